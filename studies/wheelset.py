@@ -14,7 +14,7 @@ from models.rail.energy import energy_ledger
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.equations import Y
 from models.rail.limit_cycle import positive_maxima
-from models.rail.linear import critical_or_why, kinematic_wavelength, klingel_wavelength
+from models.rail.linear import critical_speed_or_reason, kinematic_wavelength, klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset import conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
@@ -128,7 +128,7 @@ def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]
     """Lines on the critical speed and frequency in every engine, or that there is no critical speed."""
     lines = [
         "  critical speed with linear creep",
-        f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),
+        f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_speed_or_reason(wheelset)),
     ]
     first = next((linear_run.critical_speed for linear_run in linear.values()), None)
     return lines + [

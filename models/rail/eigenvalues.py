@@ -20,16 +20,16 @@ def free_wheelset(wheelset: Wheelset) -> Wheelset:
 
 def wavelength(equations_type: type[Equations], wheelset: Wheelset) -> float:
     """Wavelength (m) of the free wheelset, from the slowest oscillation among the eigenvalues."""
-    roots = values(equations_type, free_wheelset(wheelset), SLOW_SPEED)
+    roots = eigenvalues(equations_type, free_wheelset(wheelset), SLOW_SPEED)
     return 2.0 * math.pi * SLOW_SPEED / min(roots[roots.imag > 0.0], key=abs).imag
 
 
-def values(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
+def eigenvalues(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
     """Eigenvalues (9,) in 1/s of the wheelset at a speed (m/s)."""
     return np.linalg.eigvals(equations_type(wheelset, speed, "linear").state_matrix)
 
 
-def uncertainty(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
+def hunting_uncertainty(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
     """Uncertainty (1/s) of the hunting eigenvalue: its change when slopes are taken over twice the distance; NaN
     without a hunting mode."""
     equations = equations_type(wheelset, speed, "linear")
@@ -40,17 +40,17 @@ def uncertainty(equations_type: type[Equations], wheelset: Wheelset, speed: floa
 def largest_growth(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
     """Largest real part (1/s) of the wheelset's eigenvalues at a speed (m/s), as an argument for
     ``linear.critical_speed``."""
-    return float(values(equations_type, wheelset, speed).real.max())
+    return float(eigenvalues(equations_type, wheelset, speed).real.max())
 
 
 def root_locus(equations_type: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
     """Eigenvalues (speeds, 9) in 1/s of the wheelset at each speed (m/s), for a root locus."""
-    return np.array([values(equations_type, wheelset, float(speed)) for speed in speeds])
+    return np.array([eigenvalues(equations_type, wheelset, float(speed)) for speed in speeds])
 
 
-def hunting_eigenvalue(values: np.ndarray) -> np.ndarray:
+def hunting_eigenvalue(roots: np.ndarray) -> np.ndarray:
     """Eigenvalue of the hunting mode: among eigenvalues (..., 9) with positive imaginary part, the least damped one;
     NaN if there is none."""
-    oscillates = np.where(values.imag > 0.0, values.real, -math.inf)
-    root = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
+    oscillates = np.where(roots.imag > 0.0, roots.real, -math.inf)
+    root = np.take_along_axis(roots, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
     return np.where(np.isfinite(oscillates.max(axis=-1)), root, math.nan)

@@ -4,9 +4,8 @@ Stored: kinetic energy, energy of the springs and of gravity (with the vehicle's
 on the elastic contacts so far, flanges of cones included. Supplied: the work of the drive, which holds the frame at its
 speed against the creep forces along the track. Dissipated: in the suspension's dampers, in the contacts' damping and in
 creep. Each work is a further state: its power is added up at the stages of RK4 with the weights of RK4, as the path
-itself is computed. So the ledger closes to the integrator's order also where creep forces have kinks, at which a curve through
-the powers of the path's instants would not.
-"""
+itself is computed. So the ledger closes to the integrator's order also where creep forces have kinks, at which a curve
+through the powers of the path's instants would not."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -78,7 +77,11 @@ def energies_at_states(equations: Equations, states: Array) -> tuple[Array, Arra
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
     squared_speed = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
     kinetic = 0.5 * (w.mass * squared_speed + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
-    return kinetic, _spring_energy_and_damping(body, states)[0], -(w.mass * GRAVITY + 2.0 * body.carried) * states[:, Z]
+    return (
+        kinetic,
+        _spring_energy_and_damping(body, states)[0],
+        -(w.mass * GRAVITY + 2.0 * body.carried_weight) * states[:, Z],
+    )
 
 
 def _spring_energy_and_damping(body: Body, states: Array) -> tuple[Array, Array]:
@@ -87,10 +90,10 @@ def _spring_energy_and_damping(body: Body, states: Array) -> tuple[Array, Array]
     axle = np.array([-sy * cr, cy * cr, sr])
     turning = np.array([cy * states[:, ROLL_RATE], sy * states[:, ROLL_RATE], states[:, YAW_RATE]])
     energy = power = np.zeros(len(states))
-    for arm in (body.arm, -body.arm):
+    for arm in (body.half_spacing, -body.half_spacing):
         spring_travel, rate = arm * axle, np.cross(turning, arm * axle, axis=0)
         spring_travel[1] += states[:, Y] - arm
-        spring_travel[2] += states[:, Z] - body.sunk
+        spring_travel[2] += states[:, Z] - body.rest_height
         rate[1] += states[:, Y_RATE]
         rate[2] += states[:, Z_RATE]
         energy = energy + 0.5 * np.array(body.stiffness) @ spring_travel**2

@@ -39,11 +39,11 @@ from models.rail.wheel_forces import (
     Rails,
     count_of_patches,
     plain_rails,
-    rails_in,
+    rails_from_tuples,
     rails_of,
-    room_for,
     supported_force,
     wheel_forces,
+    workspace_for,
 )
 from models.rail.wheelset import GRAVITY, Wheelset
 
@@ -64,7 +64,7 @@ NO_REPORT = np.empty(0, REPORT)
 """Report without rows, for rates without contact reports, which take longer to compute than the rates."""
 
 
-Along = tuple[float, float, float]
+TrackVector = tuple[float, float, float]
 """Values along the track's axes x, y, z."""
 
 
@@ -74,15 +74,15 @@ class Body(NamedTuple):
     that weight; lean of the track; whether there is a spring or a damper."""
 
     mass: float
-    along: float
-    across: float
-    arm: float
-    stiffness: Along
-    damping: Along
-    carried: float
-    sunk: float
+    spin_inertia: float
+    yaw_inertia: float
+    half_spacing: float
+    stiffness: TrackVector
+    damping: TrackVector
+    carried_weight: float
+    rest_height: float
     lean: float
-    held: bool
+    has_suspension: bool
 
 
 class Stages(NamedTuple):
@@ -101,8 +101,8 @@ def rates(state, speed, body, rails, state_rate, report):
 
     speed, body, rails : ``parameters`` of ``Equations``.
     """
-    rails_record = rails_in(rails)
-    set_rates(state, speed, Body(*body), rails_record, state_rate, report, room_for(rails_record.profile))
+    rails_record = rails_from_tuples(rails)
+    set_rates(state, speed, Body(*body), rails_record, state_rate, report, workspace_for(rails_record.profile))
 
 
 @lean
@@ -122,9 +122,9 @@ def set_rates(state, speed, body, rails, state_rate, report, workspace):
     turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
     turning[2] = yaw_rate + axle_z * rolling
     wheel_forces(Pose(y, z, roll, yaw), rails, report, workspace)
-    force[1] += 2.0 * body.carried * body.lean
-    force[2] += 2.0 * body.carried
-    if body.held:
+    force[1] += 2.0 * body.carried_weight * body.lean
+    force[2] += 2.0 * body.carried_weight
+    if body.has_suspension:
         _add_suspension_forces(state, body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
@@ -133,10 +133,10 @@ def set_rates(state, speed, body, rails, state_rate, report, workspace):
     state_rate[ANGLE] = rolling
     state_rate[Y_RATE] = force[1] / body.mass + GRAVITY * body.lean
     state_rate[Z_RATE] = force[2] / body.mass + GRAVITY
-    whirl = body.along * spin
-    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.across - yaw_rate**2 * sr * cr
-    state_rate[SPIN] = m2 / body.along
-    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / body.across + 2.0 * roll_rate * yaw_rate * sr) / cr
+    whirl = body.spin_inertia * spin
+    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.yaw_inertia - yaw_rate**2 * sr * cr
+    state_rate[SPIN] = m2 / body.spin_inertia
+    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / body.yaw_inertia + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @lean
@@ -146,12 +146,12 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
     """
     (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = angular_velocity, body.stiffness, body.damping
     for side in (1.0, -1.0):
-        arm, turn_z = side * body.arm, state[YAW_RATE]
+        arm, turn_z = side * body.half_spacing, state[YAW_RATE]
         ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
         vx, vy, vz = turn_y * az - turn_z * ay, turn_z * ax - turn_x * az, turn_x * ay - turn_y * ax
         fx = -kx * ax - dx * vx
         fy = -ky * (state[Y] + ay - arm) - dy * (state[Y_RATE] + vy)
-        fz = -kz * (state[Z] + az - body.sunk) - dz * (state[Z_RATE] + vz)
+        fz = -kz * (state[Z] + az - body.rest_height) - dz * (state[Z_RATE] + vz)
         force[0] += fx
         force[1] += fy
         force[2] += fz
@@ -161,25 +161,34 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def march(state, parameters, steps, path, reports):
+def march(state, parameters, step_numbers, path, reports):
     """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
 
-    parameters : of ``Equations``; steps : of a length (s), how many, and every so many steps one goes into path and
-    reports.
-    """
+    parameters : of ``Equations``; step_numbers : of a length (s), how many, and every so many steps one goes into path
+    and reports."""
     stages = Stages(np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(0, REPORT))
     speed, body, rails = parameters
-    rails_record = rails_in(rails)
+    rails_record = rails_from_tuples(rails)
     return _march_with_arrays(
-        state, (speed, Body(*body), rails_record), steps, path, reports, room_for(rails_record.profile), stages
+        state,
+        (speed, Body(*body), rails_record),
+        step_numbers,
+        path,
+        reports,
+        workspace_for(rails_record.profile),
+        stages,
     )
 
 
 @lean
-def _march_with_arrays(state, parameters, steps, path, reports, workspace, stages):
+def _march_with_arrays(state, parameters, step_numbers, path, reports, workspace, stages):
     """Integrate the state over all steps with arrays allocated by the caller. Holding no references to them saves 5 %
     of the time of a bare wheelset."""
-    (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = parameters, steps, stages
+    (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = (
+        parameters,
+        step_numbers,
+        stages,
+    )
     for i in range(count + 1):
         row = i // stride
         for stage in range(4):  # one call of the rates, or it is compiled four times
@@ -239,7 +248,7 @@ class Equations:
         """Body and suspension of the wheelset."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
-        sunk = float(w.ellipse.approach) / w.slant[1]
+        sunk = float(w.ellipse.approach) / w.cone_sine_and_cosine[1]
         if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
             rails = rails_of(w)
             sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST_POSITION, xtol=1e-15))
@@ -291,7 +300,7 @@ class Equations:
     def rest(self) -> Array:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATE_COUNT)
-        start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
+        start[Z], start[SPIN] = self.body.rest_height, -self.speed / self.wheelset.radius
         return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
     def displaced_state(self, lateral_shift: float) -> Array:
@@ -299,9 +308,9 @@ class Equations:
         equilibrium."""
         start, w = self.rest.copy(), self.wheelset
         start[Y] = lateral_shift
-        start[ROLL] = -lateral_shift * w.tilt
+        start[ROLL] = -lateral_shift * w.roll_per_displacement
         if w.profiles:
-            rise, start[ROLL] = w.profiles.touching(w.radius, lateral_shift)
+            rise, start[ROLL] = w.profiles.first_touch_pose(w.radius, lateral_shift)
             start[Z] += rise
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
@@ -310,7 +319,7 @@ class Equations:
     ) -> Array:
         """State in which two coordinates are solved for so that two accelerations vanish."""
         state_indices = list(coordinates)
-        scale = np.maximum(np.abs(start_state[state_indices]), self.body.sunk)
+        scale = np.maximum(np.abs(start_state[state_indices]), self.body.rest_height)
 
         def displaced(unknowns: Array) -> Array:
             state = start_state.copy()
@@ -344,13 +353,13 @@ class Equations:
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
         contacts' largest loads among the states that are kept or, where all are, for the motion.
         """
-        count = self._steps(state, duration, step, stride)
-        states, contacts = self._marched(np.array(state, float), count, step, stride)
+        count = self._checked_step_count(state, duration, step, stride)
+        states, contacts = self._states_and_contacts(np.array(state, float), count, step, stride)
         path = WheelsetPath(np.arange(len(states)) * step * stride, states, contacts=contacts)
         self.check(path, step, stride)
         return path
 
-    def _marched(self, state: Array, step_count: int, step: float, stride: int) -> tuple[Array, Array]:
+    def _states_and_contacts(self, state: Array, step_count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
         row_count = step_count // stride + 1
         states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
@@ -381,7 +390,7 @@ class Equations:
                     path.times[k],
                 )
 
-    def _steps(self, state: Array, duration: float, step: float, stride: int) -> int:
+    def _checked_step_count(self, state: Array, duration: float, step: float, stride: int) -> int:
         """Number of steps of a run, after checks of state, duration, step and stride."""
         if quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
             raise InputError("", "state", None, f"must be {STATE_COUNT} finite numbers")

@@ -93,7 +93,7 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: f
     table; or where there are several and ``centre_guess`` is not given.
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
-    first_displacement, last_displacement = table.ends
+    first_displacement, last_displacement = table.displacement_range
     if 0.0 <= 2.0 * amplitude - (last_displacement - first_displacement) <= AMPLITUDE_TOLERANCE * amplitude:
         amplitude = (last_displacement - first_displacement) / 2.0
     if 2.0 * amplitude > last_displacement - first_displacement:
@@ -157,7 +157,7 @@ def _parabola_roots(begin_value: float, middle_value: float, end_value: float) -
 
 def _wave_from_turning_point(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
     """The wave whose left turning point is ``low``; None if the motion would stop before the other turning point."""
-    y, dr = table.between(low, low + 2.0 * amplitude)
+    y, dr = table.section(low, low + 2.0 * amplitude)
     if dr[0] > 0.0 or dr[-1] < 0.0:
         return None
     length = np.diff(y)
@@ -211,7 +211,7 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     idle = _idle_centre(table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
-    dr, (first_displacement, last_displacement) = table.differences, table.ends
+    dr, (first_displacement, last_displacement) = table.differences, table.displacement_range
     rises = table.difference(last_displacement, "left") - table.difference(first_displacement)
     if (dr >= 0.0).all() or (dr <= 0.0).all():
         why = (

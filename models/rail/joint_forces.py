@@ -30,13 +30,13 @@ from models.rail.equations import (
     Z,
 )
 from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile, Pose
-from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
+from models.rail.wheel_forces import REPORT, WHEELS, Rails, wheel_forces, workspace_for
 
 JOINTS = 5
 TABLE_HEAD = record("speed", "law", "middle", "nodes", "knots", "strips", "cells")
 """Head of the table: speed (m/s), creep law, FASTSIM's middle; counts of the wheel's nodes, of the rail's knots, of
 strips and of cells. Then WHEELS, PROFILE_COUNTS, nodes, knots, and FASTSIM's strips and cells."""
-IN_HEAD, IN_WHEELS, IN_PROFILE, IN_NODE, IN_KNOT = (
+HEAD_SIZE, WHEELS_SIZE, PROFILE_SIZE, NODE_SIZE, KNOT_SIZE = (
     size_of(kind) for kind in (TABLE_HEAD, WHEELS, PROFILE_COUNTS, WHEEL_NODE, RAIL_KNOT)
 )
 PER_STRIP, PER_CELL = 4, 5
@@ -53,15 +53,15 @@ def table(speed: float, rails: Rails) -> Array:
 
 
 @inlined
-def rails_at(table_pointer):
+def rails_from_table(table_pointer):
     """``Rails`` as views of the table at a pointer to doubles."""
     head = records(table_pointer, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
-    wheels = beyond(table_pointer, IN_HEAD)
-    profile = beyond(wheels, IN_WHEELS)
-    first_node = beyond(profile, IN_PROFILE)
-    first_knot = beyond(first_node, IN_NODE * nodes)
-    first_strip = beyond(first_knot, IN_KNOT * knots)
+    wheels = beyond(table_pointer, HEAD_SIZE)
+    profile = beyond(wheels, WHEELS_SIZE)
+    first_node = beyond(profile, PROFILE_SIZE)
+    first_knot = beyond(first_node, NODE_SIZE * nodes)
+    first_strip = beyond(first_knot, KNOT_SIZE * knots)
     first_cell = beyond(first_strip, PER_STRIP * strips)
     return Rails(
         records(wheels, 1, WHEELS),
@@ -77,14 +77,14 @@ def rails_at(table_pointer):
     )
 
 
-def to_joints(states: Array) -> Array:
+def joints_from_states(states: Array) -> Array:
     """Joint positions and rates (..., 10) from a wheelset's states (..., 10)."""
     of_joints = states[..., _POSITIONS + _RATES]
     of_joints[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return of_joints
 
 
-def from_joints(joints: Array) -> Array:
+def states_from_joints(joints: Array) -> Array:
     """States (..., 10) of a wheelset from joint positions and rates (..., 10)."""
     states = np.empty(joints.shape)
     states[..., _POSITIONS + _RATES] = joints
@@ -92,7 +92,7 @@ def from_joints(joints: Array) -> Array:
     return states
 
 
-def rates_of(joints: Array, accelerations: Array) -> Array:
+def state_rates(joints: Array, accelerations: Array) -> Array:
     """Time derivative (10,) of a wheelset's state, from positions and rates (10,) and accelerations (5,) of the
     joints."""
     state_rate = np.empty(STATE_COUNT)
@@ -109,7 +109,7 @@ def joint_forces(table_pointer, t, q, v, forces_out):
 
     The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
-    rails, speed = rails_at(table_pointer), records(table_pointer, 1, TABLE_HEAD)[0].speed
+    rails, speed = rails_from_table(table_pointer), records(table_pointer, 1, TABLE_HEAD)[0].speed
     y, z, yaw, roll, _ = array(q, (JOINTS,))
     y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
     joint_forces_view = array(forces_out, (JOINTS,))
@@ -118,7 +118,7 @@ def joint_forces(table_pointer, t, q, v, forces_out):
         return
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
-    room = room_for(rails.profile)
+    room = workspace_for(rails.profile)
     wheelset = room.wheelset[0]
     force, moment, velocity, turning = wheelset.force, wheelset.moment, wheelset.velocity, wheelset.turning
     velocity[0], velocity[1], velocity[2] = speed, y_rate, z_rate

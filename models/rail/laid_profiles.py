@@ -49,7 +49,7 @@ class Profiles(Strict):
     back_to_back: float = quantity("m", "between the backs of the flanges", default=1.360)
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
-    def located(self, scene: SceneFile) -> "Profiles":
+    def with_full_paths(self, scene: SceneFile) -> "Profiles":
         """These profiles with full paths of the files. Raises InputError for a name that is neither a file nor built
         in."""
         files = {}
@@ -61,7 +61,7 @@ class Profiles(Strict):
                 raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(known))
         return self.model_copy(update=files)
 
-    def side(self, radius: float) -> WheelAndRail:
+    def wheel_on_rail(self, radius: float) -> WheelAndRail:
         """The right wheel with a radius (m) on its rail. Raises InputError for files that contain no profile."""
         rail = _contact_profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
@@ -70,12 +70,12 @@ class Profiles(Strict):
             Wheelset(radius, self.back_to_back, self.taping),
         )
 
-    def touching(self, radius: float, lateral_shift: float) -> tuple[float, float]:
+    def first_touch_pose(self, radius: float, lateral_shift: float) -> tuple[float, float]:
         """Rise (m) of the wheelset from its height in the middle of the track, and roll (rad), at which both wheels
         just touch at a lateral displacement (m). Raises InputError if they cannot."""
-        side = self.side(radius)
-        pose = touching_pose(side, lateral_shift, 0.0)
-        return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
+        wheel_on_rail = self.wheel_on_rail(radius)
+        pose = touching_pose(wheel_on_rail, lateral_shift, 0.0)
+        return pose.fall - wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
 def _contact_profile(name: str, profile_kind: Kind, smoothing: float) -> ContactProfile:
@@ -92,20 +92,22 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
     """``LaidProfile`` that ``profile_on_rail`` reads, for wheels with a radius (m) at the taping line."""
     from scipy.interpolate import CubicSpline
 
-    side = profiles.side(radius)
-    tip = int(np.argmax(side.wheel.z))
-    y = _evenly_spaced(side.wheel.y[tip:], side.wheel.z[tip:], NODE_SPACING)
-    curve = side.wheel.curve
+    wheel_on_rail = profiles.wheel_on_rail(radius)
+    tip = int(np.argmax(wheel_on_rail.wheel.z))
+    y = _evenly_spaced(wheel_on_rail.wheel.y[tip:], wheel_on_rail.wheel.z[tip:], NODE_SPACING)
+    curve = wheel_on_rail.wheel.curve
     touched = [
-        (shift, touch[0]) for shift in LATERAL_SHIFTS.tolist() if (touch := _first_contact(side, shift)) is not None
+        (shift, touch[0])
+        for shift in LATERAL_SHIFTS.tolist()
+        if (touch := _first_contact(wheel_on_rail, shift)) is not None
     ]
-    cuts = [cut for cut in (_ridge_position(side, *pair) for pair in pairwise(touched)) if cut is not None]
+    cuts = [cut for cut in (_ridge_position(wheel_on_rail, *pair) for pair in pairwise(touched)) if cut is not None]
     nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones_of_positions(y, cuts)])
-    knots = _evenly_spaced(side.rail.y, side.rail.z, KNOT_SPACING)
-    cubic = CubicSpline(knots, side.rail.curve(knots)).c
+    knots = _evenly_spaced(wheel_on_rail.rail.y, wheel_on_rail.rail.z, KNOT_SPACING)
+    cubic = CubicSpline(knots, wheel_on_rail.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
-    level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
-    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, side.wheelset.arm, level]]
+    level = wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
+    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, wheel_on_rail.wheelset.arm, level]]
     return LaidProfile(
         *(_read_only_records(*pair) for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE), (rail, RAIL_KNOT)))
     )

@@ -78,8 +78,8 @@ class Orbit:
     equations: Equations
     state: Array
     period: float
-    steps: int
-    slopes: Array
+    step_count: int
+    return_slopes: Array
     error: float = math.nan
     frequency_error: float = math.nan
 
@@ -101,7 +101,7 @@ class Orbit:
     @property
     def multiplier(self) -> float:
         """Largest magnitude of the Floquet multipliers of the orbit; it is stable below 1."""
-        by_states, back = self.slopes[:, : len(RETURNING_STATES)], self.slopes[:, PERIOD_COLUMN]
+        by_states, back = self.return_slopes[:, : len(RETURNING_STATES)], self.return_slopes[:, PERIOD_COLUMN]
         returned = by_states - np.outer(back, by_states[RATE_INDEX]) / back[RATE_INDEX]
         return float(np.abs(np.linalg.eigvals(returned[np.ix_(SECTION_COORDINATES, SECTION_COORDINATES)])).max())
 
@@ -112,7 +112,7 @@ class Orbit:
 
     def path(self) -> WheelsetPath:
         """Motion of the wheelset over one period, including both ends."""
-        return self.equations.run(self.state, self.period, self.period / self.steps)
+        return self.equations.run(self.state, self.period, self.period / self.step_count)
 
 
 def guess_near_state(
@@ -122,7 +122,9 @@ def guess_near_state(
     most ``step`` (s)."""
     start = state.copy()
     start[Y_RATE] = 0.0
-    return _with_slopes(Orbit(equations, start, orbit_period, math.ceil(orbit_period / step), np.empty(0)), executor)
+    return _with_return_slopes(
+        Orbit(equations, start, orbit_period, math.ceil(orbit_period / step), np.empty(0)), executor
+    )
 
 
 def orbit_of_small_amplitude(
@@ -210,15 +212,15 @@ def solved_orbit(
     orbit, fresh, left = orbit_guess, False, math.inf
     for _ in range(MOST_NEWTON_STEPS):
         try:
-            end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
+            end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.step_count)
         except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
             break
         missed = ((end - orbit.state) / STATE_SIZES)[RETURNING_STATES]
         size = float(np.abs(missed).max())
         if size < CLOSURE_TOLERANCE:
-            return orbit if fresh or not precise else _with_slopes(orbit, executor)
+            return orbit if fresh or not precise else _with_return_slopes(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
-            orbit, fresh = _with_slopes(orbit, executor), True
+            orbit, fresh = _with_return_slopes(orbit, executor), True
         orbit, left, fresh = _newton_corrected(orbit, missed, sought_quantity), size, False
     raise RunFailed(
         "wheelset", f"no periodic motion was found near {orbit_guess.speed:.6g} m/s and {orbit_guess.amplitude:.3g} m"
@@ -228,7 +230,7 @@ def solved_orbit(
 def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor: Executor | None = None) -> Orbit:
     """Orbit computed with half the step, with the changes of its speed or amplitude and of its frequency as errors."""
     half = solved_orbit(
-        replace(known_orbit, steps=2 * known_orbit.steps), sought_quantity, precise=False, executor=executor
+        replace(known_orbit, step_count=2 * known_orbit.step_count), sought_quantity, precise=False, executor=executor
     )
     return replace(
         half,
@@ -237,18 +239,18 @@ def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor:
     )
 
 
-def _state_after(equations: Equations, state: Array, orbit_period: float, steps: int) -> Array:
-    return equations.run(state, orbit_period, orbit_period / steps, steps).states[-1]
+def _state_after(equations: Equations, state: Array, orbit_period: float, step_count: int) -> Array:
+    return equations.run(state, orbit_period, orbit_period / step_count, step_count).states[-1]
 
 
-Guess = tuple[Equations, Array, float]
+OrbitGuess = tuple[Equations, Array, float]
 """Start of an orbit: equations, state (10,) and period (s)."""
 
 
-def _with_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
+def _with_return_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
     """The orbit with the derivatives of its return map computed about itself."""
     eq, T, state, signs = known_orbit.equations, known_orbit.period, known_orbit.state, (-1.0, 1.0)
-    pairs: list[list[Guess]] = [
+    pairs: list[list[OrbitGuess]] = [
         *(
             [(eq, state + sign * DIFFERENCE_SHARE * STATE_SIZES[k] * np.eye(STATE_COUNT)[k], T) for sign in signs]
             for k in RETURNING_STATES
@@ -256,25 +258,25 @@ def _with_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
         [(replace(eq, speed=eq.speed + sign * DIFFERENCE_SHARE), state, T) for sign in signs],
         [(eq, state, T * (1.0 + sign * DIFFERENCE_SHARE)) for sign in signs],
     ]
-    ends = block_results(partial(_ends_of_period, steps=known_orbit.steps), pairs, executor)
+    ends = block_results(partial(_ends_of_period, step_count=known_orbit.step_count), pairs, executor)
     columns = [
         ((end_after - end_before) / (2.0 * DIFFERENCE_SHARE * STATE_SIZES))[RETURNING_STATES]
         for end_before, end_after in ends
     ]
-    return replace(known_orbit, slopes=np.array(columns).T)
+    return replace(known_orbit, return_slopes=np.array(columns).T)
 
 
-def _ends_of_period(guess_pair: list[Guess], steps: int) -> list[Array]:
-    return [_state_after(*guess, steps) for guess in guess_pair]
+def _ends_of_period(guess_pair: list[OrbitGuess], step_count: int) -> list[Array]:
+    return [_state_after(*guess, step_count) for guess in guess_pair]
 
 
-def _newton_corrected(known_orbit: Orbit, missed: Array, sought_quantity: SoughtQuantity) -> Orbit:
+def _newton_corrected(known_orbit: Orbit, mismatch: Array, sought_quantity: SoughtQuantity) -> Orbit:
     """The orbit after a Newton correction with its slopes; the lateral rate stays zero."""
-    returned = known_orbit.slopes.copy()
+    returned = known_orbit.return_slopes.copy()
     returned[:, : len(RETURNING_STATES)] -= np.eye(len(RETURNING_STATES))
     free = [k for k in SECTION_COORDINATES if k != AMPLITUDE_INDEX]
     columns = [*free, AMPLITUDE_INDEX if sought_quantity == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
-    *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
+    *section, change, longer = -np.linalg.solve(returned[:, columns], mismatch)
     state, speed = known_orbit.state.copy(), known_orbit.speed
     state_indices = [RETURNING_STATES[k] for k in free]
     state[state_indices] += section * STATE_SIZES[state_indices]
@@ -311,16 +313,20 @@ def attained_cycle(
     )
 
 
-def positive_maxima(values: Array) -> np.ndarray:
+def positive_maxima(samples: Array) -> np.ndarray:
     """Indices of the positive local maxima."""
-    previous_values, middle_values, next_values = values[:-2], values[1:-1], values[2:]
+    previous_values, middle_values, next_values = samples[:-2], samples[1:-1], samples[2:]
     return 1 + np.flatnonzero(
         (middle_values > previous_values) & (middle_values >= next_values) & (middle_values > 0.0)
     )
 
 
 def bifurcation(
-    equations: Equations, slowest: float, fastest: float, step: float = 5e-4, executor: Executor | None = None
+    equations: Equations,
+    lowest_speed: float,
+    highest_speed: float,
+    step: float = 5e-4,
+    executor: Executor | None = None,
 ) -> Iterator[Orbit]:
     """Limit cycles of increasing amplitude, from the critical speed on until the speed of a cycle leaves a range (m/s).
 
@@ -340,7 +346,7 @@ def bifurcation(
     yield refined_orbit(first, "speed", executor)
     for amplitudes in (inner, outer):
         for orbit in branch_of_orbits(first, amplitudes, executor):
-            if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST_AMPLITUDE * clearance:
+            if not lowest_speed <= orbit.speed <= highest_speed or orbit.amplitude > LARGEST_AMPLITUDE * clearance:
                 return
             first = orbit
             yield refined_orbit(orbit, "speed", executor)

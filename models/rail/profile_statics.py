@@ -31,7 +31,7 @@ class Equilibrium:
     touches: Array
     loads: Array
 
-    def radii(self) -> Array:
+    def rolling_radii(self) -> Array:
         """Rolling radii (2,) of the right and the left wheel (m); each is the load-weighted mean over the wheel's
         patches."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
@@ -49,7 +49,7 @@ def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
     if wheelset.profiles is None:
         raise InputError("", "wheelset", None, "has cones: this needs profiles")
     rails, half = rails_of(wheelset), 0.5 * wheelset.load
-    z, roll = wheelset.profiles.touching(wheelset.radius, lateral_shift)
+    z, roll = wheelset.profiles.first_touch_pose(wheelset.radius, lateral_shift)
 
     def pose(unknowns: Array) -> Equilibrium:
         touches = np.zeros(count_of_patches(rails.profile), TOUCH)
@@ -77,5 +77,7 @@ def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     """The wheelset on cones with the equivalent conicity that its profiles have at an amplitude (m), for
     ``models.rail.linear``."""
     shifts = np.linspace(0.0, amplitude, SHIFT_COUNT + 1)
-    differences = np.array([0.0, *(-np.diff(equilibrium(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
+    differences = np.array(
+        [0.0, *(-np.diff(equilibrium(wheelset, float(shift)).rolling_radii())[0] for shift in shifts[1:])]
+    )
     return wheelset.coned(harmonic_linearised_conicity(shifts, differences, amplitude)).changed(profiles=None)

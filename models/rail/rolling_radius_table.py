@@ -73,31 +73,33 @@ class RollingRadiusTable:
         return np.append(0.0, np.cumsum(np.diff(y) * (dr[1:] + dr[:-1]) / 2.0))
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def displacement_range(self) -> tuple[float, float]:
         """First and last displacement of the table."""
         return float(self.displacements[0]), float(self.displacements[-1])
 
-    def between(self, low: float, high: float) -> tuple[Array, Array]:
+    def section(self, low: float, high: float) -> tuple[Array, Array]:
         """Displacements and differences of the section of the table from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
         first_row, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
-        ends = self.difference(low, "right"), self.difference(high, "left")
-        return np.array([low, *y[first_row:last_row], high]), np.array([ends[0], *dr[first_row:last_row], ends[1]])
+        end_differences = self.difference(low, "right"), self.difference(high, "left")
+        return np.array([low, *y[first_row:last_row], high]), np.array(
+            [end_differences[0], *dr[first_row:last_row], end_differences[1]]
+        )
 
     def difference(self, displacement: float, side_of_jump: Any = "right") -> float:
         """Rolling radius difference at a displacement; at a jump, the value on the given side of the jump."""
-        i, share = self._row_before(displacement, side_of_jump)
+        i, share = self._row_and_fraction(displacement, side_of_jump)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
 
     def integral(self, displacement: float) -> float:
         """Integral of the difference from the first row to a displacement, in the square of the table's unit."""
-        i, share = self._row_before(displacement, "right")
+        i, share = self._row_and_fraction(displacement, "right")
         y, dr = self.displacements, self.differences
         step = share * (y[i + 1] - y[i])
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
-    def _row_before(self, displacement: float, side_of_jump: Any) -> tuple[int, float]:
+    def _row_and_fraction(self, displacement: float, side_of_jump: Any) -> tuple[int, float]:
         """Index of the row before a displacement, and the fraction of the way from that row to the next."""
         y = self.displacements
         i = int(np.clip(np.searchsorted(y, displacement, side_of_jump) - 1, 0, y.size - 2))

@@ -37,7 +37,7 @@ from models.rail.laid_profiles import laid_profile, no_profile
 from models.rail.profile_contact import TOUCH, LaidProfile, Pose, normal_force_and_axes, profile_on_rail
 from models.rail.wheelset import Wheelset
 
-REGULAR = 0.1
+REGULARISED_SPEED = 0.1
 """Speed of travel (m/s) below which creepage is taken relative to this speed instead."""
 LINEAR, FASTSIM = 0, 1
 LAW_NUMBERS = {"linear": LINEAR, "fastsim": FASTSIM}
@@ -132,7 +132,7 @@ class PatchMotion(NamedTuple):
     rate: float
 
 
-class Pressed(NamedTuple):
+class PatchNormalContact(NamedTuple):
     """Normal contact of a patch: penetration and semi-axes (m); elastic normal force, normal force with damping, and
     lateral force of a cone's flange (N)."""
 
@@ -148,7 +148,7 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
     """Rails under a wheelset, with FASTSIM's grid for its contact ellipse at rest (see ``fastsim_grid``)."""
     if isinstance(cells, bool) or not isinstance(cells, int) or not LEAST_CELLS <= cells <= MOST_CELLS:
         raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
-    w, pair, ellipse = wheelset, wheelset.pair, wheelset.ellipse
+    w, pair, ellipse = wheelset, wheelset.material_pair, wheelset.ellipse
     shape = w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu
     wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
     profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
@@ -163,7 +163,7 @@ def plain_rails(rails: Rails) -> tuple[Any, ...]:
 
 
 @inlined
-def rails_in(plain_tuples):
+def rails_from_tuples(plain_tuples):
     """``Rails`` made from the plain tuples of ``plain_rails``."""
     wheels, (head, nodes, knots), strips, cells, middle, law = plain_tuples
     return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
@@ -176,7 +176,7 @@ def count_of_patches(profile):
 
 
 @njit(cache=True, error_model="numpy")
-def room_for(profile):
+def workspace_for(profile):
     """``Workspace`` for the contacts of a wheelset on these profiles (or cones)."""
     n = count_of_patches(profile)
     return Workspace(
@@ -241,7 +241,7 @@ def _linear_forces(a, b, motion, shear, poisson):
 def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
     """Fill the creep forces fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll
     backwards (sign -1)."""
-    reference_speed = max(abs(speed), REGULAR)
+    reference_speed = max(abs(speed), REGULARISED_SPEED)
     for k in range(len(contacts)):
         contact = contacts[k]
         contact.xi_x, contact.xi_y = sign * slip[k].vx / reference_speed, slip[k].aside / reference_speed
@@ -263,14 +263,14 @@ def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
 
 
 @lean
-def _both_ways(forwards, contacts, slip, speed, rails, workspace):
-    """Fill the creep forces fx, fy, mz in ``workspace`` with a mixture of forward and backward rolling; ``forwards`` is
-    the weight of forward rolling."""
+def _fill_both_directions(forward_share, contacts, slip, speed, rails, workspace):
+    """Fill the creep forces fx, fy, mz in ``workspace`` with a mixture of forward and backward rolling;
+    ``forward_share`` is the weight of forward rolling."""
     for k in range(len(contacts)):
         workspace.forces[k].fx = workspace.forces[k].fy = workspace.forces[k].mz = 0.0
     directed = workspace.directed[: len(contacts)]
     for sign in (1.0, -1.0):
-        share = forwards if sign > 0.0 else 1.0 - forwards
+        share = forward_share if sign > 0.0 else 1.0 - forward_share
         if share > 0.0:
             _fill_one_direction(sign, contacts, slip, speed, rails, directed)
             for k in range(len(contacts)):
@@ -290,10 +290,10 @@ def fill_creep_forces(contacts, slip, speed, rails, workspace):
         for k in range(len(contacts)):
             c = contacts[k]
             c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
-    if speed >= REGULAR:
+    if speed >= REGULARISED_SPEED:
         _fill_one_direction(1.0, contacts, slip, speed, rails, workspace.forces[: len(contacts)])
     else:
-        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, workspace)
+        _fill_both_directions(max(0.0, 0.5 + 0.5 * speed / REGULARISED_SPEED), contacts, slip, speed, rails, workspace)
 
 
 @inlined
@@ -303,7 +303,7 @@ def wheel_forces(pose, rails, report, workspace):
     pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; workspace : ``Workspace``, its
     wheelset given in, all else written over.
     """
-    if rails.law == LINEAR and rails.profile.nodes.size == 0 and workspace.wheelset[0].velocity[0] >= REGULAR:
+    if rails.law == LINEAR and rails.profile.nodes.size == 0 and workspace.wheelset[0].velocity[0] >= REGULARISED_SPEED:
         _linear_cones(pose, rails.wheels[0], workspace.wheelset[0], report)
     else:
         patch_by_patch(pose, rails, report, workspace)
@@ -326,7 +326,7 @@ def _linear_cones(pose, wheels, wheelset, report):
         slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
         creeping = _linear_forces(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
-        press = Pressed(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
+        press = PatchNormalContact(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
         _add_patch_forces(patch_point, press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
             _fill_report(patch_point, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
@@ -352,11 +352,11 @@ def patch_by_patch(pose, rails, report, workspace):
             workspace.motion[count].patch, count = k, count + 1
     fill_creep_forces(workspace.contacts[:count], workspace.motion[:count], velocity[0], rails, workspace)
     for k in range(len(report)):
-        _blank_report(report[k])
+        _clear_report(report[k])
     for i in range(count):
         contact, m, answer = workspace.contacts[i], workspace.motion[i], workspace.forces[i]
         touch = touches[int(m.patch)]
-        press = Pressed(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
+        press = PatchNormalContact(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz
         _add_patch_forces(_patch_place(touch), press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
@@ -420,7 +420,7 @@ def _add_patch_forces(patch_point, press, creeping, force, moment):
 
 
 @lean
-def _blank_report(report):
+def _clear_report(report):
     """Fill the report of a patch without contact with zeros."""
     report.load = report.fx = report.fy = report.mz = report.xi_x = report.xi_y = report.spin = 0.0
     report.a = report.b = report.depth = report.power = report.angle = report.x = report.y = report.z = 0.0
@@ -433,7 +433,7 @@ def _fill_report(patch_point, motion, press, creeping, speed, report):
     fx, fy, mz = creeping
     vx, vy, side_speed, turn, rate = motion
     report.load, report.fx, report.fy, report.mz = press.load, fx, fy, mz
-    reference_speed = max(abs(speed), REGULAR)
+    reference_speed = max(abs(speed), REGULARISED_SPEED)
     report.xi_x, report.xi_y, report.spin = vx / reference_speed, side_speed / reference_speed, turn / reference_speed
     report.a, report.b, report.depth = press.a, press.b, press.depth
     report.angle = math.atan2(-patch_point.n_y, patch_point.n_z)

@@ -61,18 +61,18 @@ class Wheelset(Strict):
         return self
 
     @property
-    def pair(self) -> MaterialPair:
+    def material_pair(self) -> MaterialPair:
         """Materials of wheel and rail, which are equal."""
         return MaterialPair(self.material, self.material)
 
     @property
-    def slant(self) -> tuple[float, float]:
+    def cone_sine_and_cosine(self) -> tuple[float, float]:
         """Sine and cosine of the cone's half angle."""
         cosine = (1.0 + self.conicity**2) ** -0.5
         return self.conicity * cosine, cosine
 
     @property
-    def tilt(self) -> float:
+    def roll_per_displacement(self) -> float:
         """Roll to the left per lateral displacement to the right (rad/m), for small displacements."""
         return self.conicity / (self.half_gauge - self.conicity * self.radius)
 
@@ -80,7 +80,7 @@ class Wheelset(Strict):
     def equivalent_conicity(self) -> float:
         """Change of a wheel's rolling radius per lateral displacement (-), including the effect of roll; exact for
         small displacements."""
-        return self.tilt * (self.half_gauge + self.head_radius * self.slant[0])
+        return self.roll_per_displacement * (self.half_gauge + self.head_radius * self.cone_sine_and_cosine[0])
 
     def coned(self, equivalent: float) -> "Wheelset":
         """Returns a copy of the wheelset on cones with this equivalent conicity, as profiles have at some amplitude."""
@@ -100,9 +100,9 @@ class Wheelset(Strict):
     @property
     def ellipse(self) -> Hertz:
         """Contact ellipse of one wheel in the middle of the track, under half the load."""
-        cosine = self.slant[1]
+        cosine = self.cone_sine_and_cosine[1]
         load = self.load / (2.0 * cosine)
-        return by_load(cosine / (2.0 * self.radius), 1.0 / (2.0 * self.head_radius), load, self.pair)
+        return by_load(cosine / (2.0 * self.radius), 1.0 / (2.0 * self.head_radius), load, self.material_pair)
 
 
 CHOSEN_WHEELSET = Wheelset(

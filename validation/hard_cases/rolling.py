@@ -74,7 +74,7 @@ def reversal(implementation: str, folder: Path) -> float:
     """Largest jump of an acceleration, divided by mu N / m, where the speed passes 0 and the limits of its
     regularisation."""
     jumps = []
-    for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
+    for middle in (-wf.REGULARISED_SPEED, 0.0, wf.REGULARISED_SPEED):
         rates_below, rates_above = (
             built_wheelset(implementation, CHOSEN_WHEELSET, middle + speed_offset) for speed_offset in (-1e-9, 1e-9)
         )
