@@ -1,6 +1,4 @@
-"""Compiled loops over copies of a vehicle whose springs are bent or whose tyres may lift: its laws, and steps of the
-Runge-Kutta method.
-"""
+"""Compiled time integration of many copies of a vehicle with nonlinear springs, or with tyres that may lift off."""
 
 import math
 from typing import NamedTuple
@@ -10,14 +8,15 @@ import numpy as np
 from models.machine.compiled import lean, njit
 
 POWERS_SUMMED = 4
-"""Of the outputs, from the first on, that are summed."""
+"""Count of powers of the outputs, from the first on, that are summed."""
 COPIES_SIDE_BY_SIDE = 64
-"""Copies that are stepped side by side, in vector registers: one after the other they take four times as long."""
+"""Count of copies that are integrated side by side in vector registers: one after the other they take four times as
+long."""
 
 
 class Curves(NamedTuple):
-    """Curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope (s,), and changes of
-    slope, bends (s, k), at k corners (s, k); unused bends are 0."""
+    """Piecewise linear force curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope
+    (s,), and changes of slope, bends (s, k), at k corners (s, k); unused bends are 0."""
 
     offset: np.ndarray
     slope: np.ndarray
@@ -26,8 +25,8 @@ class Curves(NamedTuple):
 
 
 class PushingTyres(NamedTuple):
-    """Tyres that only push: index (u,) of the wheel of each, static load (u,) in N, stiffness (u,) in N/m, damping (u,)
-    in N s/m, heights (u, n): rise of the wheel per coordinate."""
+    """Tyres that cannot pull: index (u,) of the wheel of each, static load (u,) in N, stiffness (u,) in N/m, damping
+    (u,) in N s/m, heights (u, n): rise of the wheel per coordinate."""
 
     wheel: np.ndarray
     load: np.ndarray
@@ -37,8 +36,8 @@ class PushingTyres(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Force laws and linear motion of n coordinates over w wheels, with s nonlinear springs, u tyres that only push,
-    and p outputs.
+    """Force laws and linear equations of motion of n coordinates over w wheels, with s nonlinear springs, u tyres that
+    cannot pull, and p outputs.
 
     rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s + u): accelerations by positions, rates, road, bent
     forces and what tyres that only push have beside linear ones; read (p, 3 n + 2 w + s + u): outputs by positions,
@@ -58,7 +57,7 @@ class Laws(NamedTuple):
 
 @lean
 def add(total, factor, values):
-    """Add ``factor`` times a row (copies,) to another row; nothing is done where the factor is 0."""
+    """Add ``factor`` times a row (copies,) to another row ``total``; nothing is done where the factor is 0."""
     if factor != 0.0:
         for c in range(total.size):
             total[c] += factor * values[c]
@@ -66,7 +65,8 @@ def add(total, factor, values):
 
 @lean
 def on_curve(curves, spring, argument, force):
-    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel or rate, ``argument`` (copies,)."""
+    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel (m) or rate (m/s), ``argument``
+    (copies,)."""
     offset, slope = curves.offset[spring], curves.slope[spring]
     for c in range(force.size):
         force[c] += offset + slope * argument[c]
@@ -79,7 +79,7 @@ def on_curve(curves, spring, argument, force):
 
 @lean
 def off_road(u, x, road, tyres, pressed, rate, missing_force):
-    """Fill ``missing_force`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0
+    """Fill ``missing_force`` (copies,) in N: the force of a tyre that cannot pull, minus that of a linear tyre. It is 0
     on the road, and cancels the pull of a lifted tyre.
 
     pressed, rate (copies,) are overwritten.
@@ -100,8 +100,8 @@ def off_road(u, x, road, tyres, pressed, rate, missing_force):
 
 @lean
 def fill_rates(x, road, laws, force, state_rate, workspace):
-    """Fill the time derivatives (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the
-    nonlinear forces (s + u, copies) in N; room (2, copies) is overwritten."""
+    """Fill the time derivatives (2 n, copies) of the states (positions, then rates) on roads (2 w, copies), and the
+    nonlinear forces (s + u, copies) in N."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
     for s in range(springs):
         travel, slip, bent = workspace[0], workspace[1], force[s]
@@ -129,7 +129,7 @@ def fill_rates(x, road, laws, force, state_rate, workspace):
 
 @lean
 def fill_output(p, x, road, rate, force, laws, output):
-    """Fill one output (copies,) from the states and their time derivatives."""
+    """Fill output p (copies,) from the states and their time derivatives."""
     n, w = x.shape[0] // 2, road.shape[0]
     output[:] = 0.0
     for j in range(2 * n):
@@ -163,8 +163,8 @@ def states_ahead(x, time, rate, next_states):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def march(states, roads, step, first, every, laws, power_sums):
-    """Advance the copies by steps (s) of the classical Runge-Kutta method, and sum up powers of their outputs on the
-    way.
+    """Integrate all copies by the classical Runge-Kutta method with a fixed step (s), and sum up powers of their
+    outputs.
 
     states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; sums (4, p, copies) gain
     the outputs, their squares, cubes and fourth powers before step ``first`` and each ``every``-th after it.

@@ -1,4 +1,5 @@
-"""Spectra of a vehicle's outputs, and variances as integrals over them: independent of the covariance equation.
+"""Spectra of a vehicle's outputs on a random road, and variances as integrals over them: independent of the covariance
+equation.
 
 Transfer functions come from the dynamic stiffness K + i w D - w^2 M, frequency by frequency; the road is put in front
 as a factor. The integrand of a delay, f(w) e^(i w tau), is smooth but for its oscillation: f is interpolated by
@@ -29,21 +30,24 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, poles
 
 GAUSS_POINTS = 16
-"""Gauss points of a panel."""
+"""Count of Gauss points of a panel."""
 LOWEST_RATIO, HIGHEST_RATIO = 0.02, 1e12
-"""Ends of the first and of the last panel, by the lowest and the highest frequency of vehicle and road. Not lower: near
-zero the stiffness of a free vehicle is all rounding, so that the first panel is not halved for ever either."""
+"""Ratios of the ends of the first and of the last panel to the lowest and the highest frequency of vehicle and road.
+Not lower: near zero the stiffness of a free vehicle is only rounding, so that the first panel is not halved for ever
+either."""
 PANEL_TOLERANCE = 1e-11
-"""A panel is halved while that changes any variance by more than this share; MOST_PANELS at most in all."""
+"""Relative change of a variance by halving a panel above which the panel is halved again; MOST_PANELS panels at
+most."""
 MOST_PANELS = 1500
 EPS = float(np.finfo(float).eps)
 GROWTH_SHARE = 1e-6
-"""Share of the fastest rate: a Jordan pair of zeros comes out at the root of rounding."""
+"""Share of the fastest rate below which a growth rate counts as rounding: a Jordan pair of zeros comes out at the root
+of rounding."""
 SILENCE_SHARE = 1e-24
-"""Share of its terms' squares below which an output is zero by symmetry, and rounding is all of it."""
+"""Share of its terms' squares below which an output is zero by symmetry, so that its value is only rounding."""
 
 Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
-"""By output, the complex factor of a weighting as a function of the frequency in Hz."""
+"""Weighting of each output by name: its complex factor as a function of the frequency in Hz."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +72,8 @@ def transfer_functions(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
 
 
 def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
-    """Transfer functions (a, n, w, k) from the noise to heights under the wheels, one axle after the other, without
-    delays; m / sqrt(1/s)."""
+    """Transfer functions (a, n, w, k), in m / sqrt(1/s), from the road's noise to the heights under the wheels, one
+    axle after the other, without delays."""
     s = 1j * np.asarray(omega, float)[:, None, None]
     shape = s * np.eye(len(excitation.F)) - speed * excitation.F
     filtered = np.linalg.solve(shape, speed**0.5 * excitation.G.astype(complex)[None])
@@ -95,7 +99,8 @@ def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, freq
 
 
 def _weighted_transfer(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
-    """Transfer functions (n, p, w) from heights to outputs, in which weighted outputs replace the unweighted ones."""
+    """Transfer functions (n, p, w) from road heights to outputs, in which weighted outputs replace the unweighted
+    ones."""
     transfer = transfer_functions(vehicle, omega)
     for i, output in enumerate(vehicle.outputs):
         if output.name in weights:
@@ -106,7 +111,7 @@ def _weighted_transfer(vehicle: LinearVehicle, omega: np.ndarray, weights: Weigh
 def variances_by_quadrature(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weights: Weights | None = None
 ) -> Quadrature:
-    """Variances of the outputs as integrals over all frequencies; inf where an integral diverges.
+    """Variances of the outputs as integrals of their spectra over all frequencies; inf where an integral diverges.
 
     Outputs with a weighting are replaced by their weighted ones.
 
@@ -156,9 +161,8 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 def _halve_panels(
     over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, largest_change: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most
-    ``largest_change`` (p,).
-    """
+    """Sums (p,) of the integral over all panels, and the changes by the last halving; panels are halved until that
+    changes each sum by at most ``largest_change`` (p,)."""
     variance, error = np.zeros_like(largest_change), np.zeros_like(largest_change)
     panels_used, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
@@ -179,7 +183,7 @@ LEGENDRE_DEGREES = np.arange(GAUSS_POINTS)
 TO_LEGENDRE = (
     (LEGENDRE_DEGREES[:, None] + 0.5) * eval_legendre(LEGENDRE_DEGREES[:, None], LEGENDRE_NODES) * LEGENDRE_WEIGHTS
 )
-"""Coefficients of the Legendre polynomials (degree, node) by the values at the nodes."""
+"""Matrix (degree, node) from values at the Gauss nodes to coefficients of the Legendre polynomials."""
 
 
 def _panel_integrals(
@@ -210,19 +214,22 @@ def _panel_edges(vehicle: LinearVehicle, excitation: Excitation, speed: float) -
 
 
 Densities = Callable[[np.ndarray], np.ndarray]
-"""From wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of heights, see models/road/isotropic.py."""
+"""Function from wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of the heights under the wheels, see
+models/road/isotropic.py."""
 PER_PANEL = 10
-"""Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest delay."""
+"""Count of Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest
+delay."""
 
 
 def output_densities(vehicle: LinearVehicle, heights: Densities, speed: float, wavenumber: np.ndarray) -> np.ndarray:
-    """Two-sided densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in m/s."""
+    """Two-sided spectral densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in
+    m/s."""
     H = transfer_functions(vehicle, speed * wavenumber)
     return np.einsum("kpi,kij,kpj->kp", H.conj(), heights(wavenumber), H, optimize=True).real
 
 
 def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float) -> np.ndarray:
-    """Variances (p,) in unit^2 of the outputs, from wavenumbers between ``low`` and ``high`` (rad/m), positive and
+    """Variances (p,) of the outputs in unit^2, from wavenumbers between ``low`` and ``high`` (rad/m), positive and
     negative.
 
     What lies outside is left out: a band limit where that is wanted, an error where it is not.
@@ -232,8 +239,8 @@ def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: flo
 
 
 def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positive and negative wavenumbers (k,) in rad/m between ``low`` and ``high``, and their weights for
-    integration."""
+    """Positive and negative wavenumbers (k,) in rad/m with absolute values between ``low`` and ``high``, and their
+    weights for integration."""
     behind = vehicle.axles[0] - vehicle.axles[-1]
     longest = np.pi / behind if behind else np.inf
     edges = [low]
@@ -245,17 +252,18 @@ def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndar
 
 
 HIGHEST_FREQUENCY = 60.0
-"""Hz up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
+"""Frequency (Hz) up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
 PER_LOBE = 8
-"""Frequencies for each lobe, 1 / T, of the first integral."""
+"""Count of frequencies in each lobe, 1 / T wide, of the integrand of the mean's variance."""
 FREQUENCIES_AT_ONCE = 2000
-"""Frequencies whose densities are made at once."""
+"""Count of frequencies whose densities are computed at once."""
 
 
 def standard_errors(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Standard errors (p,) of an output's mean, and of its mean square, over a time of ``duration`` (s)."""
+    """Standard errors (p,) of an output's mean, and of its mean square, when averaged over a time of ``duration``
+    (s)."""
     step = 2.0 * np.pi / duration / PER_LOBE
     omega = step * (np.arange(int(2.0 * np.pi * HIGHEST_FREQUENCY / step)) + 0.5)
     parts = np.array_split(omega, -(-len(omega) // FREQUENCIES_AT_ONCE))

@@ -1,4 +1,4 @@
-"""The random road under all wheels in time, at equal half steps, for runs in time at a constant speed.
+"""Random road under all wheels over time, at equal half steps, for time integration at a constant speed.
 
 From one half step to the next a shape filter moves by its exact transition and by noise of its exact covariance: the
 heights at the half steps are those of the road itself, whatever the step. An axle behind the first meets what that
@@ -22,7 +22,7 @@ from models.vehicles.spatial import SpatialVehicle
 
 @dataclass(frozen=True)
 class RoadPath:
-    """A road travelled at a constant ``speed`` (m/s) and sampled every ``half`` step (s)."""
+    """Random road travelled at a constant ``speed`` (m/s) and sampled every ``half`` step (s)."""
 
     excitation: Excitation
     speed: float
@@ -30,7 +30,7 @@ class RoadPath:
 
     @property
     def step(self) -> float:
-        """Time step (s) of a run on this road path."""
+        """Time step (s) of a simulation on this road path."""
         return 2.0 * self.half
 
     @property
@@ -47,7 +47,7 @@ class RoadPath:
         return next(self.blocks(steps, 1, seed, path))[:, :, 0]
 
     def blocks(self, steps: int, copies: int, seed: int, path: int = 0) -> Iterator[np.ndarray]:
-        """Roads (2 steps + 1, 2 w, copies) under as many copies, without end; each begins where the last one ended.
+        """Yield, without end, roads (2 steps + 1, 2 w, copies) under all copies; each begins where the last one ended.
 
         The first begins in the road's stationary state, or at 0 where it has none; they draw the noise paths ``path``,
         ``path`` + 1 and so on.
@@ -86,7 +86,7 @@ class RoadPath:
 
 
 def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "") -> None:
-    """Raise InputError for damped tyres on a road whose heights have no rates: a run in time cannot read them."""
+    """Raise InputError for damped tyres on a road whose heights have no rates: time integration cannot read them."""
     if any(tyre.damping for tyre in vehicle.tyres) and not RoadPath(excitation, 1.0, 1.0).has_rates:
         raise InputError(
             file,
@@ -98,12 +98,14 @@ def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "")
 
 
 def road_path(excitation: Excitation, speed: float, longest_step: float) -> RoadPath:
-    """Road path for runs with steps (s) of at most ``longest_step``; its half steps divide the axle distances."""
+    """Road path for time integration with steps (s) of at most ``longest_step``; its half steps divide the axle
+    distances."""
     return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest_step / 2.0)[0] / speed)
 
 
 def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-    """F, G and heights of each independent noise source: one filter, or one per axle if the axles are independent."""
+    """Filter matrices F, G and heights of the independent noise sources: one filter, or one per axle if the axles are
+    independent."""
     F, G, heights = excitation.F, excitation.G, excitation.heights
     if not excitation.independent:
         return F, G, heights
@@ -112,8 +114,8 @@ def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.nda
 
 
 def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition matrix of the road filter over a length (m), and a root of the covariance of the noise in it (van
-    Loan).
+    """Transition matrix of the road filter over a length (m), and a square root of the covariance of the noise in it
+    (van Loan).
 
     The result is built by doubling short lengths, because rounding would grow exponentially over many decay lengths at
     once.
@@ -128,13 +130,13 @@ def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.nd
 
 
 def _stationary_root(F: np.ndarray, G: np.ndarray) -> np.ndarray:
-    """Root of the stationary covariance of the filter state; zeros if the road is a random walk."""
+    """Square root of the stationary covariance of the road filter's state; zeros if the road is a random walk."""
     if np.linalg.eigvals(F).real.max() >= 0.0:
         return np.zeros_like(F)
     return _covariance_root(solve_continuous_lyapunov(F, -G @ G.T))
 
 
 def _covariance_root(P: np.ndarray) -> np.ndarray:
-    """Root S of S S' = P for a symmetric P that is positive semidefinite except for rounding."""
+    """Square root S, with S S' = P, of a symmetric P that is positive semidefinite except for rounding."""
     values, vectors = np.linalg.eigh((P + P.T) / 2.0)
     return vectors * np.sqrt(values.clip(0.0))

@@ -1,4 +1,4 @@
-"""The covariance of a vehicle whose springs are bent, on a random road: statistical linearisation.
+"""Covariance of a vehicle with nonlinear springs on a random road, by statistical linearisation.
 
 Every spring-damper with curves or friction is replaced by the stiffness and damping that miss its force least in the
 mean square where travel and rate are Gaussian with the covariance that the replaced vehicle itself has (the gains of
@@ -25,28 +25,31 @@ from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, Spring
 from models.vehicles.spatial_linear import Gains, linearise
 
 GAIN_TOLERANCE = 1e-12
-"""Largest relative change of a gain at which the fixed point is reached."""
+"""Largest relative change of a gain at which the fixed point counts as reached."""
 MOST_ROUNDS = 400
 FIRST_TRAVEL_DEVIATION, FIRST_RATE_DEVIATION = 0.02, 0.3
-"""Deviations (m, m/s) with which the first gains are taken: slopes at rest may leave a vehicle undamped."""
+"""Standard deviations of travel (m) and rate (m/s) at which the first gains are computed: slopes at rest may leave a
+vehicle undamped."""
 GAUSSIAN_REMARK = "it is nearly Gaussian"
 NOT_GAUSSIAN = "it is not Gaussian any more: no shares of time and exceedances from it"
 ERROR_GRADES = ((0.01, 0.02, GAUSSIAN_REMARK), (0.05, 0.06, GAUSSIAN_REMARK), (0.1, 0.06, NOT_GAUSSIAN))
-"""Left-out share of an output's variance, and the relative error of its deviation that was found up to there, beside
-Monte Carlo of quarter cars: dampers of two slopes and more, dry friction, stops, alone and together, on five levels of
-road at two speeds. Kurtosis, 3 for Gaussian ones, was 2.5 to 3.3 in the first two and up to 4 in the
-third."""
+"""Share of an output's variance from forces that linearisation leaves out, largest relative error of its standard
+deviation seen up to there, and remark. The errors are those against Monte Carlo of quarter cars: dampers of two slopes
+and more, dry friction, stops, alone and together, on five levels of road at two speeds. Kurtosis, 3 for Gaussian
+outputs, was 2.5 to 3.3 in the first two and up to 4 in the third."""
 EXTRAPOLATION_ERROR = 0.15
-"""The error found beyond, with stops that are met at every second wave; kurtosis went up to 6."""
+"""Relative error of a standard deviation seen beyond these shares, with stops that are met at every second wave;
+kurtosis went up to 6."""
 MOST_NEWTON_STEPS = 60
 HARMONIC_RATIO = 2.0
-"""Left-out forces change at least twice as fast as what moves the spring: they are harmonics of its motion."""
+"""Ratio of the frequency of left-out forces to that of the spring's motion, at least: they are harmonics of this
+motion."""
 
 
 @dataclass(frozen=True)
 class BentSpring:
-    """A nonlinear spring (curves or friction) in motion: its equivalent gains (N/m, N s/m), mean travel (m) and mean
-    force.
+    """A nonlinear spring (curves or friction) in random motion: its equivalent stiffness and damping (N/m, N s/m), mean
+    travel (m) and mean force (N).
 
     deviation, rate : standard deviations of travel (m) and its rate (m/s). ``force``: mean force less the preload (N).
     ``left_out``: share of the variance of its force that the gains leave out.
@@ -62,7 +65,7 @@ class BentSpring:
 
 @dataclass(frozen=True)
 class StatisticallyLinear:
-    """The statistically linearised vehicle, its covariance and its means.
+    """Statistically linearised vehicle, its covariance and its mean position.
 
     mean, left_out (p,), by output: mean beside the equilibrium on a flat road (0 for accelerations), and the variance
     that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``gain_changes``: largest
@@ -80,7 +83,7 @@ class StatisticallyLinear:
 
     @property
     def contraction(self) -> float:
-        """Largest ratio of a change to the change one iteration before, among changes above rounding."""
+        """Largest ratio of a gain change to that of the iteration before, among changes above rounding."""
         ratios = [
             change_after / change_before
             for change_before, change_after in pairwise(self.gain_changes)
@@ -97,14 +100,14 @@ class StatisticallyLinear:
 
 
 def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
-    """The springs that have curves or friction."""
+    """Springs of the vehicle that have curves or friction."""
     return tuple(spring for spring in vehicle.springs if spring.bent)
 
 
 def statistically_linear(
     vehicle: SpatialVehicle, excitation: Excitation, speed: float, start_scale: float = 1.0
 ) -> StatisticallyLinear:
-    """Linearise the nonlinear springs of a vehicle statistically, on a road at a constant speed (m/s).
+    """Statistical linearisation of a vehicle with nonlinear springs on a road, at a constant speed (m/s).
 
     start_scale : of the travels and rates that the first gains are taken at. Where different ones lead to different
         fixed points, the vehicle has several ways to move, and no one covariance. InputError for tyres that may lift,
@@ -122,13 +125,14 @@ def statistically_linear(
 
 
 Law = tuple[float, float, float]
-"""What ``gaussian_laws`` says of a law."""
+"""Statistical linearisation of a force law by ``gaussian_laws``: mean force, gain, and variance of the remaining
+force."""
 
 
 @dataclass
 class _Moments:
-    """Moments of the nonlinear springs' motion: mean travel, and standard deviations of travel and rate, each
-    (springs,)."""
+    """Moments of the nonlinear springs' motion: mean travel (m), and standard deviations of travel (m) and rate (m/s),
+    each (springs,)."""
 
     mean: np.ndarray
     travel: np.ndarray
@@ -136,7 +140,8 @@ class _Moments:
 
 
 class _Search:
-    """Fixed-point search for one vehicle, road and speed; extra outputs read the motion of the nonlinear springs."""
+    """Fixed-point search for the equivalent gains of one vehicle, road and speed; extra outputs read the motion of the
+    nonlinear springs."""
 
     def __init__(self, vehicle: SpatialVehicle, excitation: Excitation, speed: float) -> None:
         self.vehicle, self.excitation, self.speed = vehicle, excitation, speed
@@ -175,14 +180,14 @@ class _Search:
         return self._result(gains, moments, position, changes)
 
     def _equivalent_gains(self, moments: _Moments) -> np.ndarray:
-        """Equivalent stiffness and damping (springs, 2) of springs with the given moments of motion."""
+        """Equivalent stiffness and damping (springs, 2) of the nonlinear springs at given moments of their motion."""
         laws = zip(self.springs, self._linearised_laws(moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
     def _linearised_laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
-        """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
-        the force that the gain does not represent."""
+        """Statistical linearisation of each spring's force laws over travel and over rate: mean force, gain, and
+        variance of the remaining force."""
         moments_by_spring = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
         return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moments_by_spring]
 
@@ -262,8 +267,8 @@ class _Search:
     def _left_out(
         self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: StationaryCovariance
     ) -> np.ndarray:
-        """Ratios (p,) of the variance that the neglected residual forces would add to each output's own variance; each
-        force law counts separately."""
+        """Ratios (p,) of the variance that the left-out forces would add to each output to the output's own variance;
+        each force law counts separately."""
         if not self.springs:
             return np.zeros(len(linear.outputs))
         n = len(linear.mass)
@@ -282,7 +287,7 @@ class _Search:
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
 
     def _own_forces(self) -> np.ndarray:
-        """Matrix (p, 2 springs) with 1 where an output is the force of a nonlinear spring itself."""
+        """Matrix (p, 2 springs) with 1 where an output is the force of this nonlinear spring."""
         names = [s.name for s in self.springs] * 2
         return np.array(
             [
@@ -293,8 +298,8 @@ class _Search:
 
 
 def _corner_frequency(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
-    """Corner frequency (1/s) of a residual force's spectrum, from the standard deviations of the spring's motion and of
-    its rate."""
+    """Corner frequency (1/s) of the spectrum of a left-out force, from the standard deviations of the spring's motion
+    and of its rate."""
     return HARMONIC_RATIO * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
 
 
@@ -317,7 +322,7 @@ def _largest_gain_change(wanted_gains: np.ndarray, gains: np.ndarray) -> float:
 
 
 def _left_out_sentence(name: str, share: float, status: str) -> str:
-    """Sentence on how much the neglected share of force may change an output's standard deviation."""
+    """Sentence on how much the left-out share of force may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     opening = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
@@ -331,5 +336,6 @@ def _left_out_sentence(name: str, share: float, status: str) -> str:
 
 
 def promised_error(share: float) -> float:
-    """Relative error of an output's standard deviation that tests found not to be exceeded at this left-out share."""
+    """Largest relative error of an output's standard deviation that tests have seen at this share of left-out
+    forces."""
     return next((error for largest_share, error, _ in ERROR_GRADES if share <= largest_share), EXTRAPOLATION_ERROR)

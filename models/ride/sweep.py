@@ -1,4 +1,4 @@
-"""Variances of all outputs over cases of correlation and speeds, by the fast route where it is exact enough.
+"""Variances of all outputs over correlation cases and speeds, by fast modal sums where these are accurate enough.
 
 The fast route is the covariance in closed form from eigenvectors. A vehicle behind road filters, with weightings behind
 it, has a block triangular matrix. Each block is diagonalised on its own (the vehicle's and the weightings' once for all
@@ -26,13 +26,13 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_FAST_ERROR = 1e-9
-"""Largest relative error that the fast route may suspect of itself; it overstates it ten to a thousand times."""
+"""Largest estimated relative error of the fast modal sums; the estimate is ten to a thousand times too high."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Stationary variances. variance (cases, speeds, outputs), inf where infinite, with status and reason for each;
-    units (outputs,).
+    """Stationary variances over correlation cases and speeds. variance (cases, speeds, outputs), inf where infinite,
+    with status and reason for each; units (outputs,).
 
     ``direct_counts``: number of points computed by the direct method, by the reason for not using the fast one.
     """
@@ -48,11 +48,11 @@ class Sweep:
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (cases, speeds, outputs)."""
+        """Standard deviations (cases, speeds, outputs) in the outputs' units."""
         return np.sqrt(self.variance)
 
     def of(self, case: str, output: str) -> np.ndarray:
-        """Standard deviation of one output over the speeds."""
+        """Standard deviations (speeds,) of one output in one correlation case."""
         return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
 
 
@@ -90,13 +90,13 @@ def variance_sweep(
 
 
 ASKED_FOR = "asked for"
-"""Reason of a direct answer that was wanted."""
+"""Reason of a variance by the direct method that the caller wanted."""
 Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
-"""Variance, status and reason of every output."""
+"""Variances, statuses and reasons of all outputs."""
 
 
 def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
-    """Variances from solving for the covariance; the error for an unstable vehicle states its speed."""
+    """Variances from solving the Lyapunov equation; the error for an unstable vehicle states its speed."""
     try:
         exact = stationary_covariance(system, accuracy)
     except Unstable as error:
@@ -107,7 +107,7 @@ def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> A
 def _fast_variances(
     system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "SharedModes", accuracy: float
 ) -> Answer | str:
-    """Variances by the fast method, or a text that says why it is unreliable here."""
+    """Variances by modal sums, or a text that says why these are unreliable here."""
     quick = modal_variances(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick
@@ -159,7 +159,7 @@ def modes(A: np.ndarray) -> Modes:
 
 EPS = float(np.finfo(float).eps)
 LARGEST_RATE_ROUNDING = 1e-11
-"""Largest relative rounding of the slowest decay with which the sums are still made."""
+"""Largest relative rounding of the slowest decay rate at which modal sums are used."""
 
 
 class SharedModes:
@@ -169,7 +169,7 @@ class SharedModes:
         self.known: dict[bytes, Modes] = {}
 
     def of(self, A: np.ndarray) -> Modes:
-        """Modes of a block."""
+        """Modes of a matrix block, computed once."""
         if (key := A.tobytes()) not in self.known:
             self.known[key] = modes(A)
         return self.known[key]
@@ -177,8 +177,8 @@ class SharedModes:
 
 @dataclass(frozen=True)
 class ModalVariances:
-    """Results per output (p,): variance, ``rounding_floor`` that rounding makes of a zero variance, and bound
-    ``relative_error``.
+    """Variances by modal sums for each output (p,): variance, ``rounding_floor`` that rounding makes of a zero
+    variance, and bound ``relative_error``.
 
     fastest_rate : rate of the system in 1/s
     """
@@ -192,8 +192,8 @@ class ModalVariances:
 def modal_variances(
     system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: SharedModes
 ) -> ModalVariances | str:
-    """Variances of a system as built by ``vehicle_with_road`` and ``system_with_weightings``, or a text that says why
-    they cannot be computed here.
+    """Variances of the outputs by modal sums, for a system as built by ``vehicle_with_road`` and
+    ``system_with_weightings``; or a text that says why they cannot be computed here.
 
     vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
     the states of weightings stand last.
@@ -240,7 +240,8 @@ def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -
 def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
 ) -> ModalVariances | str:
-    """Variances of y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the hits."""
+    """Variances of the outputs y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the arrivals of
+    noise at the axles."""
     earlier_responses = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)
     for j, b in enumerate(inputs):

@@ -1,4 +1,4 @@
-"""Covariance of a vehicle on a random road while its speed varies, through standstill, delays exact.
+"""Covariance of a vehicle on a random road while its speed varies, also through standstill, with exact axle delays.
 
 Noise lives in path, motion in time (``road_in_path``). In steps of time, E the transition of the state (y, f),
 
@@ -30,14 +30,14 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_RATE_TIMES_STEP = 1.0
-"""Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""
+"""Largest product of the fastest rate of vehicle or road and the step; half of it changes nothing above 1e-10."""
 STEPS_PER_BLOCK = 128
-"""Steps whose responses are made at once."""
+"""Count of steps whose noise responses are computed at once."""
 
 
 @dataclass(frozen=True)
 class VaryingSpeed:
-    """Standard deviations at every instant of a drive.
+    """Standard deviations of the outputs at every instant of a drive with varying speed.
 
     time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
     and, while the road moves, where it holds white noise; height (N, w) of the road under each wheel, m, which may not
@@ -55,13 +55,13 @@ class VaryingSpeed:
     P: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
-        """Standard deviation (N,) of one output; raises InputError for an unknown name."""
+        """Standard deviation (N,) of one output over the drive. Raises InputError for an unknown name."""
         if name not in self.names:
             raise InputError("", "output", name, "must be an output of the vehicle", self.names)
         return self.deviation[:, self.names.index(name)]
 
     def at(self, instants: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Standard deviations (k, p) at instants (s), each the nearest one of ``time``."""
+        """Standard deviations (k, p) of the outputs at instants (s), each taken at the nearest value of ``time``."""
         return self.deviation[np.abs(self.time[:, None] - np.asarray(instants)).argmin(axis=0)]
 
 
@@ -75,7 +75,8 @@ def varying_speed(
     accuracy: float = MATRIX_ACCURACY,
     largest_rate_times_step: float = LARGEST_RATE_TIMES_STEP,
 ) -> VaryingSpeed:
-    """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
+    """Standard deviations of the outputs along a drive that begins in the stationary state of its first speed, or at
+    rest.
 
     The vehicle's matrices are those of one speed. The cost grows with the time that the last axle needs to where the
     first one is: below a crawl of about 0.3 m/s it is long.
@@ -130,8 +131,8 @@ def quasi_stationary(
     weightings: Mapping[str, str] | None = None,
     accuracy: float = MATRIX_ACCURACY,
 ) -> np.ndarray:
-    """Standard deviations (N, p) as if each of the speeds (N,) had been constant for ever; for speed 0, those of a
-    vehicle at rest.
+    """Standard deviations (N, p) of the outputs as if each of the speeds (N,) had been constant for ever; for speed 0,
+    those of a vehicle at rest.
 
     Errors are those of ``varying_speed``.
     """
@@ -158,7 +159,7 @@ def _covariance_by_step(
     instants: Sequence[float] | np.ndarray,
     largest_rate_times_step: float,
 ) -> Iterator[tuple[float, np.ndarray]]:
-    """End of each step of the drive and the covariance there, starting from P.
+    """Yield the end time of each step of the drive and the covariance of (y, f) there, starting from P.
 
     Where the vehicle moves from the beginning, the steps begin earlier: the first axle is ahead of the last one.
     """
@@ -186,7 +187,8 @@ def _covariance_by_step(
 
 
 class _NoiseMet:
-    """State responses at the ends of the steps to noise that an axle meets at given times (s) in ascending order."""
+    """State responses at the ends of the steps to the noise that an axle meets at given times (s) in ascending
+    order."""
 
     def __init__(self, responses: Responses, axle: int, time: np.ndarray, step_ends: np.ndarray) -> None:
         self.responses, self.axle, self.time, self.ends = responses, axle, time, step_ends
@@ -194,11 +196,11 @@ class _NoiseMet:
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
     def within(self, step: int) -> slice:
-        """Slice of the times that lie in a step."""
+        """Slice of the meeting times that lie in a step."""
         return slice(self.first[step], self.first[step + 1])
 
     def of(self, step: int) -> np.ndarray:
-        """Responses (n, c, k) to the noise met in a step."""
+        """State responses (n, c, k) to the noise met in a step."""
         block = step // STEPS_PER_BLOCK
         last_step = min((block + 1) * STEPS_PER_BLOCK, len(self.ends) - 1)
         begin = self.first[block * STEPS_PER_BLOCK]
@@ -213,7 +215,8 @@ class _NoiseMet:
 
 
 class _Queue:
-    """Responses (n, q, k) to noise that one axle has already met and the ``last`` axle will meet at given times (s)."""
+    """State responses (n, q, k) to noise that an axle has already met and the ``last`` axle will meet at given times
+    (s)."""
 
     def __init__(
         self, responses: Responses, axle: int, last_axle: int, time: np.ndarray, step_ends: np.ndarray
@@ -246,8 +249,8 @@ def _sum_of_products(first_responses: np.ndarray, second_responses: np.ndarray, 
 
 
 def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
-    """Responses (n, q, k) of a vehicle at rest to noise that the axle met long ago, at a distance ``behind`` (m) its
-    position."""
+    """State responses (n, q, k) of a vehicle at rest to noise that an axle met long ago, at a distance ``behind`` (m)
+    its position."""
     F, G = road_in_path.excitation.F, road_in_path.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
     n, axles, m = road_in_path.noise_inputs.shape
@@ -259,7 +262,7 @@ def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) 
 
 
 def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
-    """State (y, f) of a vehicle at rest as a linear function of its road's filter states f: (n + a m, a m)."""
+    """Matrix (n + a m, a m) from the road's filter states f to the state (y, f) of a vehicle at rest."""
     if np.linalg.cond(road_in_path.A) > 1.0 / (1e3 * np.finfo(float).eps):
         raise InputError(
             "",
@@ -273,7 +276,7 @@ def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
 
 
 def _standing_covariance(road_in_path: RoadInPath) -> np.ndarray:
-    """Covariance of (y, f) where the vehicle stands, at rest."""
+    """Covariance of the state (y, f) of a vehicle that stands still, at rest."""
     road = road_in_path.excitation
     stationary, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)
     axles = range(len(road.heights))
