@@ -372,8 +372,7 @@ def _checked_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
 def rolling_radius_difference(placement: WheelsetPlacement) -> float:
     """Rolling radius of the right wheel minus that of the left one (m), each at the patch with the largest load."""
     right, left = (
-        max(patches_of_wheel, key=lambda patch: patch.normal_force)
-        for patches_of_wheel in (placement.right, placement.left)
+        max(patches_of_wheel, key=lambda patch: patch.normal) for patches_of_wheel in (placement.right, placement.left)
     )
     return right.rolling_radius - left.rolling_radius
 

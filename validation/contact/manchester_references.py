@@ -71,7 +71,9 @@ def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[f
 
     def pressed(depth: float) -> NormalSolution:
         distance = distance_over(side, replace(pose, fall=pose.fall + depth), place, angle, (-5e-3, 15e-3))
-        return solve_normal(distance.at(x[None, :], s[:, None]) + DEEPEST, CELL, CELL, contact.pair, approach=DEEPEST)
+        return solve_normal(
+            distance.at(x[None, :], s[:, None]) + DEEPEST, CELL, CELL, contact.material_pair, approach=DEEPEST
+        )
 
     depth = brentq(lambda depth: pressed(depth).load - normal, 2e-5, 4e-5, xtol=1e-9)
     solved = pressed(depth)
@@ -93,10 +95,10 @@ def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[fl
     def pressed(approach: float) -> np.ndarray:
         forces = np.zeros(2)
         while True:
-            before, sunk = forces, forces[::-1] / (math.pi * contact.pair.modulus * away)
+            before, sunk = forces, forces[::-1] / (math.pi * contact.material_pair.modulus * away)
             forces = np.array(
                 [
-                    _load_of_patch(touch.patch.distance, approach * cosine - by, contact.pair)
+                    _load_of_patch(touch.patch.distance, approach * cosine - by, contact.material_pair)
                     for touch, cosine, by in zip(touches, cosines, sunk, strict=True)
                 ]
             )

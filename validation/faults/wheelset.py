@@ -113,7 +113,7 @@ def _linear_law_error() -> float:
     """Error of the linear law's creep forces and moment against Kalker's theory at the reported creepages."""
     report = _contact_report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
-    wanted = kalker(a, b, x, y, spin, CHOSEN_WHEELSET.pair)
+    wanted = kalker(a, b, x, y, spin, CHOSEN_WHEELSET.material_pair)
     return max(
         largest_relative_difference(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True)
     )
