@@ -27,7 +27,7 @@ from models.drawing.figures import (
     wrapped_text,
 )
 from models.drawing.figures import COLOURS as ENGINES
-from models.ride.frequency import one_sided
+from models.ride.frequency import one_sided_densities
 from models.ride.statistical_linearisation import ERROR_GRADES
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
@@ -159,7 +159,7 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path) -> None:
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
-    densities = one_sided(linear, excitation, speed, frequency)
+    densities = one_sided_densities(linear, excitation, speed, frequency)
     moving_kinds = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moving_kinds]
     if not shown:
@@ -327,7 +327,7 @@ def engine_spectra_figure(
 ) -> None:
     """Plot spectra of the engines' runs, by Welch's method, over those of the statistically linearised vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
-    expected = one_sided(linear, road, speed, frequency)
+    expected = one_sided_densities(linear, road, speed, frequency)
     first = next(iter(runs.values()))
     shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
     figure, axes = _few_panels(len(shown))

@@ -289,7 +289,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     assert force.min() == pytest.approx(-load) and 0.1 < (force <= -load + 1e-9).mean() < 0.6
     march = CopiesMarch(vehicle, 20.0, road.step, 1)
     march.states = np.zeros((2 * len(vehicle.coordinates()), 1))  # the engines begin at rest in the design position
-    march.march_over(road.table(runs[0].run.counts["steps"], 2)[:, :, None], 0)
+    march.march_over(road.wheel_heights_and_rates(runs[0].run.counts["steps"], 2)[:, :, None], 0)
     # a quarter car goes up and down alone, so that small motion is all that it has
     assert np.abs(march.states[:, 0] - np.concatenate([runs[1].run.positions[-1], runs[1].run.rates[-1]])).max() < 1e-11
 

@@ -28,7 +28,7 @@ from models.rail.wheel_forces import plain_rails
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.ride.covariance import rounding_thresholds
 from models.ride.excited import _range_and_kernel
-from models.ride.sweep import modes, variance_sweep
+from models.ride.sweep import modes_of_matrix, variance_sweep
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, _both_filters, half_track
 from models.systems.bicycle.run import assumptions
@@ -156,7 +156,7 @@ def test_a_singular_matrix_is_split_into_its_range_and_its_null_space():
 
 def test_rounding_of_the_slowest_decay_is_that_of_the_fastest_motion():
     """An uncoupled system, whose eigenvectors are perpendicular: 8 against 0.25."""
-    system = modes(np.diag([-8.0, -0.25, -2.0]))
+    system = modes_of_matrix(np.diag([-8.0, -0.25, -2.0]))
     assert system.condition == 1.0
     assert system.rate_rounding == pytest.approx(np.finfo(float).eps * 8.0 / 0.25, rel=1e-12, abs=0.0)
 

@@ -52,7 +52,7 @@ def driven_by(equations: Equations) -> Driven:
             body.damping,
             body.carried_weight * track,
         )
-        for arm in (body.half_spacing, -body.arm)
+        for arm in (body.half_spacing, -body.half_spacing)
     )
     numbers = table(float(equations.speed), equations.rails)
     vehicle = SpatialVehicle("wheelset", bodies, (), (), ())

@@ -65,7 +65,7 @@ def stationary_covariance(system: DelayedSystem, accuracy: float = MATRIX_ACCURA
     P, correction, residual = lyapunov_solution(split.S, noise_intensity(split.S, onto_stable))
     V = split.V
     if split.count_of_marginal_states:
-        P, correction, V = _with_marginal(split, met, onto_stable, P, correction)
+        P, correction, V = _with_marginal_motions(split, met, onto_stable, P, correction)
     C = system.C @ V
     floor, change = rounding_thresholds(C, P), _output_variances(C, correction)
     variance = _output_variances(C, P)
@@ -149,7 +149,7 @@ def _responses_before_arrival(
     return responses
 
 
-def noise_of(system: DelayedSystem, propagator: Propagator | None = None) -> np.ndarray:
+def noise_intensity_of_system(system: DelayedSystem, propagator: Propagator | None = None) -> np.ndarray:
     """Noise intensity matrix Q of a system (see ``noise_intensity``), in double precision."""
     return noise_intensity(system.A, noise_arrivals(system), propagator).astype(float)
 
@@ -223,7 +223,7 @@ ends: what remains is its square. A single correction is enough unless a motion 
 digits off the error as the first solution had."""
 
 
-def _with_marginal(
+def _with_marginal_motions(
     split: MarginalParts, arrivals: NoiseArrivals, onto_stable: NoiseArrivals, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance of the whole state (marginal motions first), its last correction and its basis; motions with unbounded
@@ -279,25 +279,25 @@ is zero by symmetry: motions are known to about ten digits, and states at rest t
 def variance_verdicts(
     D: Sequence[np.ndarray],
     variance: np.ndarray,
-    floor: np.ndarray,
-    grown: Growth,
-    fastest: float,
+    rounding_floor: np.ndarray,
+    growth: Growth,
+    fastest_rate: float,
     accuracy: float,
     split: MarginalParts | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Status of every output's variance (finite, infinite or diffusing), and the reason for it.
 
-    White noise that comes through D counts if, up to the ``fastest`` rate of the system (1/s), it carries more than
-    rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.
-    """
-    direct = sum((d**2).sum(axis=1) for d in D) * fastest
-    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + floor
-    verdicts = [_variance_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
+    White noise that comes through D counts if, up to the ``fastest_rate`` rate of the system (1/s), it carries more
+    than rounding could of the output's variance without it; ``rounding_floor`` (p,) is what rounding makes of a
+    variance of zero."""
+    direct = sum((d**2).sum(axis=1) for d in D) * fastest_rate
+    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + rounding_floor
+    verdicts = [_variance_verdict(*output, split) for output in zip(white, growth.rate, growth.power, strict=True)]
     return tuple(status for status, _ in verdicts), tuple(reason for _, reason in verdicts)
 
 
-def _variance_verdict(white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
-    if white:
+def _variance_verdict(is_white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
+    if is_white:
         return INFINITE, WHITE_NOISE_REASON
     if power:
         deviation_after = np.sqrt(rate * 100.0**power)

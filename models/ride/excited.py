@@ -47,7 +47,7 @@ def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: flo
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
     if has_singular_mass(vehicle.mass):
-        return first_order(vehicle, vehicle_states(vehicle), excitation, speed)[0]
+        return first_order_system(vehicle, vehicle_states(vehicle), excitation, speed)[0]
     n, (m, k), axles = len(vehicle.mass), excitation.G.shape, len(excitation.heights)
     by_motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
     by_road = np.linalg.solve(vehicle.mass, np.hstack([vehicle.road_stiffness, vehicle.road_damping]))
@@ -132,7 +132,7 @@ def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
     return VehicleStates(A, B, q, direct, back[:a], back[a : a + b])
 
 
-def first_order(
+def first_order_system(
     vehicle: LinearVehicle, states: VehicleStates, excitation: Excitation, speed: float
 ) -> tuple[DelayedSystem, np.ndarray]:
     """State-space model with the state (a, a', b, f) of a vehicle whose mass matrix may be singular, and the matrix (n,

@@ -29,7 +29,7 @@ def exported_arrays(system: DelayedSystem, covariance: StationaryCovariance) -> 
     }
 
 
-def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) -> list[Path]:
+def write_exports(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) -> list[Path]:
     """Write the exported arrays to ``stem``.npz and ``stem``.mat; returns the paths of both files."""
     from scipy.io import savemat
 

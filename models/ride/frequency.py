@@ -39,7 +39,7 @@ PANEL_TOLERANCE = 1e-11
 """Relative change of a variance by halving a panel above which the panel is halved again; MOST_PANELS panels at
 most."""
 MOST_PANELS = 1500
-EPS = float(np.finfo(float).eps)
+MACHINE_EPSILON = float(np.finfo(float).eps)
 GROWTH_SHARE = 1e-6
 """Share of the fastest rate below which a growth rate counts as rounding: a Jordan pair of zeros comes out at the root
 of rounding."""
@@ -71,7 +71,7 @@ def transfer_functions(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
     return rows @ motion + read.road_factors + s * read.road_rate_factors
 
 
-def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
+def road_transfer(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
     """Transfer functions (a, n, w, k), in m / sqrt(1/s), from the road's noise to the heights under the wheels, one
     axle after the other, without delays."""
     s = 1j * np.asarray(omega, float)[:, None, None]
@@ -85,7 +85,7 @@ def spectral_densities(
 ) -> np.ndarray:
     """Two-sided spectral densities (n, p) of the outputs over the angular frequency (rad/s); their integral over
     positive and negative frequencies is the variance."""
-    parts = _weighted_transfer(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
+    parts = _weighted_transfer(vehicle, omega, weights or {}) @ road_transfer(excitation, speed, omega)
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
     delays = np.array(excitation.lengths) / speed
@@ -93,7 +93,9 @@ def spectral_densities(
     return (abs(delayed_parts.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
 
 
-def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
+def one_sided_densities(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray
+) -> np.ndarray:
     """One-sided spectral densities (n, p) of the outputs over the frequency (Hz)."""
     return 4 * np.pi * spectral_densities(vehicle, excitation, speed, 2 * np.pi * frequency)
 
@@ -125,7 +127,7 @@ def variances_by_quadrature(
         """Contributions (panels, p) to the variances from the frequency interval in each row of ``edges``."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
         omega = (centre[:, None] + half[:, None] * LEGENDRE_NODES).ravel()
-        parts = _weighted_transfer(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
+        parts = _weighted_transfer(vehicle, omega, weights or {}) @ road_transfer(excitation, speed, omega)
         parts = parts.reshape(len(parts), len(centre), GAUSS_POINTS, *parts.shape[2:])
         return _panel_integrals(parts, centre, half, excitation, speed)
 
@@ -134,11 +136,11 @@ def variances_by_quadrature(
     first = panel_integrals(edges)
     stiffness = vehicle.stiffness
     largest = np.sqrt(abs(stiffness).max(axis=1, initial=0.0))
-    digit = EPS * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
+    digit = MACHINE_EPSILON * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
     nudged = panel_integrals(edges, replace(vehicle, stiffness=stiffness + digit))
     rounding = 10 * abs((nudged - first).sum(axis=0))  # one draw of many
     weighted_gains = abs(_weighted_transfer(vehicle, frequencies[1:], weights or {})) @ abs(
-        road(excitation, speed, frequencies[1:])
+        road_transfer(excitation, speed, frequencies[1:])
     )
     terms = np.einsum("ambk,ambk,m->b", weighted_gains, weighted_gains, frequencies[1:])
     total = abs(first).sum(axis=0)
@@ -159,7 +161,10 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 
 
 def _halve_panels(
-    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, largest_change: np.ndarray
+    integrals_over: Callable[[np.ndarray], np.ndarray],
+    edges: np.ndarray,
+    panel_integrals: np.ndarray,
+    largest_change: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Sums (p,) of the integral over all panels, and the changes by the last halving; panels are halved until that
     changes each sum by at most ``largest_change`` (p,)."""
@@ -167,14 +172,14 @@ def _halve_panels(
     panels_used, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
         finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
-        parts = over(finer)
+        parts = integrals_over(finer)
         panels_used += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
-        change = abs(halves - panels)
+        change = abs(halves - panel_integrals)
         rough = (change > largest_change).any(axis=1) & (edges[:, 1] > lowest) & (panels_used < MOST_PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
-        edges, panels = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
+        edges, panel_integrals = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
     return variance, error, panels_used
 
 
@@ -216,7 +221,7 @@ def _panel_edges(vehicle: LinearVehicle, excitation: Excitation, speed: float) -
 Densities = Callable[[np.ndarray], np.ndarray]
 """Function from wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of the heights under the wheels, see
 models/road/isotropic.py."""
-PER_PANEL = 10
+GAUSS_POINTS_PER_PANEL = 10
 """Count of Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest
 delay."""
 
@@ -228,17 +233,19 @@ def output_densities(vehicle: LinearVehicle, heights: Densities, speed: float, w
     return np.einsum("kpi,kij,kpj->kp", H.conj(), heights(wavenumber), H, optimize=True).real
 
 
-def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float) -> np.ndarray:
+def variances_over_wavenumbers(
+    vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float
+) -> np.ndarray:
     """Variances (p,) of the outputs in unit^2, from wavenumbers between ``low`` and ``high`` (rad/m), positive and
     negative.
 
     What lies outside is left out: a band limit where that is wanted, an error where it is not.
     """
-    wavenumber, weight = both_sides(vehicle, low, high)
+    wavenumber, weight = signed_wavenumbers(vehicle, low, high)
     return weight @ output_densities(vehicle, heights, speed, wavenumber)
 
 
-def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+def signed_wavenumbers(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
     """Positive and negative wavenumbers (k,) in rad/m with absolute values between ``low`` and ``high``, and their
     weights for integration."""
     behind = vehicle.axles[0] - vehicle.axles[-1]
@@ -246,14 +253,14 @@ def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndar
     edges = [low]
     while edges[-1] < high:
         edges.append(min(edges[-1] + min(0.19 * edges[-1], longest), high))
-    nodes, weights = leggauss(PER_PANEL)
+    nodes, weights = leggauss(GAUSS_POINTS_PER_PANEL)
     start, half = np.array(edges[:-1]), np.diff(edges) / 2.0
     return ((start + half)[:, None] + half[:, None] * nodes).ravel(), (2.0 * half[:, None] * weights).ravel()
 
 
 HIGHEST_FREQUENCY = 60.0
 """Frequency (Hz) up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
-PER_LOBE = 8
+FREQUENCIES_PER_LOBE = 8
 """Count of frequencies in each lobe, 1 / T wide, of the integrand of the mean's variance."""
 FREQUENCIES_AT_ONCE = 2000
 """Count of frequencies whose densities are computed at once."""
@@ -264,7 +271,7 @@ def standard_errors(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Standard errors (p,) of an output's mean, and of its mean square, when averaged over a time of ``duration``
     (s)."""
-    step = 2.0 * np.pi / duration / PER_LOBE
+    step = 2.0 * np.pi / duration / FREQUENCIES_PER_LOBE
     omega = step * (np.arange(int(2.0 * np.pi * HIGHEST_FREQUENCY / step)) + 0.5)
     parts = np.array_split(omega, -(-len(omega) // FREQUENCIES_AT_ONCE))
     density = np.concatenate([spectral_densities(vehicle, excitation, speed, omega_part) for omega_part in parts])

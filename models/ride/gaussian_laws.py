@@ -20,7 +20,7 @@ SECH_LIMIT, NORMAL_LIMIT = 20.0, 9.0
 """Ends of the integration range: sech^2 is 4 e^-40 there, the normal density e^-40."""
 
 
-def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
+def mean_force_and_slope(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
     """Expected values E[f(x)] (N) and E[f'(x)] (N per unit of x) of a force curve f for normally distributed x; zeros
     without a curve."""
     if curve is None:
@@ -40,7 +40,7 @@ def _slope_of_curve(curve: Curve, x: float) -> float:
     return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if x >= corner)
 
 
-def of_friction(friction: float, friction_rate: float, deviation: float) -> float:
+def mean_friction_slope(friction: float, friction_rate: float, deviation: float) -> float:
     """Expected slope E[f'(v)] (N s/m) of the friction force f(v) = friction tanh(v / friction_rate), for v normal with
     mean 0 and a standard deviation (m/s).
 
@@ -54,20 +54,20 @@ def of_friction(friction: float, friction_rate: float, deviation: float) -> floa
     return friction / friction_rate * float((density / np.cosh(t) ** 2).sum() * (t[1] - t[0]))
 
 
-def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
+def linearised_travel_law(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
     """Statistical linearisation of a spring's force curve over travel (m): mean force (N), gain (N/m), and variance
     (N^2) of the remaining force."""
-    force, gain = of_curve(spring.travel_force, mean, deviation)
+    force, gain = mean_force_and_slope(spring.travel_force, mean, deviation)
     x = deviation * EXPECTATION_POINTS
     law = _curve_at(spring.travel_force, mean + x)
     return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
 
 
-def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
+def linearised_rate_law(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
     """Statistical linearisation of a spring's force curve and friction over the rate (m/s): mean force (N), gain (N
     s/m), and variance (N^2) of the remaining force."""
-    force, gain = of_curve(spring.rate_force, 0.0, deviation)
-    gain += of_friction(spring.friction, spring.friction_rate, deviation)
+    force, gain = mean_force_and_slope(spring.rate_force, 0.0, deviation)
+    gain += mean_friction_slope(spring.friction, spring.friction_rate, deviation)
     x = deviation * EXPECTATION_POINTS
     law = _curve_at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
     return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)

@@ -64,7 +64,7 @@ class MarginalParts:
     S: np.ndarray
     V: np.ndarray
     W: np.ndarray
-    zeros: int
+    zero_count: int
     scale: np.ndarray
     norm_of_rates: float
     neglected_rate_ratio: float
@@ -93,7 +93,7 @@ def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> Marginal
     W = V.T.copy()
     for size in {k, zeros}:
         _decouple(form, V, W, size)
-    S, T, back = _by_motions(form[k:, k:])
+    S, T, back = _modal_form(form[k:, k:])
     stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
     return MarginalParts(
         form[:k, :k],
@@ -105,7 +105,7 @@ def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> Marginal
         zeros,
         scale,
         norm,
-        _by_slowest(left, stable_part[undamped:, undamped:]),
+        _ratio_to_slowest_decay(left, stable_part[undamped:, undamped:]),
     )
 
 
@@ -136,7 +136,7 @@ def _balanced_matrix(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     return A * scale / scale[:, None], scale, fastest
 
 
-def _by_slowest(rate: float, S: np.ndarray) -> float:
+def _ratio_to_slowest_decay(rate: float, S: np.ndarray) -> float:
     return rate / float(-np.linalg.eigvals(S).real.max()) if len(S) else 0.0
 
 
@@ -195,7 +195,7 @@ def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
         form[:k, k:] = 0.0
 
 
-def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _modal_form(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """System matrix A transformed almost to its own modes, T^-1 A T, with T and its inverse: real, in extended
     precision.
 
@@ -251,19 +251,19 @@ def variance_growth(
     )
     outputs_of_marginal = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.count_of_marginal_states)
-    z, least_rate = split.zeros, ZERO_MARGIN * accuracy
+    z, least_rate = split.zero_count, ZERO_MARGIN * accuracy
     largest_rounding = least_rate * variance * 2 * accuracy * split.norm_of_rates
-    rate, power = _of_zeros(
+    rate, power = _growth_by_zeros(
         split.M[:z, :z], G[:z], G_size[:z], outputs_of_marginal[:, :z], seen_size[:, :z], least_rate, largest_rounding
     )
-    swung = _of_undamped(
+    swung = _growth_by_undamped(
         split.M[z:, z:], G[z:], G_size[z:], outputs_of_marginal[:, z:], seen_size[:, z:], least_rate, largest_rounding
     )
     rate = np.where(power <= 1, rate + swung, rate)
     return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
 
 
-def _of_zeros(
+def _growth_by_zeros(
     N: np.ndarray,
     G: np.ndarray,
     G_size: np.ndarray,
@@ -287,7 +287,7 @@ def _of_zeros(
     return rate, power
 
 
-def _of_undamped(
+def _growth_by_undamped(
     T: np.ndarray,
     G: np.ndarray,
     G_size: np.ndarray,

@@ -21,7 +21,7 @@ from models.core.errors import InputError
 from models.core.noise import ROAD, SAMPLES_PER_BLOCK, normal_samples
 from models.ride.covariance import FINITE, stationary_covariance
 from models.ride.excited import DelayedSystem
-from models.ride.road_in_path import at_speed, power_terms
+from models.ride.road_in_path import system_at_speed, taylor_terms
 from models.ride.speed_profile import SpeedProfile
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -88,7 +88,7 @@ def variances_along_drive(
     ends = profile.time(cells.length * np.arange(1, int(profile.paths[-1] / cells.length) + 1))
     wanted = np.unique(np.abs(ends[:, None] - np.asarray(instants)).argmin(axis=0))
     first = float(profile.speeds[0])
-    lead = np.full(cells.to_forget(first), cells.length / first)
+    lead = np.full(cells.cells_to_forget(first), cells.length / first)
     rows = []
     durations = np.append(lead, np.diff(ends[: wanted[-1] + 1], prepend=profile.times[0]))
     for number, x in enumerate(cells.states(durations, copies, seed)):
@@ -98,7 +98,7 @@ def variances_along_drive(
     return cells.estimate(ends[wanted], np.array(rows), copies)
 
 
-def at_constant_speed(
+def variances_at_constant_speed(
     vehicle: LinearVehicle,
     excitation: Excitation,
     speed: float,
@@ -111,7 +111,7 @@ def at_constant_speed(
     """Stationary variances (1, p) of the outputs at a constant speed (m/s), averaged over the copies and, in each of
     them, over ``duration`` (s)."""
     cells = _Cells(vehicle, excitation, weightings, speed)
-    skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
+    skipped, counted = cells.cells_to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
     for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copies, seed)):
         if number >= skipped:
@@ -146,7 +146,7 @@ class _Cells:
         self, vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None, slowest: float
     ) -> None:
         def system(speed: float) -> DelayedSystem:
-            return at_speed(vehicle, excitation, speed, weightings)
+            return system_at_speed(vehicle, excitation, speed, weightings)
 
         self.at_unit_speed, self.at_double_speed = system(1.0), system(2.0)
         self.finite = np.array([status == FINITE for status in stationary_covariance(system(slowest)).status])
@@ -157,7 +157,7 @@ class _Cells:
             self.at_double_speed.A - self.at_unit_speed.A,
         )
 
-    def to_forget(self, speed: float) -> int:
+    def cells_to_forget(self, speed: float) -> int:
         """Number of cells at a constant speed after which a copy no longer depends on its initial state."""
         slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
         if slowest < SLOWEST_DECAY:
@@ -210,7 +210,7 @@ def _legendre_integrals() -> np.ndarray:
     points, weights = np.polynomial.legendre.leggauss(SERIES_TERMS)
     degree = np.sqrt(2.0 * np.arange(LEGENDRE_MODES) + 1.0)
     basis = np.polynomial.legendre.legvander(points, LEGENDRE_MODES - 1) * degree
-    return np.einsum("u,uj,ul->jl", weights / 2.0, power_terms((1.0 - points) / 2.0, SERIES_TERMS), basis)
+    return np.einsum("u,uj,ul->jl", weights / 2.0, taylor_terms((1.0 - points) / 2.0, SERIES_TERMS), basis)
 
 
 def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:

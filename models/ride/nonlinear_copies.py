@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.ride.copies_kernel import POWERS_SUMMED, Curves, Laws, PushingTyres, march
+from models.ride.copies_kernel import POWERS_SUMMED, Curves, ForceLaws, PushingTyres, march
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
 from models.road.excitation import Excitation
@@ -21,7 +21,7 @@ from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
 from models.vehicles.spatial_linear import Gains, linearise, preloads
 
-LARGEST_RATE_TIMES_STEP, STEEPEST = 0.25, 0.5
+LARGEST_RATE_TIMES_STEP, LARGEST_STIFF_RATE_TIMES_STEP = 0.25, 0.5
 """Largest products of step and fastest rate: of the statistically linearised vehicle, and of the vehicle with its
 springs as stiff as they can become. Deviations of a quarter car are then too large by 0.05 to 0.1 %, by the covariance
 of the steps themselves."""
@@ -159,17 +159,17 @@ class CopiesMarch:
     def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:
         springs = nonlinear_springs(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
-        self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
+        self.laws, self.step = force_laws(vehicle, self.plain, springs, speed), step
         self.sums = np.zeros((POWERS_SUMMED, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
-    def march_over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
+    def march_over(self, roads: np.ndarray, first_counted: int, stride: int = STEPS_PER_READING) -> None:
         """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
-        ``first`` on."""
+        ``first_counted`` on."""
         if self.states is None:
             self.states = np.vstack([_static_positions(self.plain, roads[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
-        march(self.states, roads, self.step, first, stride, self.laws, self.sums)
+        march(self.states, roads, self.step, first_counted, stride, self.laws, self.sums)
 
 
 def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
@@ -186,7 +186,7 @@ def settling_time(equivalent: LinearVehicle) -> float:
 def longest_resolving_step(vehicle: SpatialVehicle, speed: float) -> float:
     """Longest step (s) that resolves the vehicle's motion when its springs are as stiff as they can become."""
     steepest = linearise(vehicle, speed, {s.name: _steepest_gains(s) for s in nonlinear_springs(vehicle)})
-    return STEEPEST / float(abs(poles(steepest)).max())
+    return LARGEST_STIFF_RATE_TIMES_STEP / float(abs(poles(steepest)).max())
 
 
 def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PER_READING) -> int:
@@ -194,11 +194,11 @@ def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PE
     return settling - completed if completed <= settling else (settling - completed) % stride
 
 
-def _static_positions(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
+def _static_positions(linear: LinearVehicle, road: np.ndarray) -> np.ndarray:
     """Positions (n, copies) of static equilibrium on a road (2 w, copies). Vehicles that start far above the road would
     oscillate for long."""
-    heights = road[: plain.road_stiffness.shape[1]]
-    return np.linalg.lstsq(plain.stiffness, plain.road_stiffness @ heights, rcond=1e-12)[0]
+    heights = road[: linear.road_stiffness.shape[1]]
+    return np.linalg.lstsq(linear.stiffness, linear.road_stiffness @ heights, rcond=1e-12)[0]
 
 
 def _steepest_gains(spring: SpringDamper) -> Gains:
@@ -214,17 +214,19 @@ def _slopes_of_pieces(curve: Curve | None) -> np.ndarray:
     return slope + np.cumsum([0.0, *bends])
 
 
-def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float) -> Laws:
-    """``Laws`` of the vehicle for compiled loops; ``plain`` is the vehicle without the nonlinear parts of these
+def force_laws(
+    vehicle: SpatialVehicle, linear: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float
+) -> ForceLaws:
+    """``Laws`` of the vehicle for compiled loops; ``linear`` is the vehicle without the nonlinear parts of these
     springs."""
-    n = len(plain.mass)
+    n = len(linear.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
     rows = np.array([o.displacement_factors for o in linearise(watched, speed).outputs]).reshape(-1, n)
     pushing = [tyre for tyre in vehicle.tyres if tyre.pushes_only]
     kinematics = Kinematics(vehicle)
     heights = np.array([kinematics.shift(tyre.body, tyre.point)[2] for tyre in pushing]).reshape(-1, n)
-    forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T, heights.T)
-    motion = np.linalg.solve(plain.mass, np.hstack(forced))
+    forced = (-linear.stiffness, -linear.damping, linear.road_stiffness, linear.road_damping, -rows.T, heights.T)
+    motion = np.linalg.solve(linear.mass, np.hstack(forced))
     named_forces = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
     read = np.array([[float((o.kind, _part_of_output(o)) == force) for force in named_forces] for o in vehicle.outputs])
     read = np.hstack(
@@ -239,12 +241,12 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
                         o.acceleration_factors,
                     ]
                 )
-                for o in plain.outputs
+                for o in linear.outputs
             ],
-            read.reshape(len(plain.outputs), -1),
+            read.reshape(len(linear.outputs), -1),
         ]
     )
-    return Laws(
+    return ForceLaws(
         rows,
         motion,
         read,

@@ -40,7 +40,7 @@ class RoadInPath:
     noise_inputs: np.ndarray
     basis: np.ndarray
     C: np.ndarray
-    rate: np.ndarray
+    C_per_speed: np.ndarray
     names: tuple[str, ...]
     excitation: Excitation
 
@@ -53,7 +53,7 @@ def road_in_path(
 
     A system is linear in v (its noise in sqrt(v)), so two speeds tell all.
     """
-    at_1, at_2 = (at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
+    at_1, at_2 = (system_at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
     first, (m, axles) = 2 * len(vehicle.mass), (len(excitation.F), len(excitation.heights))
     road = np.arange(first, first + axles * m)
     other_states = np.setdiff1d(np.arange(len(at_1.A)), road)
@@ -84,7 +84,7 @@ def road_in_path(
     )
 
 
-def at_speed(
+def system_at_speed(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weightings: Mapping[str, str] | None = None
 ) -> DelayedSystem:
     """State-space model of the vehicle on its road at a constant speed (m/s, above 0), with weighted outputs."""
@@ -109,13 +109,13 @@ class Responses:
         self.motion = [
             exponential_series(road_in_path.A, road_in_path.noise_inputs[:, axle]) for axle in range(self.axles)
         ]
-        self.of_length = lru_cache(maxsize=64)(self._of_length)
+        self.of_length = lru_cache(maxsize=64)(self._step_matrices)
 
     def transition(self, start_time: float, end_time: float) -> np.ndarray:
         """Transition matrix E (n + a m, n + a m) of the state (y, f) over a step from start to end time (s)."""
         motion, inputs = self.of_length(round(end_time - start_time, 14))
         driven = self.path(start_time + (end_time - start_time) * np.append(UNIT_POINTS, 1.0)) - self.path(start_time)
-        decay = (power_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
+        decay = (taylor_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
         E = np.zeros((self.n + self.axles * self.m,) * 2)
         E[: self.n, : self.n] = motion
         E[: self.n, self.n :] = (inputs @ decay[: -self.m]).reshape(self.n, -1)
@@ -123,14 +123,14 @@ class Responses:
             E[first : first + self.m, first : first + self.m] = decay[-self.m :]
         return E
 
-    def _of_length(self, length: float) -> tuple[np.ndarray, np.ndarray]:
+    def _step_matrices(self, length: float) -> tuple[np.ndarray, np.ndarray]:
         """Matrix exponential e^(A h) over a step of length h (s), and the effect of inputs at the points of the step
         through e^(A (h - u)): (n a, g m)."""
         left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in UNIT_POINTS])
         inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.noise_inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
 
-    def to_noise(self, axle: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
+    def noise_responses(self, axle: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
         """States (n + a m, L, k) at ``end_time`` (L,) after a unit of noise that the axle has met at ``meeting_times``
         (L,), in s.
 
@@ -139,13 +139,13 @@ class Responses:
         left = (end_time - meeting_times)[:, None]
         driven = self.path(meeting_times[:, None] + left * UNIT_POINTS) - self.path(meeting_times)[:, None]
         k = self.noise.shape[1] // self.m
-        road = (power_terms(driven, SERIES_TERMS) @ self.noise) * (left * UNIT_WEIGHTS)[..., None]
-        weighted = np.swapaxes(power_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
+        road = (taylor_terms(driven, SERIES_TERMS) @ self.noise) * (left * UNIT_WEIGHTS)[..., None]
+        weighted = np.swapaxes(taylor_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
         responses = np.zeros((self.n + self.axles * self.m, len(meeting_times), k))
         columns = weighted.reshape(-1, SERIES_TERMS, self.m, k).transpose(1, 2, 0, 3).reshape(SERIES_TERMS * self.m, -1)
         motion = self.motion[axle].reshape(SERIES_TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
         responses[: self.n] = (motion @ columns).reshape(self.n, -1, k)
-        filter_states = power_terms(self.path(end_time) - self.path(meeting_times), SERIES_TERMS) @ self.noise
+        filter_states = taylor_terms(self.path(end_time) - self.path(meeting_times), SERIES_TERMS) @ self.noise
         rows = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
         responses[rows] = filter_states.reshape(-1, self.m, k).transpose(1, 0, 2)
         return responses
@@ -159,7 +159,7 @@ def exponential_series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return np.stack([row.ravel() for row in rows])
 
 
-def power_terms(t: np.ndarray, term_count: int) -> np.ndarray:
+def taylor_terms(t: np.ndarray, term_count: int) -> np.ndarray:
     """Terms t^j / j! along a new last axis, for j = 0 to ``term_count`` - 1."""
     terms = np.ones((*np.shape(t), term_count))
     terms[..., 1:] = np.asarray(t)[..., None] / np.arange(1, term_count)

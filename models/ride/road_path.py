@@ -26,12 +26,12 @@ class RoadPath:
 
     excitation: Excitation
     speed: float
-    half: float
+    half_step: float
 
     @property
     def step(self) -> float:
         """Time step (s) of a simulation on this road path."""
-        return 2.0 * self.half
+        return 2.0 * self.half_step
 
     @property
     def has_rates(self) -> bool:
@@ -39,27 +39,26 @@ class RoadPath:
         heights directly."""
         return not any((H @ self.excitation.G).any() for H in self.excitation.heights)
 
-    def table(self, steps: int, seed: int, path: int = 0) -> np.ndarray:
+    def wheel_heights_and_rates(self, step_count: int, seed: int, first_path: int = 0) -> np.ndarray:
         """Heights (m) under the wheels, then their rates (m/s), at every half step: (2 steps + 1, 2 w).
 
         Rates that are white noise are left 0, which is right for tyres without damping only.
         """
-        return next(self.blocks(steps, 1, seed, path))[:, :, 0]
+        return next(self.blocks(step_count, 1, seed, first_path))[:, :, 0]
 
-    def blocks(self, steps: int, copies: int, seed: int, path: int = 0) -> Iterator[np.ndarray]:
+    def blocks(self, step_count: int, copies: int, seed: int, first_path: int = 0) -> Iterator[np.ndarray]:
         """Yield, without end, roads (2 steps + 1, 2 w, copies) under all copies; each begins where the last one ended.
 
-        The first begins in the road's stationary state, or at 0 where it has none; they draw the noise paths ``path``,
-        ``path`` + 1 and so on.
-        """
+        The first begins in the road's stationary state, or at 0 where it has none; they draw the noise paths
+        ``first_path``, ``first_path`` + 1 and so on."""
         F, G, heights = _axles(self.excitation)
-        move, root = _transition_over(F, G, self.speed * self.half)
-        lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half)).astype(int)
+        move, root = _transition_over(F, G, self.speed * self.half_step)
+        lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half_step)).astype(int)
         lags = 0 * lags if self.excitation.independent else lags
         met, buffer = np.empty((0, len(F), copies)), np.empty((len(F), copies))
         while True:
-            fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
-            drawn = normal_samples(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
+            fresh = 2 * step_count + (0 if len(met) else 1 + max(lags))
+            drawn = normal_samples(seed, first_path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
             drawn = np.concatenate(
                 [met[-1:] if len(met) else _stationary_root(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
             )
@@ -68,8 +67,8 @@ class RoadPath:
                     next_states, np.dot(move, last_states, buffer), next_states
                 )  # two thirds of the time of after += move @ before
             met = np.concatenate([met[:-1], drawn])
-            yield self._road_under_wheels(F, heights, met, lags, 2 * steps + 1)
-            met, path = met[2 * steps :], path + 1
+            yield self._road_under_wheels(F, heights, met, lags, 2 * step_count + 1)
+            met, first_path = met[2 * step_count :], first_path + 1
 
     def _road_under_wheels(
         self, F: np.ndarray, heights: Sequence[np.ndarray], met_states: np.ndarray, lags: np.ndarray, row_count: int

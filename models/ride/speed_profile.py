@@ -88,7 +88,7 @@ STANDSTILL_CUTS = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
 
 
 @dataclass(frozen=True)
-class Nodes:
+class IntegrationPoints:
     """Integration points (K,) of the integral over the path: time (s), weight (m), and index of the step in which each
     lies."""
 
@@ -97,32 +97,32 @@ class Nodes:
     step: np.ndarray
 
 
-def steps(
+def step_ends_of_drive(
     profile: SpeedProfile,
     begin_time: float,
     instants: Sequence[float] | np.ndarray,
-    motion: float,
-    road: float,
+    motion_rate: float,
+    road_rate: float,
     largest_rate_times_step: float,
 ) -> np.ndarray:
     """Ends (N + 1,) of the time steps (s) from ``begin_time`` to the profile's end; the profile's points and
     ``instants`` are among them.
 
-    A step times the fastest rate of the motion (1/s) and of the road met (``road`` in 1/m) is at most
+    A step times the fastest rate of the motion (1/s) and of the road met (``road_rate`` in 1/m) is at most
     ``largest_rate_times_step``.
     """
     within = [t for t in instants if begin_time < t < profile.times[-1]]
     cuts = np.unique(np.concatenate([[begin_time], profile.times, within]))
     ends = [cuts[:1]]
     for start, stop in pairwise(cuts):
-        rate = max(motion, road * float(profile.speed(np.array([start, stop])).max()))
+        rate = max(motion_rate, road_rate * float(profile.speed(np.array([start, stop])).max()))
         ends.append(
             np.linspace(start, stop, max(1, int(np.ceil(rate * (stop - start) / largest_rate_times_step))) + 1)[1:]
         )
     return np.concatenate(ends)
 
 
-def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> Nodes:
+def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> IntegrationPoints:
     """Integration points of the integral over the path, in cells. Cells end at every step's end, and wherever an axle
     passes a position at which a step ended.
 
@@ -142,7 +142,7 @@ def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: 
     weight = np.diff(cuts)[:, None] * UNIT_WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)
     time, weight = time[moving].ravel(), weight[moving].ravel()
-    return Nodes(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
+    return IntegrationPoints(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
 
 
 def _passing_times(profile: SpeedProfile, positions: np.ndarray, distances: Sequence[float]) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.ride.covariance import StationaryCovariance, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
-from models.ride.gaussian_laws import of_rate, of_travel
+from models.ride.gaussian_laws import linearised_rate_law, linearised_travel_law
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
@@ -26,7 +26,7 @@ from models.vehicles.spatial_linear import Gains, linearise
 
 GAIN_TOLERANCE = 1e-12
 """Largest relative change of a gain at which the fixed point counts as reached."""
-MOST_ROUNDS = 400
+LARGEST_ITERATION_COUNT = 400
 FIRST_TRAVEL_DEVIATION, FIRST_RATE_DEVIATION = 0.02, 0.3
 """Standard deviations of travel (m) and rate (m/s) at which the first gains are computed: slopes at rest may leave a
 vehicle undamped."""
@@ -121,10 +121,10 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
+    return _FixedPointSearch(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
 
 
-Law = tuple[float, float, float]
+LinearisedLaw = tuple[float, float, float]
 """Statistical linearisation of a force law by ``gaussian_laws``: mean force, gain, and variance of the remaining
 force."""
 
@@ -139,7 +139,7 @@ class _Moments:
     rate: np.ndarray
 
 
-class _Search:
+class _FixedPointSearch:
     """Fixed-point search for the equivalent gains of one vehicle, road and speed; extra outputs read the motion of the
     nonlinear springs."""
 
@@ -168,10 +168,10 @@ class _Search:
             moments, position = self._spring_moments(gains, position)
             wanted = self._equivalent_gains(moments)
             changes.append(_largest_gain_change(wanted, gains))
-            if len(changes) >= MOST_ROUNDS:
+            if len(changes) >= LARGEST_ITERATION_COUNT:
                 raise RunFailed(
                     "statistical linearisation",
-                    f"gains still change by {changes[-1]:.1e} after {MOST_ROUNDS} "
+                    f"gains still change by {changes[-1]:.1e} after {LARGEST_ITERATION_COUNT} "
                     "iterations: the vehicle has no one way to move on this road",
                 )
             if len(changes) > 1 and changes[-1] > 0.9 * changes[-2] and changes[-1] > GAIN_TOLERANCE:
@@ -185,11 +185,14 @@ class _Search:
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
-    def _linearised_laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
+    def _linearised_laws(self, moments: _Moments) -> list[tuple[LinearisedLaw, LinearisedLaw]]:
         """Statistical linearisation of each spring's force laws over travel and over rate: mean force, gain, and
         variance of the remaining force."""
         moments_by_spring = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
-        return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moments_by_spring]
+        return [
+            (linearised_travel_law(s, mean, travel), linearised_rate_law(s, rate))
+            for s, mean, travel, rate in moments_by_spring
+        ]
 
     def _linearised_vehicle(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
@@ -210,9 +213,12 @@ class _Search:
     def _mean_position(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
         """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
         stay 0."""
-        damper = np.array([of_rate(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
+        damper = np.array([linearised_rate_law(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
         for _ in range(MOST_NEWTON_STEPS):
-            laws = [of_travel(s, m, d) for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)]
+            laws = [
+                linearised_travel_law(s, m, d)
+                for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)
+            ]
             force, gain = np.array([law[:2] for law in laws]).reshape(-1, 2).T
             left = self.plain.stiffness @ position + self.rows.T @ (force + damper)
             step = np.linalg.lstsq(self.plain.stiffness + self.rows.T * gain @ self.rows, left, rcond=1e-12)[0]
@@ -278,7 +284,7 @@ class _Search:
             [_corner_frequency(moments.rate, moments.travel), _corner_frequency(change, moments.rate)]
         )
         lost = np.array([[law[2] for law in laws] for laws in self._linearised_laws(moments)]).T.ravel()
-        forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._own_forces())
+        forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._spring_force_outputs())
         noise = np.diag(np.sqrt(2.0 * corners * lost))
         added = stationary_covariance(
             vehicle_with_road(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0)
@@ -286,7 +292,7 @@ class _Search:
         usable = np.isfinite(covariance.variance) & (covariance.variance > 0) & np.isfinite(added.variance)
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
 
-    def _own_forces(self) -> np.ndarray:
+    def _spring_force_outputs(self) -> np.ndarray:
         """Matrix (p, 2 springs) with 1 where an output is the force of this nonlinear spring."""
         names = [s.name for s in self.springs] * 2
         return np.array(
@@ -297,19 +303,19 @@ class _Search:
         )
 
 
-def _corner_frequency(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+def _corner_frequency(rate_deviation: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     """Corner frequency (1/s) of the spectrum of a left-out force, from the standard deviations of the spring's motion
     and of its rate."""
-    return HARMONIC_RATIO * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
+    return HARMONIC_RATIO * np.divide(rate_deviation, deviation, out=np.ones_like(rate_deviation), where=deviation > 0)
 
 
-def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
-    """The vehicle excited by forces along rows (f, n) instead of road heights; ``reading`` (p, f): direct effect of the
-    forces on the outputs."""
+def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, direct_effects: np.ndarray) -> LinearVehicle:
+    """The vehicle excited by forces along rows (f, n) instead of road heights; ``direct_effects`` (p, f): direct effect
+    of the forces on the outputs."""
     no_roads = np.zeros(len(rows))
     outputs = tuple(
         Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads)
-        for o, read in zip(linear.outputs, reading, strict=True)
+        for o, read in zip(linear.outputs, direct_effects, strict=True)
     )
     wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
@@ -335,7 +341,7 @@ def _left_out_sentence(name: str, share: float, status: str) -> str:
     )
 
 
-def promised_error(share: float) -> float:
+def largest_error_seen(share: float) -> float:
     """Largest relative error of an output's standard deviation that tests have seen at this share of left-out
     forces."""
     return next((error for largest_share, error, _ in ERROR_GRADES if share <= largest_share), EXTRAPOLATION_ERROR)

@@ -23,8 +23,8 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from models.core.errors import InputError
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covariance
 from models.ride.marginal import MATRIX_ACCURACY
-from models.ride.road_in_path import Responses, RoadInPath, at_speed, road_in_path
-from models.ride.speed_profile import SpeedProfile, integration_points, steps
+from models.ride.road_in_path import Responses, RoadInPath, road_in_path, system_at_speed
+from models.ride.speed_profile import SpeedProfile, integration_points, step_ends_of_drive
 from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -97,11 +97,11 @@ def varying_speed(
     if fastest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 somewhere: at standstill nothing moves")
     form = road_in_path(vehicle, excitation, weightings)
-    status = stationary_covariance(at_speed(vehicle, excitation, fastest, weightings), accuracy).status
+    status = stationary_covariance(system_at_speed(vehicle, excitation, fastest, weightings), accuracy).status
     if first == 0.0:
         P = _standing_covariance(form)
     else:
-        P = stationary_covariance(at_speed(vehicle, excitation, first, weightings), accuracy).P
+        P = stationary_covariance(system_at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
     rows_of_results = [_all_variances(form, P, first, status)]
     time = [profile.times[0]]
@@ -168,25 +168,25 @@ def _covariance_by_step(
     axle_distances = [road.lengths[j] - road.lengths[i] for i, j in pairs]
     lead = max(axle_distances, default=0.0) / first if first else 0.0
     motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (road_in_path.A, road.F))
-    ends = steps(profile, profile.times[0] - lead, instants, motion, path, largest_rate_times_step)
+    ends = step_ends_of_drive(profile, profile.times[0] - lead, instants, motion, path, largest_rate_times_step)
     points = integration_points(profile, ends, sorted({distance for distance in axle_distances if distance}))
     responses = Responses(road_in_path, profile)
-    hits = [_NoiseMet(responses, axle, points.time, ends) for axle in range(len(road.heights))]
-    queues = [_Queue(responses, i, j, points.time, ends) for i, j in pairs]
+    hits = [_NoiseResponses(responses, axle, points.time, ends) for axle in range(len(road.heights))]
+    queues = [_ResponseQueue(responses, i, j, points.time, ends) for i, j in pairs]
     for step, (start, end) in enumerate(pairwise(ends)):
         E = responses.transition(start, end)
         for queue in queues:
-            queue.move(E, step)
+            queue.advance(E, step)
         if end > profile.times[0]:
-            b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].within(step)]
+            b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].times_in_step(step)]
             half = [_sum_of_products(block, block, weight) / 2.0 for block in b]
-            half += [_sum_of_products(queue.take(len(weight)), b[queue.last], weight) for queue in queues]
+            half += [_sum_of_products(queue.remove_first(len(weight)), b[queue.last], weight) for queue in queues]
             Q = np.sum(half, axis=0)
             P = E @ P @ E.T + Q + Q.T
             yield end, P
 
 
-class _NoiseMet:
+class _NoiseResponses:
     """State responses at the ends of the steps to the noise that an axle meets at given times (s) in ascending
     order."""
 
@@ -195,7 +195,7 @@ class _NoiseMet:
         self.first = np.searchsorted(time, step_ends)
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
-    def within(self, step: int) -> slice:
+    def times_in_step(self, step: int) -> slice:
         """Slice of the meeting times that lie in a step."""
         return slice(self.first[step], self.first[step + 1])
 
@@ -210,11 +210,11 @@ class _NoiseMet:
                 self.ends[block * STEPS_PER_BLOCK + 1 : last_step + 1],
                 np.diff(self.first[block * STEPS_PER_BLOCK : last_step + 1]),
             )
-            self.made, self.block = self.responses.to_noise(self.axle, time, end), block
+            self.made, self.block = self.responses.noise_responses(self.axle, time, end), block
         return self.made[:, self.first[step] - begin : self.first[step + 1] - begin]
 
 
-class _Queue:
+class _ResponseQueue:
     """State responses (n, q, k) to noise that an axle has already met and the ``last`` axle will meet at given times
     (s)."""
 
@@ -227,15 +227,15 @@ class _Queue:
         met = profile.time(position) if distance else time
         is_before_start = np.isneginf(met)
         self.waiting = _delayed_responses(form, axle, -position[is_before_start])
-        self.met = _NoiseMet(responses, axle, met[~is_before_start], step_ends)
+        self.met = _NoiseResponses(responses, axle, met[~is_before_start], step_ends)
 
-    def move(self, E: np.ndarray, step: int) -> None:
+    def advance(self, E: np.ndarray, step: int) -> None:
         """Advance all responses by one step, and add those to noise that is met within the step."""
         n, _, k = self.waiting.shape
         moved_responses = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
         self.waiting = np.concatenate([moved_responses, self.met.of(step)], axis=1)
 
-    def take(self, response_count: int) -> np.ndarray:
+    def remove_first(self, response_count: int) -> np.ndarray:
         """Remove the first ``response_count`` entries from the queue and return them."""
         removed, self.waiting = self.waiting[:, :response_count], self.waiting[:, response_count:]
         return removed
@@ -292,7 +292,7 @@ def _standing_covariance(road_in_path: RoadInPath) -> np.ndarray:
 
 def _all_variances(road_in_path: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
     """Variances of all outputs and of the road's height under each wheel."""
-    n, C = len(road_in_path.A), road_in_path.C + speed * road_in_path.rate
+    n, C = len(road_in_path.A), road_in_path.C + speed * road_in_path.C_per_speed
     H = np.hstack(road_in_path.excitation.heights)
     variance = ((C @ P) * C).sum(axis=1)
     lost = [state == DIFFUSING or (state == INFINITE and speed > 0.0) for state in status]

@@ -12,7 +12,7 @@ from models.engines.protocol import guard
 from models.engines.spatial_protocol import INTEGRATORS, build
 from models.machine.timing import interleave, paired_ratio
 from models.ride.copies_kernel import POWERS_SUMMED, march
-from models.ride.nonlinear_copies import laws_of
+from models.ride.nonlinear_copies import force_laws
 from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.vehicles.spatial import SpatialVehicle
@@ -40,7 +40,11 @@ def rides(engine: str, steps: int) -> tuple[Job, Job]:
     """Two runs of the bare ride in one engine, by twinrig's model and by the hand-written car. Both give states (steps
     + 1, 14), and check them with the same guard."""
     vehicle, road = scene()
-    table, rest_state, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
+    table, rest_state, duration = (
+        road.wheel_heights_and_rates(steps, 0),
+        np.zeros(len(vehicle.coordinates())),
+        steps * road.step,
+    )
     model = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
     by_hand = BY_HAND[engine](Car.of(vehicle), table[:, : len(vehicle.tyres)], road.step, steps)
 
@@ -61,7 +65,7 @@ def copies(steps: int) -> tuple[Job, Job]:
     final states (14, COPIES)."""
     vehicle, road = scene()
     plain, roads = linearise(vehicle, road.speed), next(road.blocks(steps, COPIES, 0))
-    laws, car, heights = laws_of(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
+    laws, car, heights = force_laws(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
     sums = np.zeros((POWERS_SUMMED, len(plain.outputs), COPIES))
 
     def ours() -> np.ndarray:

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
-from models.ride.frequency import both_sides, output_densities, variances
+from models.ride.frequency import output_densities, signed_wavenumbers, variances_over_wavenumbers
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import Excitation
 from models.road.isotropic import DensityPart, IsotropicRoad, cross_spectrum_of, isotropic_like, spectral_matrix
@@ -242,7 +242,7 @@ def _names(vehicle: LinearVehicle) -> list[str]:
 
 
 def _by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
-    spectral = variances(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *BAND)
+    spectral = variances_over_wavenumbers(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *BAND)
     return np.sqrt(_accelerations(spectral, vehicle))
 
 
@@ -293,7 +293,7 @@ def _weighted_rows() -> list[Row]:
     filters = {"left occupant": "Wk", "body centre": "Wd"}
     system = system_with_weightings(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED), filters)
     deviations = stationary_covariance(system).deviation[-len(filters) :]
-    k, weight = both_sides(vehicle, *BAND)
+    k, weight = signed_wavenumbers(vehicle, *BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
     rows = []
     for value, (output, name) in zip(deviations, filters.items(), strict=True):

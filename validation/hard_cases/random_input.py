@@ -101,7 +101,9 @@ def any_step(implementation: str, folder: Path) -> float:
         keeps = np.exp(
             -2.0 * step_share
         )  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
-        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).table(20_000, seed=12)[:, 0]
+        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).wheel_heights_and_rates(20_000, seed=12)[
+            :, 0
+        ]
         error = (2.0 / len(road) * (1.0 + keeps) / (1.0 - keeps)) ** 0.5
         worst = max(worst, abs(float(np.mean(road**2)) / (Q / (2.0 * CORNER)) - 1.0) / error)
     return worst
@@ -120,9 +122,9 @@ def odd_delay(implementation: str, folder: Path) -> float:
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
         road = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
         steps = int(2.0 * length / (speed * road.step)) + 50
-        front, rear = road.table(steps, seed=3)[:, :2].T
+        front, rear = road.wheel_heights_and_rates(steps, seed=3)[:, :2].T
         lag = next((i for i in range(1, len(front)) if np.array_equal(rear[i : i + 20], front[:20])), 0)
-        worst = max(worst, abs(lag * road.half * speed / length - 1.0) if lag else np.inf)
+        worst = max(worst, abs(lag * road.half_step * speed / length - 1.0) if lag else np.inf)
     return worst
 
 

@@ -16,8 +16,8 @@ from scipy.linalg import block_diag
 from models.advice.ride_choice.modes import Modes, behind_road, behind_weightings, modes_of, stable_step
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
-from models.ride.covariance import noise_of
-from models.ride.excited import DelayedSystem, VehicleStates, first_order, vehicle_states
+from models.ride.covariance import noise_intensity_of_system
+from models.ride.excited import DelayedSystem, VehicleStates, first_order_system, vehicle_states
 from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
@@ -79,7 +79,7 @@ class Reduced:
     @cached_property
     def noise(self) -> np.ndarray:
         """Covariance (x, x) per second that the noise of all axles adds."""
-        return noise_of(self.system, self.modes.propagated if self.modes else None)
+        return noise_intensity_of_system(self.system, self.modes.propagated if self.modes else None)
 
 
 class Numbers:
@@ -234,7 +234,7 @@ class FullScene:
         """The system of the reduced scene before the weightings of outputs are added."""
         vehicle, (excitation, Tf, left_f) = self.vehicles.of(scene, self.speed), self._heights(scene)
         states, N = vehicle.states, vehicle.N
-        system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
+        system, Tq = first_order_system(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
         inert, road = len(states.massless_part), len(states.A)
         q, f = N @ Tq, np.hstack([np.zeros((m, road)), Tf])

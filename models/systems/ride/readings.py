@@ -33,7 +33,7 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
 
     Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
     """
-    from models.ride.frequency import variances
+    from models.ride.frequency import variances_over_wavenumbers
     from models.road.isotropic import isotropic_like, spectral_matrix
 
     placed = placed_wheels(scene, wheels(vehicle))
@@ -48,7 +48,7 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
         else 0.01
     )
     of_road, of_isotropic = (
-        variances(linear, partial(spectral_matrix, road_model, placed), speed, low, HIGHEST_WAVENUMBER)
+        variances_over_wavenumbers(linear, partial(spectral_matrix, road_model, placed), speed, low, HIGHEST_WAVENUMBER)
         for road_model in (road, isotropic_like(road, y))
     )
     pairs = zip(linear.names, of_road, of_isotropic, strict=True)
