@@ -52,7 +52,7 @@ class MarginalParts:
     """Decoupling of x' = A x + u into a marginal part (eigenvalues on the imaginary axis) and a stable part: x = V0 a +
     V b, a' = M a + W0 u, b' = S b + W u.
 
-    M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
+    M (k, k) has its eigenvalues on the imaginary axis, the first ``zero_count`` of its rows those at 0 (nilpotent), the
     others undamped oscillations; S is stable. V and W are in extended precision.
     scale (n,): sizes of the states that balance A; rounding is relative to them. norm_of_rates: norm of A, 1/s.
     neglected_rate_ratio: largest rate that was taken for 0, by the slowest of the stable part.

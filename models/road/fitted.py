@@ -1,4 +1,5 @@
-"""Mean and roll process fitted to two measured tracks, with sentences on what the measurement leaves undetermined."""
+"""Random road (mean height and roll process) fitted to two measured tracks, with sentences on what the measurement
+leaves undetermined."""
 
 import itertools
 import math
@@ -12,14 +13,14 @@ from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad
 
 PER_DECADE = 10
-"""Bands per decade in which a density is averaged before the fit, so that every octave counts the same."""
+"""Count of bands per decade in which a density is averaged before the fit, so that every octave counts the same."""
 HIGHEST_WAVENUMBER = 2.0 * math.pi * 2.83
-"""Upper end of the standard's band, rad/m: shorter waves are the tyre's business."""
+"""Upper end (rad/m) of the band of ISO 8608: shorter waves are swallowed by the tyre."""
 
 
 @dataclass(frozen=True)
 class FilterFit:
-    """First-order filter fitted to a density between ``low`` and ``high`` (rad/m).
+    """First-order filter fitted to a measured density between the wavenumbers ``low`` and ``high`` (rad/m).
 
     corner_error, intensity_error: relative standard errors from the scatter about the fit. ``log_residual``: rms of
     ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``corner_is_resolved`` if it lies
@@ -37,8 +38,8 @@ class FilterFit:
 
 @dataclass(frozen=True)
 class FittedRoad:
-    """The fitted road, the fits of its mean and roll process (None for an absent process), sentences on their quality,
-    and the spectra."""
+    """Road fitted to measured tracks, the fits of its mean and roll process (None for an absent process), sentences on
+    their quality, and the spectra."""
 
     road: TwoTrackRoad
     mean: FilterFit
@@ -50,7 +51,7 @@ class FittedRoad:
 def fit_road(
     tracks: MeasuredTracks, window_length: float | None = None, low: float | None = None, high: float | None = None
 ) -> FittedRoad:
-    """First-order mean and roll process by least squares on the logarithms of the measured densities.
+    """Fit of a first-order mean and roll process by least squares on the logarithms of the measured densities.
 
     low, high : band of the fit in rad/m; by default from twice the lowest wavenumber that a window holds, where the
     straight line that was taken out is no longer felt, to the end of the standard's band
@@ -91,8 +92,8 @@ def fit_road(
 def _fit_first_order(
     k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str
 ) -> FilterFit:
-    """Least-squares fit of ln S = ln(q / 2 pi) - ln(corner^2 + k^2), with the logarithms of q and corner as
-    unknowns."""
+    """Least-squares fit of ln S = ln(q / 2 pi) - ln(corner^2 + k^2), with the logarithms of q and corner as unknowns,
+    to a density over the wavenumber k."""
     from scipy.optimize import least_squares
 
     middle, mean = _band_averages(k, density, freedom, low, high)
@@ -118,8 +119,8 @@ def _fit_first_order(
 def _band_averages(
     k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Band centres (rad/m), and logarithms of the densities times k^2 averaged in bands, corrected for the bias of the
-    logarithm."""
+    """Band centres (rad/m), and logarithms of the densities averaged in bands (as density times k^2), corrected for the
+    bias of the logarithm."""
     from scipy.special import digamma
 
     count = max(1, round(PER_DECADE * math.log10(high / low))) if high > low else 0
@@ -137,7 +138,7 @@ def _band_averages(
 
 
 def _data_limit_sentences(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
-    """Sentences on limits of the data that no fit can remove."""
+    """Sentences on limits of the measured data that no fit can remove."""
     lowest_wavenumber = spectra.wavenumber[0]
     low, high = spectra.confidence_factors()
     return [
