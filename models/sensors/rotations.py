@@ -1,4 +1,4 @@
-"""Orientation of a rigid body: unit quaternions, their exact step under a turning rate, and Cardan angles.
+"""Orientation of a rigid body: unit quaternions, their exact integration from angular rates, and Cardan angles.
 
 S (3, 3) turns local (body) components into global ones: x_global = S x_local (eq. 21). A quaternion
 q = (q1, q2, q3, q4) has its scalar first; q and -q are the same orientation. Rates are **local** and in rad/s:
@@ -15,14 +15,15 @@ from models.core.errors import InputError
 from models.machine.compiled import njit
 
 Rule = Literal["held", "mean", "cubic"]
-"""How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
+"""How an angular rate runs between its samples: constant ("held"), at the mean of both, or along a cubic; order 1, 2, 4
+of the orientation in the sampling period."""
 HALF_TURN = np.pi
-"""Turn (rad) from sample to sample beyond which nobody can tell the way it went; the series of Magnus ends there."""
+"""Rotation (rad) from sample to sample beyond which its direction cannot be told; the series of Magnus ends there."""
 UNIT_NORM_TOLERANCE = 1e-6
-"""Largest departure of a quaternion's norm from 1."""
+"""Largest difference of a quaternion's norm from 1."""
 GIMBAL_LOCK_COSINE = 1e-6
-"""Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that
-rounding alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
+"""Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that rounding
+alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
 ORTHOGONALITY_TOLERANCE = 1e-6
 """Largest departure of S^T S from the identity that still counts as a rotation."""
 
@@ -46,7 +47,7 @@ class GimbalLock(InputError):
 
 
 def skew_matrix(v: np.ndarray) -> np.ndarray:
-    """Matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
+    """Skew matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
     matrix = np.zeros((*v.shape, 3))
     matrix[..., 2, 1], matrix[..., 0, 2], matrix[..., 1, 0] = np.moveaxis(v, -1, 0)
     return matrix - np.swapaxes(matrix, -1, -2)
@@ -60,7 +61,7 @@ def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def conjugate_quaternion(q: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) of the inverse rotations."""
+    """Conjugate quaternions (..., 4), which are those of the inverse rotations."""
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -79,7 +80,7 @@ def rotation_vector(q: np.ndarray) -> np.ndarray:
 
 
 def turns_between_samples(rates: np.ndarray, sample_period: float, integration_rule: Rule = "cubic") -> np.ndarray:
-    """Rotation vectors (n - 1, ..., 3) in rad from each sample of local rates (n, ..., 3) in rad/s to the next one.
+    """Rotation vectors (n - 1, ..., 3) in rad from each sample of local angular rates (n, ..., 3) in rad/s to the next.
 
     "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
     "mean" : the mean of both neighbours; "cubic" : the integral of the cubic through four neighbours and the
@@ -108,7 +109,7 @@ def turns_between_samples(rates: np.ndarray, sample_period: float, integration_r
 
 
 def _check_turned(rates: np.ndarray, sample_period: float) -> None:
-    """Refuse angular rates that rotate the body too far between two samples."""
+    """Raise InputError for angular rates that rotate the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * sample_period > HALF_TURN:
         samples = f"for samples every {sample_period:g} s, half a turn from one to the next: are they in degrees?"
@@ -126,7 +127,8 @@ def cubic_integrals(values: np.ndarray, sample_period: float) -> np.ndarray:
 def integrate(
     rates: np.ndarray, sample_period: float, start_attitude: np.ndarray, integration_rule: Rule = "cubic"
 ) -> np.ndarray:
-    """Quaternions (n, ..., 4) at the samples of local rates (n, ..., 3) in rad/s, eq. (22); start (..., 4).
+    """Quaternions (n, ..., 4) of the orientation at the samples of local angular rates (n, ..., 3) in rad/s, eq. (22);
+    start_attitude (..., 4).
 
     Each step is the exact exponential of its rotation vector (``turns_between_samples``), and each result is divided by
     its norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
@@ -143,8 +145,8 @@ def integrate(
 
 @njit(cache=True)
 def _chain_rotations(start_attitude, steps):
-    """Normalised running products start, start steps[0], start steps[0] steps[1] ...: from shapes (m, 4) and (n, m, 4)
-    to (n + 1, m, 4)."""
+    """Normalised running products of quaternions, start, start steps[0], start steps[0] steps[1] ...: from shapes (m,
+    4) and (n, m, 4) to (n + 1, m, 4)."""
     attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
     for j in range(steps.shape[1]):
         a, b, c, d = start_attitude[j]
@@ -164,7 +166,7 @@ def _chain_rotations(start_attitude, steps):
 
 
 def rotation_matrix(q: np.ndarray) -> np.ndarray:
-    """Matrices S (..., 3, 3), local to global, of unit quaternions (..., 4), eq. (21)."""
+    """Rotation matrices S (..., 3, 3), local to global, of unit quaternions (..., 4), eq. (21)."""
     a, v = q[..., 0, None, None], q[..., 1:]
     outer = v[..., :, None] * v[..., None, :]
     square = np.trace(outer, axis1=-2, axis2=-1)[..., None, None]
@@ -172,7 +174,8 @@ def rotation_matrix(q: np.ndarray) -> np.ndarray:
 
 
 def from_matrix(s: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4), scalar 0 or more, of matrices (..., 3, 3); raises ValueError if one is no rotation."""
+    """Unit quaternions (..., 4), scalar 0 or more, of rotation matrices (..., 3, 3). Raises ValueError if one is no
+    rotation."""
     departure = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
     if not departure < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(s) > 0).all():
         raise ValueError(
@@ -182,7 +185,7 @@ def from_matrix(s: np.ndarray) -> np.ndarray:
 
 
 def from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
-    """Unit quaternions (..., 4) of S = Rz(yaw) Ry(pitch) Rx(roll), all in rad."""
+    """Unit quaternions (..., 4) of the rotation S = Rz(yaw) Ry(pitch) Rx(roll) by Cardan angles, all in rad."""
     axes = np.eye(3)
     parts = [
         exponential(np.asarray(angle, dtype=float)[..., None] * axes[i]) for i, angle in enumerate((roll, pitch, yaw))

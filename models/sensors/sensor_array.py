@@ -1,4 +1,4 @@
-"""Where tri-axial accelerometers sit on a body, and what such an arrangement can and cannot tell."""
+"""Arrangement of tri-axial accelerometers on a body: what it can and cannot measure, and simulated readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,16 +11,19 @@ from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
 
 Formula = Literal["auto", "spatial", "plane"]
 LINE_SPREAD_RATIO = 1e-3
-"""Second spread by the first one below which sensors lie on a line: on a car some millimetres, no better known."""
+"""Ratio of the second spread of the sensors to the first below which they lie on a line: on a car some millimetres, no
+better known."""
 FLAT_SPREAD_RATIO = 0.1
-"""Third spread by the second one below which "auto" takes the formula for sensors in a plane."""
+"""Ratio of the third spread of the sensors to the second below which "auto" takes the formula for sensors in a
+plane."""
 PLANE_SPREAD_RATIO = 1e-6
-"""The same below which they lie in a plane to rounding, and there is no choice."""
+"""Ratio of the third spread of the sensors to the second below which they lie in a plane to rounding, so that there is
+no choice."""
 
 
 @dataclass(frozen=True)
 class SensorArray:
-    """Sensors that are fixed at known positions on a body.
+    """Tri-axial accelerometers that are fixed at known positions on a body.
 
     Attributes
     ----------
@@ -65,7 +68,7 @@ class SensorArray:
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
     def own_gains(self, planar: bool) -> np.ndarray:
-        """Noise gains as ``noise_gains``, about the array's axes e1, e2, n."""
+        """Noise gains (3,) as ``noise_gains`` gives, but about the array's axes e1, e2, n."""
         first, second_axis, three = self.inverse_squares
         return np.sqrt(
             [second_axis, first, (first + second_axis) / 4]
@@ -75,7 +78,8 @@ class SensorArray:
 
     @property
     def inverse_squares(self) -> np.ndarray:
-        """1 / spreads^2 (3,) in 1/m^2: variances of the columns of M for readings with unit variance."""
+        """Inverse squares 1 / spreads^2 (3,) in 1/m^2: variances of the columns of M for readings with unit
+        variance."""
         return np.append(1 / self.spreads[:2] ** 2, np.inf if self.flat else 1 / self.spreads[2] ** 2)
 
     def describe(self) -> list[str]:
@@ -102,7 +106,7 @@ class SensorArray:
 
 
 def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "auto") -> SensorArray:
-    """The array of named sensors at local positions (3,) in m.
+    """``SensorArray`` of named sensors at local positions (3,) in m.
 
     ``formula`` "spatial" is eq. (18) as it stands, "plane" the one that leaves the normal out, which is exact for
     any arrangement and the less noisy one where the sensors lie nearly in a plane. Raises InputError for fewer than
@@ -145,7 +149,8 @@ def sensor_readings(
     pitch_acceleration: np.ndarray,
     gravity: float,
 ) -> np.ndarray:
-    """Specific forces (n, sensors, 3) in m/s^2, in the chassis' axes (x forward, y right, z down), eqs (16), (17).
+    """Specific forces (n, sensors, 3) in m/s^2 at sensors on a vehicle that heaves and pitches, in the chassis' axes (x
+    forward, y right, z down), eqs (16), (17).
 
     sensor_positions : (sensors, 3) in m from the centre of mass, local; pitch (rad, nose up), its rate and
     acceleration, and the heave acceleration (m/s^2, down), each (n,). The vehicle moves in its plane: no roll, no yaw,
@@ -160,7 +165,7 @@ def sensor_readings(
 
 
 def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Specific forces (n, sensors, 3) in m/s^2, in the body's axes, eqs (16), (17), whatever its motion.
+    """Specific forces (n, sensors, 3) in m/s^2 at sensors on a body in any motion, in the body's axes, eqs (16), (17).
 
     sensor_positions : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3),
     the body's rates and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
@@ -170,8 +175,8 @@ def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.nd
 
 
 def on_bracket(mount: np.ndarray, sample_period: float, frequency: float, damping: float) -> np.ndarray:
-    """Reading (n, 3) of a sensor on a light bracket from that of a rigid mount (n, 3), sampled every ``sample_period``
-    (s).
+    """Reading (n, 3) of a sensor on a light flexible bracket from that of a rigid mount (n, 3), sampled every
+    ``sample_period`` (s).
 
     Along each of the body's axes a one-way coupled oscillator of natural frequency (Hz) and damping ratio: its
     mass is too small to move the body, and what the sensor feels is what spring and damper pass on,

@@ -1,4 +1,4 @@
-"""A user's own tyre table as CSV: a row for each slip angle, load and slip, with mu_x and mu_y.
+"""Tyre table of a user as CSV file: a row for each slip angle, load and slip, with friction coefficients mu_x and mu_y.
 
 Columns ``slip angle [deg], load [kN], slip [-], mu_x [-], mu_y [-]`` in any order, each with one of its units (rad, N,
 %), all combinations once, rows in any order; without the column of the load friction is that of every load. mu_y is
@@ -22,14 +22,14 @@ FRICTION_COLUMNS: Columns = {
 }
 COLUMN_SETS: tuple[Columns, ...] = (FRICTION_COLUMNS, {**FRICTION_COLUMNS, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
 ANY_LOAD = 1e4
-"""Load (N) of the only node where a file has none."""
+"""Load (N) of the only node of a table whose file has no column of the load."""
 PRODUCT_TOLERANCE = 0.03
-"""Share of the largest friction to which g h must meet mu_y."""
+"""Largest difference between the product g h and lateral friction mu_y, as a share of the largest friction."""
 MOST_NODES = 3_000_000
 
 
 def tyre_table(path: str | Path) -> TyreTable:
-    """Table from a CSV file; raises InputError that names file, line, column, value and what is allowed."""
+    """Tyre table from a CSV file. Raises InputError that names file, line, column, value and what is allowed."""
     lines, columns = _columns_in_si(Path(path))
     columns.setdefault("load", np.full(len(lines), ANY_LOAD))
     _check_ranges(path, lines, columns)
@@ -51,7 +51,8 @@ def tyre_table(path: str | Path) -> TyreTable:
 
 
 def _columns_in_si(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Line number (n,) of every row, and columns (n,) in SI; raises InputError for the first row with an error."""
+    """Line number (n,) of every row of the file, and its columns (n,) in SI units. Raises InputError for the first row
+    with an error."""
     parts: list[RowBlock] = []
     for block in table_blocks(path, COLUMN_SETS):
         for row, wrong in block.faulty_rows.items():

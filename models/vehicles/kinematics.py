@@ -1,4 +1,5 @@
-"""Where points and bodies of a vehicle go when its coordinates are small: exact to second order."""
+"""Kinematics of a vehicle for small coordinates: displacements of points and rotations of bodies, exact to second
+order."""
 
 from functools import lru_cache
 
@@ -8,11 +9,11 @@ from models.core.errors import InputError
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, SpatialVehicle, Vector
 
 End = tuple[str | None, Vector]
-"""A body, None for the ground, and a point (m) that is fixed to it, in the design position."""
+"""End of a spring: a body, None for the ground, and a point (m) that is fixed to it, in the design position."""
 UNIT = np.eye(3)
-"""Rows are the axes x, y, z."""
+"""Unit matrix, whose rows are the axes x, y, z."""
 TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
-"""(3, 3, 3): e_i x v = TURN[i] @ v."""
+"""Generators (3, 3, 3) of rotations about the axes: e_i x v = TURN[i] @ v."""
 
 
 class Kinematics:
@@ -31,14 +32,14 @@ class Kinematics:
         self._shifts = _shifts_of(tuple(bodies))
 
     def coordinate(self, body: str, freedom: str) -> np.ndarray:
-        """Row (n,) that selects one coordinate from q; zeros if the body does not have it."""
+        """Row (n,) that selects a coordinate from all coordinates q; zeros if the body does not have it."""
         row = np.zeros(self.size)
         if (body, freedom) in self._index:
             row[self._index[body, freedom]] = 1.0  # type: ignore[index]
         return row
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """Displacement (3, n) of a point (m) per coordinate, read-only; zeros on the ground, None."""
+        """Displacement (3, n) of a point (m) of a body per coordinate, read-only; zeros on the ground, None."""
         x, y, z = point
         place = body, (x, y, z)
         if place not in self._shifts:
@@ -75,11 +76,12 @@ class Kinematics:
         return second
 
     def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
-        """Change (3, n) of an axis fixed in a body, per coordinate; zeros for the space, None."""
+        """Change (3, n) of an axis fixed in a body, per coordinate; zeros for an axis fixed in space, None."""
         return np.zeros((3, self.size)) if frame is None else -np.tensordot(axis, TURN, 1) @ self.turn(frame)
 
     def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
-        """Second derivatives (n, n) of axis . (point two - point one); axis fixed in ``frame``, a body or space."""
+        """Second derivatives (n, n) of the travel axis . (second point - first point) with respect to the coordinates;
+        the axis is fixed in ``frame``, a body or space."""
         ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
         total = np.tensordot(axis, second, 1)
         if frame is None:
@@ -106,7 +108,7 @@ def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ..
 
 
 def _check_parallel(vehicle: SpatialVehicle) -> None:
-    """InputError for features of the vehicle that the linear equations do not support."""
+    """Raise InputError for features of the vehicle that the linear equations do not support."""
     turned = next((body.name for body in vehicle.bodies if body.axes != PARALLEL), None)
     if turned is not None:
         raise InputError(vehicle.name, f"bodies[{turned}].axes", None, "must be parallel to the vehicle's axes")

@@ -1,4 +1,5 @@
-"""Queries on implausible vehicles: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
+"""Plausibility checks of a vehicle: a mass in tonnes, springs in N/mm, a strut far from its wheel, a wheel without a
+strut.
 
 Nothing here refuses: each finding names the entry, its value and what is usual, as the units of a file are named. Only
 what is far from every vehicle on wheels is queried, from a quarter of a small car to a loaded truck; a vehicle that is
@@ -19,31 +20,33 @@ from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest, stati
 
 GRAVITY = 9.81
 MASS = 30.0, 60e3
-"""kg, of everything."""
+"""Usual range of the mass (kg) of the whole vehicle."""
 LEAST_SPRUNG_RATIO = 0.7
-"""Sprung by unsprung mass at the least: the axle of an empty trailer."""
+"""Smallest usual ratio of sprung to unsprung mass: that of the axle of an empty trailer."""
 SHARE = 0.03
-"""Of the weight, that an axle carries at the least, where there are several."""
+"""Smallest usual share of the weight on an axle, where there are several."""
 UNEVEN = 3.0
-"""Load, or stiffness, of one wheel of an axle divided by that of the other."""
+"""Largest usual ratio of load, or stiffness, between the wheels of an axle."""
 BOUNCE = 0.5, 6.0
-"""Hz, of the whole vehicle on springs and tyres, from how far it sinks under its weight."""
+"""Usual range of the bounce frequency (Hz) of the vehicle on springs and tyres, from its static deflection."""
 HOP = 3.0, 60.0
-"""Hz, of a wheel or an axle between road and body."""
+"""Usual range of the hop frequency (Hz) of a wheel or an axle between road and body."""
 DAMPING = 0.005, 5.0
-"""Of the critical one, of a damper beside its spring under its static load."""
+"""Usual range of the damping ratio of a damper beside its spring under its static load."""
 PRESSED = 5e-4, 0.25
-"""m, of a tyre under its static load."""
+"""Usual range of the deflection (m) of a tyre under its static load."""
 FARTHEST_STRUT = 0.7
-"""m, from a strut to its wheel sideways or along, beyond the track of a rigid axle: levers bring it inwards."""
+"""Largest usual distance (m) from a strut to its wheel sideways or along, beyond the track of a rigid axle: levers
+bring it inwards."""
 WHEELBASE = 0.5, 25.0
 TRACK = 0.3, 4.0
 HEIGHT = 5.0
-"""m, of a centre of mass above the ground."""
+"""Largest usual height (m) of a centre of mass above the ground."""
 GYRATION = {"rx": (0.15, 1.5), "ry": (0.12, 1.2), "rz": (0.12, 1.2)}
-"""Radius of gyration of what is carried, by the track in roll, by the wheelbase in pitch and yaw."""
+"""Usual ranges of the ratio of the sprung body's radius of gyration to the track in roll, and to the wheelbase in pitch
+and yaw."""
 UPRIGHT = 0.3
-"""Vertical part of a direction from which on a spring carries."""
+"""Smallest vertical component of a spring's direction with which the spring counts as carrying weight."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class VehicleFigures:
 
     @cached_property
     def wheels(self) -> dict[str, tuple[Tyre, ...]]:
-        """Bodies that carry tyres, by name, with their tyres; empty if all bodies do."""
+        """Unsprung bodies, those that carry tyres, by name, with their tyres; empty if all bodies carry tyres."""
         names = dict.fromkeys(tyre.body for tyre in self.vehicle.tyres)
         tyres_of = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
         return tyres_of if len(tyres_of) < len(self.vehicle.bodies) else {}
@@ -77,12 +80,12 @@ class VehicleFigures:
 
     @cached_property
     def wheelbase(self) -> float:
-        """Wheelbase, m; 0 for a single axle."""
+        """Wheelbase of the vehicle, m; 0 for a single axle."""
         return max(self.vehicle.axles) - min(self.vehicle.axles)
 
     @cached_property
     def track(self) -> float:
-        """Largest track width, m; 0 for a vehicle without width."""
+        """Largest track width of the vehicle, m; 0 for a vehicle without width."""
         return float(np.ptp([tyre.point[1] for tyre in self.vehicle.tyres]))
 
     def struts(self, wheel: str) -> list[SpringDamper]:
@@ -100,7 +103,7 @@ class VehicleFigures:
 
 
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """Queries on implausible values of a vehicle, in SI, without those that the user has accepted; empty for an
+    """Findings on implausible values of a vehicle, in SI units, without those that the user has accepted; empty for an
     ordinary vehicle."""
     whole = VehicleFigures(vehicle)
     queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
@@ -162,7 +165,7 @@ def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
-    """Findings on the inertia of the sprung body: its rotations, and whether the tensor would need negative mass."""
+    """Findings on the inertia of the sprung body (radii of gyration) and on tensors that would need negative mass."""
     body, spans = figures.carried, {"rx": figures.track, "ry": figures.wheelbase, "rz": figures.wheelbase}
     about = dict(zip(GYRATION, np.diag(body.inertia).tolist(), strict=True))
     for freedom, usual in GYRATION.items():
@@ -328,8 +331,8 @@ def _sunk(figures: VehicleFigures) -> float:
 
 
 def _hop(figures: VehicleFigures, wheel: str) -> float | None:
-    """Frequency (Hz) of the vertical motion of a wheel or an axle with all other bodies fixed; None if it cannot move
-    so."""
+    """Natural frequency (Hz) of the vertical motion of a wheel or an axle with all other bodies fixed; None if it
+    cannot move so."""
     vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     row = motion.coordinate(wheel, "z")
     if not row.any() or wheel == figures.carried.name:
@@ -339,7 +342,7 @@ def _hop(figures: VehicleFigures, wheel: str) -> float | None:
 
 
 def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
-    """Findings on damping ratios of the struts with the mass above them, and on different springs on one axle."""
+    """Findings on the damping ratios of struts with the mass that rests on them."""
     struts = {strut.name: strut for wheel in figures.wheels for strut in figures.struts(wheel)}
     for name, strut in struts.items():
         stiffness, load = slopes_at_rest(strut)[0], figures.held[name]

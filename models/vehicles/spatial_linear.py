@@ -1,4 +1,5 @@
-"""M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
+"""Mass, damping and stiffness matrices, road inputs and outputs of a vehicle in space, for small motion about its
+design position."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,15 +24,16 @@ from models.vehicles.spatial import (
 )
 
 NEGLIGIBLE_TRAVEL = 1e-10
-"""Share of the largest one below which a travel of a reduced vehicle counts as none."""
+"""Share of the largest travel below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
-"""Stiffness and damping."""
+"""Stiffness and damping of a spring (N/m, N s/m)."""
 
 
 def linearise(
     vehicle: SpatialVehicle, speed: float | None = None, equivalent: Mapping[str, Gains] | None = None
 ) -> LinearVehicle:
-    """M q'' + D q' + K q = R z + S z' about the design position: without gravity unloaded, with it the equilibrium.
+    """Linear vehicle M q'' + D q' + K q = R z + S z' for small motion about the design position, unloaded without
+    gravity, in equilibrium with it.
 
     speed : m/s, above 0, wanted by side forces and drag only; InputError where they miss it.
     Tyres that may leave the road are on it.
@@ -67,19 +69,19 @@ def linearise(
 
 
 def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
-    """Positions of the tyres' contacts with the road."""
+    """Positions of the contacts of a vehicle's tyres with the road."""
     return tuple(WheelPosition(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
 def outputs(vehicle: SpatialVehicle, motion: Kinematics) -> tuple[Output, ...]:
-    """``Output`` of every output: from the ``motion`` of points (possibly an engine's), and the slopes of the springs
-    at rest."""
+    """``Output`` of every output of a vehicle: from the ``motion`` of points (possibly an engine's), and the slopes of
+    the springs at rest."""
     parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
 def mass(vehicle: SpatialVehicle) -> np.ndarray:
-    """Mass matrix (n, n) in the design position: kg, kg m, kg m^2."""
+    """Mass matrix (n, n) of a vehicle in the design position: kg, kg m, kg m^2."""
     motion = Kinematics(vehicle)
     total = np.zeros((motion.size, motion.size))
     for body in vehicle.bodies:
@@ -92,7 +94,8 @@ def mass(vehicle: SpatialVehicle) -> np.ndarray:
 
 
 def slopes_at_rest(spring: SpringDamper) -> Gains:
-    """Stiffness (N/m) and damping (N s/m) for small motion: linear terms, and slopes of curves and friction at rest."""
+    """Stiffness (N/m) and damping (N s/m) of a spring for small motion: linear terms, and slopes of curves and friction
+    at rest."""
     travel, rate = spring.travel_force, spring.rate_force
     return (
         spring.stiffness + (travel.slope_at_rest() if travel else 0.0),
@@ -101,15 +104,15 @@ def slopes_at_rest(spring: SpringDamper) -> Gains:
 
 
 class Preloads(NamedTuple):
-    """Static forces F0 by name: of spring-dampers (N), bars (N m), joint elements (N, N m) and tyres (N); all 0 without
-    gravity."""
+    """Static forces of a vehicle's parts by name: of spring-dampers (N), bars (N m), joint elements (N, N m) and tyres
+    (N); all 0 without gravity."""
 
     parts: dict[str, float]
     tyres: dict[str, float]
 
 
 def preloads(vehicle: SpatialVehicle) -> Preloads:
-    """Preloads that hold the design position against gravity; a tyre's is its static wheel load.
+    """Preloads that hold a vehicle in its design position against gravity; that of a tyre is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
     sunk by K^-1 times the weights. InputError where no spring can carry a weight, and for a tyre that only pushes
@@ -137,7 +140,7 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
 
 
 Part = tuple[np.ndarray, float, float]
-"""Row (n,) of a deformation by the coordinates, stiffness, damping."""
+"""A spring, bar or tyre for small motion: row (n,) of its deformation per coordinate, stiffness, damping."""
 
 
 def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
@@ -145,7 +148,7 @@ def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
 
 
 def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
-    """Rows and gains of spring-dampers, bars and joint elements, by name."""
+    """Rows and gains of a vehicle's spring-dampers, bars and joint elements, by name."""
     rows = dict[str, Part]()
     for spring in vehicle.springs:
         ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
@@ -161,13 +164,15 @@ def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[s
 
 
 def _joint_row(motion: Kinematics, element: JointElement) -> np.ndarray:
-    """Row (n,) of factors in the displacement d of a joint element, which is linear in the coordinates."""
+    """Row (n,) of the coordinates' factors in the displacement d of a joint element, which is linear in the
+    coordinates."""
     places = zip(element.coordinates, element.factors, strict=True)
     return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
 
 
 def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
-    """Row (n,) of factors in the twist angle of a bar, whose vertical direction turns with its frame."""
+    """Row (n,) of the coordinates' factors in the twist angle of a bar, whose vertical direction turns with its
+    frame."""
     risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
     turning = np.subtract(bar.point_right, bar.point_left) @ motion.turned_axis(bar.frame, (0.0, 0.0, 1.0))
     rolls = 0.0 if bar.frame == bar.body else motion.coordinate(bar.body, "rx")
@@ -179,7 +184,7 @@ def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
 
 
 def preloaded(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
-    """The vehicle with the preloads of its joint elements in them."""
+    """The vehicle with the preloads of its joint elements included in these."""
     elements = tuple(replace(element, held=preloads.parts[element.name]) for element in vehicle.joint_elements)
     return replace(vehicle, joint_elements=elements)
 
@@ -213,7 +218,7 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
 def _speed_forces(
     vehicle: SpatialVehicle, motion: Kinematics, speed: float | None, damping: np.ndarray, stiffness: np.ndarray
 ) -> None:
-    """Add the contributions of side forces and drag to damping and stiffness in place."""
+    """Add the contributions of side forces and drag at a speed (m/s) to the damping and stiffness matrices in place."""
     if not vehicle.side_forces and not vehicle.drags:
         return
     if speed is None or not speed > 0:
@@ -243,7 +248,7 @@ UNITS = {
     "tyre force": "N",
     "tyre deflection": "m",
 }
-"""Unit of each kind of output; of an anti-roll bar and of a joint element that turns rad, rad/s and N m."""
+"""Unit of each kind of output; for an anti-roll bar, and for a joint element that rotates, rad, rad/s and N m."""
 
 
 def _output(
@@ -253,7 +258,7 @@ def _output(
     parts: Mapping[str, Part],
     tyres: Mapping[str, Part],
 ) -> Output:
-    """Rows of one output."""
+    """``Output`` with the factors of an output of the vehicle."""
     rows = np.zeros((3, motion.size))  # of q, q', q''
     road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
     unit, order = UNITS[spec.kind], 2 if "acceleration" in spec.kind else int("velocity" in spec.kind)
@@ -276,12 +281,13 @@ def _output(
 
 
 def _is_angle(element: JointElement) -> bool:
-    """Whether the d of a joint element is an angle."""
+    """Whether the displacement d of a joint element is an angle."""
     return all(freedom.startswith("r") for _, freedom in element.coordinates)
 
 
 def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
-    """Linear vehicle in the remaining coordinates r with q = N r; the mass matrix may be singular.
+    """Linear vehicle in the remaining coordinates r of a reduced vehicle, with q = N r; the mass matrix may be
+    singular.
 
     mass_matrix : (n, n) of ``massless``; N : (n, r) of ``free``. InputError where no coordinate is left.
     """
@@ -305,7 +311,7 @@ def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> Li
 
 
 def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
-    """Mass matrix (n, n) without the given bodies; no rounding residue of them remains."""
+    """Mass matrix (n, n) of a vehicle without the mass of the given bodies; no rounding residue of them remains."""
     light = tuple(
         replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
     )
@@ -313,8 +319,8 @@ def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
 
 
 def free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
-    """Matrix N (n, r) of the remaining motions: unit vectors where only coordinates are locked, else a basis of motions
-    that leave the rigid springs' lengths unchanged."""
+    """Matrix N (n, r) of the motions that remain to a reduced vehicle: unit vectors where only coordinates are locked,
+    else a basis of motions that leave the rigid springs' lengths unchanged."""
     coordinates = vehicle.coordinates()
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
     if not limits.rigid:

@@ -1,4 +1,4 @@
-"""Checks of a vehicle as a whole, before any number is computed from it."""
+"""Checks that a vehicle is possible, before any number is computed from it."""
 
 from collections import defaultdict
 
@@ -13,7 +13,7 @@ GROUND = "the ground"
 
 
 def check(vehicle: SpatialVehicle, file: str) -> None:
-    """Raise InputError with the name of the entry that makes the vehicle impossible."""
+    """Raise InputError with the name of the entry in the vehicle file that makes the vehicle impossible."""
     _bodies(vehicle, file)
     _connected(vehicle, file)
     _inert(vehicle, file)
@@ -36,8 +36,8 @@ def _bodies(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _connected(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that springs, tyres and bars connect every body to the ground, and that no moving body is held by its
-    joint alone."""
+    """Raise InputError unless springs, tyres and bars connect every body to the ground, and no moving body is held by
+    its joint alone."""
     beside = defaultdict[str, set[str]](set)
     for first, two in _links(vehicle):
         beside[first].add(two)
@@ -68,7 +68,7 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
 
 
 def _inert(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
+    """Raise InputError unless every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
     definite."""
     matrix, coordinates = mass(vehicle), vehicle.coordinates()
     for (name, freedom), inertia in zip(coordinates, matrix.diagonal(), strict=True):
@@ -84,7 +84,7 @@ def _inert(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _movable(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that every tyre can move vertically, and a chassis with side forces laterally."""
+    """Raise InputError unless every tyre can move vertically, and a chassis with side forces laterally."""
     motion = Kinematics(vehicle)
     for tyre in vehicle.tyres:
         if not motion.shift(tyre.body, tyre.point)[2].any():
@@ -96,7 +96,7 @@ def _movable(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _towed(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that every towed body, and the vehicle that tows it, has wheels."""
+    """Raise InputError unless every towed body, and the vehicle that tows it, has wheels."""
     on_wheels = {vehicle.towed_under(tyre.body) for tyre in vehicle.tyres}
     for name in vehicle.towed:
         if name not in on_wheels:

@@ -1,4 +1,4 @@
-"""A vehicle file becomes a vehicle in space: read strictly, checked as a whole, every fault told by its entry."""
+"""Reading of a vehicle file in TOML into a vehicle in space: strict, with checks, every fault named by its entry."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +55,8 @@ def shipped() -> tuple[str, ...]:
 def load_vehicle(
     name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False, towing: bool = False
 ) -> SpatialVehicle:
-    """A vehicle that comes with twinrig, by its name, or a user's TOML file, relative to ``folder``; unloaded.
+    """The unloaded vehicle that comes with twinrig under a name, or that a user's TOML file, relative to ``folder``,
+    describes.
 
     ``file`` and ``place`` say who asked for it, for the message if there is none. reduced : may it have [reduced]?
     towing : may it tow bodies by a hitch? Raises InputError.
@@ -76,7 +77,7 @@ def load_vehicle(
 
 
 def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str = "") -> Path:
-    """Path of the file that ``load_vehicle`` reads for a vehicle; raises InputError."""
+    """Path of the file that ``load_vehicle`` reads for a vehicle. Raises InputError."""
     if not name.endswith(".toml"):
         if name not in shipped():
             raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped())
@@ -85,12 +86,12 @@ def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str
 
 
 def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:
-    """The vehicle of nested tables as a TOML file holds them; raises InputError for the first fault."""
+    """The vehicle from nested tables as a TOML file contains them. Raises InputError for the first fault."""
     return _Builder(_read(table, file), file).vehicle()
 
 
 def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
-    """The checked tables. An error inside a list of tables is reported with the name of the entry."""
+    """Checked tables of a vehicle file. An error inside a list of tables is reported with the name of the entry."""
     try:
         return read(VehicleTable, table, file)
     except InputError as error:
@@ -109,7 +110,7 @@ def _place_of_key(table: str, entry: object, key: str = "") -> str:
 
 
 class _Builder:
-    """Builds the parts of a vehicle from the tables of one file."""
+    """Builder of the parts of a vehicle from the tables of a vehicle file."""
 
     def __init__(self, tables: VehicleTable, file: str) -> None:
         self.tables, self.file = tables, file
@@ -123,7 +124,7 @@ class _Builder:
         self.tyres = {tyre.name: self._tyre(tyre) for tyre in tables.tyres}
 
     def vehicle(self) -> SpatialVehicle:
-        """The vehicle, checked as a whole."""
+        """The complete vehicle, after checks."""
         tables = self.tables
         springs = (*map(self._spring, tables.springs), *self._mounts(), *map(self._seat_spring, tables.seats))
         bars = tuple(map(self._bar, tables.anti_roll_bars))
@@ -203,7 +204,7 @@ class _Builder:
         return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
 
     def _hitch(self, body: Body, point: Vector) -> Body:
-        """Massless body with the rotations of a towed one, at the point where its parent tows it."""
+        """Massless body with the rotations of a towed body, at the point where its parent tows it."""
         place, name = _place_of_key("bodies", body.name), hitch_of(body.name)
         self._require(
             body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
@@ -215,7 +216,7 @@ class _Builder:
         return Body(name, 0.0, point, body.freedoms, parent=body.parent)
 
     def _towed_under(self, name: str | None) -> str | None:
-        """The towed body that is, or carries, the given body."""
+        """Name of the towed body that is, or carries, the given body; None if there is none."""
         while name is not None and name not in self.towed:
             name = self.bodies[name].parent
         return name
@@ -256,14 +257,15 @@ class _Builder:
         )
 
     def _frame(self, place: str, name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
-        """The frame: the body that the table names, else the towed body that carries both ends, if any."""
+        """Name of the body in which an axis is fixed: the body that the table names, else the towed body that carries
+        both ends, if any."""
         if name is not None:
             return self._body(f"{place}.frame", name)
         first, second = map(self._towed_under, end_bodies)
         return first if first == second else None
 
     def _two_bodies(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
-        """The two bodies that a part connects; None for the ground."""
+        """Names of the two bodies that a part connects; None for the ground."""
         (first, second), place = bodies, f"{place}.bodies"
         self._require(first != second, place, bodies, "connects a body with itself")
         self._require(first != GROUND, place, bodies, "name the ground second")
@@ -276,7 +278,8 @@ class _Builder:
         return _vector(first), _vector(second)
 
     def _axis(self, place: str, spring: SpringTable, points: tuple[Vector, Vector]) -> Vector:
-        """Unit vector of the axis: the given one, else from the second point to the first, else upwards."""
+        """Unit vector of a spring's axis: the given direction, else from the second point to the first, else
+        upwards."""
         if spring.direction is not None:
             return self._unit(f"{place}.direction", spring.direction)
         apart = np.subtract(*points)

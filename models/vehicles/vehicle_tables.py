@@ -1,4 +1,4 @@
-"""The tables of a vehicle file, as a user writes them: axes x forward, y left, z up from the ground, SI units."""
+"""Tables of a vehicle file, as a user writes them: axes x forward, y left, z up from the ground, SI units."""
 
 from typing import Annotated, Any, Literal
 
@@ -20,7 +20,7 @@ FRAME = "body in whose axes the direction is fixed; by default what the system o
 
 
 def of(unit: str, meaning: str, default: Any = ...) -> Any:
-    """Field of a list of quantities."""
+    """Schema field for a list of quantities with a unit and a meaning."""
     return Field(default, description=meaning, json_schema_extra={"unit": unit})
 
 
@@ -29,15 +29,15 @@ def _source() -> Any:
 
 
 class Entry(Strict):
-    """Keys that every table of a vehicle file has: a name, by which messages and outputs call it, and where its values
-    are from."""
+    """Keys that every table of a vehicle file has: a name, by which messages and outputs call it, and the source of its
+    values."""
 
     name: Name
     source: str = _source()
 
 
 class BodyTable(Entry):
-    """[[bodies]]: a rigid body, where its centre of mass lies and what it may do."""
+    """[[bodies]]: a rigid body, the position of its centre of mass and its freedoms."""
 
     mass: float = quantity("kg", "mass")
     position: Triple = of("m", "centre of mass: x forward, y left, z above the ground")
@@ -101,7 +101,7 @@ class BarTable(Entry):
 
 
 class AxleTable(Entry):
-    """[[axles]], from the front."""
+    """[[axles]]: an axle of the vehicle, listed from the front."""
 
     x: float = quantity("m", "place of the axle", signed=True)
     roll_steer: float = quantity("rad/rad", "steer of its wheels over roll of the chassis", default=0.0, signed=True)
@@ -142,7 +142,8 @@ Kind = Literal[
 
 
 class OutputTable(Strict):
-    """[[outputs]]: what is read; of a point of a body, of a spring, mount, seat or bar, or of a tyre."""
+    """[[outputs]]: an output of the simulation: motion of a point of a body, or a quantity of a spring, mount, seat or
+    bar, or of a tyre."""
 
     name: Name
     kind: Kind
@@ -154,7 +155,7 @@ class OutputTable(Strict):
 
 
 class ReducedTable(Strict):
-    """[reduced]: what a choice of effects has left out, as limits; only the closed form of ride reads them."""
+    """[reduced]: parts that a choice of effects has left out, as limits; only the closed form of ride reads them."""
 
     massless: list[Name] = Field(default_factory=list, description="bodies that count as having no mass")
     rigid: list[Name] = Field(default_factory=list, description="springs, and NAME.x of mounts, that count as rigid")
@@ -162,7 +163,7 @@ class ReducedTable(Strict):
 
 
 class VehicleTable(Strict):
-    """A vehicle file."""
+    """Tables of a vehicle file."""
 
     title: str = Field(description="what the vehicle is")
     notes: str = Field("", description="what a reader should know")
