@@ -33,7 +33,7 @@ from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
 from models.road.excitation import Excitation
 from models.road.fitted import FittedRoad
-from models.road.isotropic import isotropic_like
+from models.road.isotropic import isotropic_road_like
 from models.road.two_track import TwoTrackRoad
 from models.systems.ride.nonlinear import Nonlinear, Ride
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -190,7 +190,7 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading
     left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
     right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
     if road.mean.cutoff is None:
-        isotropic_road = isotropic_like(road, y)
+        isotropic_road = isotropic_road_like(road, y)
         right.semilogx(
             wavenumber, isotropic_road.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum"
         )

@@ -133,7 +133,7 @@ def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypa
 
     undamped = marginal._growth_by_undamped
     monkeypatch.setattr(marginal, "_balanced_matrix", balanced)
-    monkeypatch.setattr(marginal, "_of_undamped", lambda *own: undamped(*own[:-1], np.inf))
+    monkeypatch.setattr(marginal, "_growth_by_undamped", lambda *own: undamped(*own[:-1], np.inf))
     assert found(ride, "no damping, road that next to walks", "reference", tmp_path) == "SILENT"
 
 

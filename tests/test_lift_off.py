@@ -194,15 +194,15 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
     own = scene({"road": ROAD}, duration=1.5)
     truth = simulate(own, "exudyn")
     for law in (
-        lambda y, u, p: pitch_plane_equations.tyres(y, u, p),
-        lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.tyres(y, u, p)),
+        lambda y, u, p: pitch_plane_equations.linear_tyres(y, u, p),
+        lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.linear_tyres(y, u, p)),
     ):
         assembly = assembly_of_scene(own)
         model = build("reference", assembly, settings_of(own, "reference"))
         dy = np.empty(8)
 
         def wrong(y, u, p, law=law, dy=dy):
-            struts = pitch_plane_equations.suspension(y, p, np.sin(y[3]), np.cos(y[3]))
+            struts = pitch_plane_equations.suspension_forces(y, p, np.sin(y[3]), np.cos(y[3]))
             pitch_plane_equations.newton_euler(y, law(y, u, p), struts, np.cos(y[3]), p, dy)
             return dy
 

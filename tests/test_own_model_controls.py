@@ -60,7 +60,7 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
         return honest(late if fault == "late" else changed, *words)
 
     honest = marching.path_of_build
-    monkeypatch.setattr(marching, "path_by", wrong)
+    monkeypatch.setattr(marching, "path_of_build", wrong)
     report = compare_paths(twin, table=table)
     assert not report.alike and report.distances[FILE_BUILD_NAME] > 1e-8
 

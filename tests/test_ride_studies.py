@@ -255,9 +255,9 @@ def test_a_mass_in_grams_is_asked_about_and_no_shipped_vehicle_is():
     from dataclasses import replace
 
     from models.systems.ride.plan import frequency_doubts
-    from models.vehicles.vehicle_file import load_vehicle, shipped
+    from models.vehicles.vehicle_file import load_vehicle, shipped_vehicles
 
-    assert not any(frequency_doubts(load_vehicle(name, towing=True)) for name in shipped())
+    assert not any(frequency_doubts(load_vehicle(name, allows_towing=True)) for name in shipped_vehicles())
     own = load_vehicle("half_car")
     heavy = replace(own, bodies=tuple(replace(body, mass=1e3 * body.mass) for body in own.bodies))
     assert "SI units" in frequency_doubts(heavy)[0]

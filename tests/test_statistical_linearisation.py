@@ -23,9 +23,9 @@ from models.road.two_track import (
     CORRELATION_CASES,
     half_track,
     input_covariance,
-    on_track,
     road_excitation,
     road_of_level,
+    wheels_on_track,
 )
 from models.systems.ride.nonlinear import drive_over_road
 from models.vehicles.spatial import Curve
@@ -142,7 +142,7 @@ def test_road_in_time_has_the_roads_covariance(case):
 
 def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
     vehicle = load_vehicle("half_car")
-    own = on_track(wheels(vehicle), 1.0)
+    own = wheels_on_track(wheels(vehicle), 1.0)
     road = road_path(road_excitation(road_of_level(1.0, cutoff=3.0), own), SPEED, 1e-3)
     table = road.wheel_heights_and_rates(400, 3)
     lag = round((own[0].x - own[1].x) / SPEED / road.half_step)
@@ -236,7 +236,7 @@ def test_standard_errors_of_a_run():
         displacement_factors=np.zeros(2),
         road_factors=np.ones(1),
     )
-    road = road_excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
+    road = road_excitation(road_of_level(1.0, corners=(0.3, 0.3)), wheels_on_track(wheels(vehicle), 1.0))
     P, a, T = (
         stationary_covariance(vehicle_with_road(replace(linear, outputs=(height,)), road, 10.0)).variance[0],
         3.0,

@@ -38,7 +38,7 @@ from models.multibody.forces import (
 )
 from models.multibody.moving_vehicle import WheelContact, carried_velocity
 from models.multibody.tree import cross, dot, plus, put, three, times
-from models.tyre.bristles import FIRST_FLEXIBILITY, net, shape_factor, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, cornering_stiffness_factor, net, tyre_forces
 from models.vehicles.free_vehicle import joints
 from models.vehicles.spatial import SpatialVehicle
 
@@ -152,7 +152,7 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
         load = bicycle.loads()[i]
         if not load > 0.0:
             raise InputError("", name, load, "carries no weight (N): it must press on the road at rest")
-        bristles = t.stiffness * t.cornering * vertical / (shape_factor(t.cells) * wheel.radius * width)
+        bristles = t.stiffness * t.cornering * vertical / (cornering_stiffness_factor(t.cells) * wheel.radius * width)
         table[i, [forces.KNUCKLE, forces.ROTOR, forces.POINT, forces.STATIC]] = joint, spin, i, load
         table[i, [forces.RADIUS, forces.BRISTLES]] = wheel.radius, bristles
     table[:, forces.HEIGHT] = [body.position[2] for body in bicycle.vehicle.bodies if body.name.endswith("wheel")]

@@ -221,7 +221,7 @@ def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:
         if isinstance(part.travel, CoordinateTravel):
             tendon = model.tendon(f"{i}{BREAK}{element.name}").id
             model.tendon_stiffness[tendon], model.tendon_damping[tendon] = element.stiffness, element.damping
-            model.tendon_lengthspring[tendon] = -element.held / element.stiffness if element.stiffness else 0.0
+            model.tendon_lengthspring[tendon] = -element.preload / element.stiffness if element.stiffness else 0.0
         for k, force in enumerate(affine_forces(part)):
             actuator = model.actuator(f"{i}.{k}{BREAK}{element.name}").id
             model.actuator_biasprm[actuator, :3] = force[:3]
@@ -244,7 +244,7 @@ def affine_forces(element: NativePart) -> list[Affine]:
     axial, e = isinstance(element.travel, AxialTravel), element.element
     design = element.travel.design if isinstance(element.travel, AxialTravel) else 0.0
     stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
-    held = e.held if axial or not e.stiffness else 0.0
+    held = e.preload if axial or not e.stiffness else 0.0
     line = np.array([held, stiffness, damping]) + sum(_lines(e), np.zeros(3))
     forces = [Affine(*-line), *_corners(e.travel_force, 1), *_corners(e.rate_force, 2)]
     shifted = [force._replace(constant=force.constant - force.slope * design) for force in forces]

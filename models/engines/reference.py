@@ -17,7 +17,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import guard, landings_followed
 from models.machine.compiled import named_closure, njit
-from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
+from models.vehicles.pitch_plane_equations import ADDED_TERMS, RIGHT_HAND_SIDES, parameter_numbers
 
 NO_INPUT = np.zeros((1, 4))
 """The flat road."""
@@ -96,7 +96,7 @@ class Reference:
             if assembly.input is None or assembly.moment is None
             else Stacked((assembly.input, assembly.moment))
         )
-        self._p = numbers(assembly.parameters, assembly.vehicle)
+        self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
@@ -231,7 +231,7 @@ _SINGLE: dict[tuple, Any] = {}
 
 
 def _right_hand_side(mode: str, geometry: str, *added: str):
-    return reduce(_sum, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
+    return reduce(_sum, (ADDED_TERMS[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
 
 
 def march_of(mode: str, geometry: str, *added: str):

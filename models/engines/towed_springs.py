@@ -46,6 +46,6 @@ def numbers_beside(handling: Handling, division: Division) -> np.ndarray:
 def _remainder(row: np.ndarray, left: Element | None) -> None:
     """Reduce a part's row of the table to what is not native, to zeros where the part is entirely native."""
     gone = left is None or left.travel_force is None, left is None or left.rate_force is None
-    row[ACTS[:4]] = (left.stiffness, left.damping, left.held, left.friction) if left else 0.0
+    row[ACTS[:4]] = (left.stiffness, left.damping, left.preload, left.friction) if left else 0.0
     for column, none in zip(ACTS[4:], gone, strict=True):
         row[column] = 0.0 if none else row[column]

@@ -9,8 +9,8 @@ import numpy as np
 from models.multibody import cut_kernel as kernel
 from models.multibody.parts import curve_numbers
 from models.vehicles.cut_vehicle import ROLL, CutVehicle, Element
-from models.vehicles.free_vehicle import anchor
 from models.vehicles.free_vehicle import joints as free_joints
+from models.vehicles.free_vehicle import last_coordinate_and_joint
 from models.vehicles.spatial import Vector
 
 
@@ -74,7 +74,7 @@ def joints(vehicle: CutVehicle) -> Joints:
     """Joint table of a cut vehicle, in the order of its coordinates. All joints of a body have the same position, that
     of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
-    anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
+    anchors = {body.name: last_coordinate_and_joint(vehicle.tree, body.name) for body in vehicle.tree.bodies}
     rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
     origin = {name: place for name, (_, place) in anchors.items()}
     return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
@@ -133,7 +133,7 @@ def _element_numbers(element: Element, joined: Joints) -> list[float]:
         np.subtract(element.second_point, joined.joint_position[element.second_body]),
     )
     law = (
-        element.held,
+        element.preload,
         element.stiffness,
         element.damping,
         joined.last_joint[element.frame],

@@ -10,10 +10,10 @@ from models.core.errors import InputError
 from models.multibody import forces as at
 from models.multibody import tree
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
-from models.tyre.bristles import net, shape_factor
-from models.vehicles.free_vehicle import CARRIER, anchor, chassis_of, free_vehicle, joints, rotor
+from models.tyre.bristles import cornering_stiffness_factor, net
+from models.vehicles.free_vehicle import CARRIER, chassis_of, free_vehicle, joints, last_coordinate_and_joint, rotor
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
-from models.vehicles.spatial_linear import Preloads, preloaded, preloads
+from models.vehicles.spatial_linear import Preloads, preloads, with_preloads
 
 Control = tuple[tuple[float, float], ...]
 """Knots (time in s, value) of a control over time; it rests at each knot and goes from one to the next by the smoothest
@@ -94,7 +94,7 @@ class Handling:
             raise InputError(self.given.name, "fixed", name, "no such tyre", names)
         free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), tyres.spin_inertia, tyres.fixed)
         held = preloads(free)
-        object.__setattr__(self, "vehicle", preloaded(free, held))
+        object.__setattr__(self, "vehicle", with_preloads(free, held))
         object.__setattr__(self, "held", held)
         object.__setattr__(self, "numbers", table(self))
 
@@ -198,7 +198,7 @@ def _joints(vehicle: SpatialVehicle, loaded_coordinates: set[float]) -> np.ndarr
 
 def _point_position(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
     """Index of the last coordinate that moves a point, and the point's position (m) relative to that joint."""
-    joint, origin = anchor(vehicle, body)
+    joint, origin = last_coordinate_and_joint(vehicle, body)
     return joint, np.subtract(point, origin)
 
 
@@ -238,7 +238,7 @@ def _frame(vehicle: SpatialVehicle, key_path: str, frame: str | None) -> float:
     if frame not in vehicle.towed:
         allowed = "must be left out, or be a towed body: in handling axes are fixed in the carrier, which only yaws"
         raise InputError(vehicle.name, f"{key_path}.frame", frame, allowed, vehicle.towed)
-    return float(anchor(vehicle, frame)[0])
+    return float(last_coordinate_and_joint(vehicle, frame)[0])
 
 
 def _put_curves(parts: list[_PartRow], rows: np.ndarray, first: int) -> np.ndarray:
@@ -265,7 +265,7 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     sunk = load / tyre.stiffness
     radius = tyre.point[2] + sunk
     cornering = next(force.stiffness for force in handling.given.side_forces if force.name == tyre.name)
-    bristles = cornering / (shape_factor(of.cells) * radius * sunk * of.half_width)
+    bristles = cornering / (cornering_stiffness_factor(of.cells) * radius * sunk * of.half_width)
     spins = (rotor(tyre.name), "ry")
     axle = [t for t in free.tyres if t.axle == tyre.axle]
     share, front, c = 1.0 / len(axle), tyre.axle == 0, handling.controls
@@ -274,7 +274,7 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
     drive = 0.0 if towed else share * (c.front_drive if front else (1.0 - c.front_drive) / driven)
     leans = 0.0 if towed else np.sign(tyre.point[1]) * of.inclination
-    carrying, _ = anchor(free, towed or chassis_of(handling.given).name)
+    carrying, _ = last_coordinate_and_joint(free, towed or chassis_of(handling.given).name)
     return [
         joint,
         places.index(spins) if spins in places else -1,

@@ -36,7 +36,7 @@ from models.vehicles.spatial import (
     Vector,
 )
 from models.vehicles.spatial_linear import preloads
-from models.vehicles.vehicle_checks import check
+from models.vehicles.vehicle_checks import check_vehicle
 
 CONTACT_CONTENT = "contact"
 """The kind of content that a car's file may have beside twinrig's tyres: contacts, which are left out."""
@@ -90,7 +90,7 @@ class _Reader:
             joint_elements=elements,
             ranges=tuple(self._ranges(parts)),
         )
-        check(vehicle, file)
+        check_vehicle(vehicle, file)
         return self._without_preloads(vehicle)
 
     def _refuse(self, part: str, value: object, reason: str) -> NoReturn:
@@ -165,14 +165,14 @@ class _Reader:
         where the file's preloads differ."""
         held = preloads(replace(vehicle, gravity=GRAVITY)).parts
         changed = [
-            f"{e.name} {held[e.name]:.4g} for {e.held:.4g}"
+            f"{e.name} {held[e.name]:.4g} for {e.preload:.4g}"
             for e in vehicle.joint_elements
-            if abs(e.held - held[e.name]) > PRELOAD_DIFFERENCE * abs(held[e.name])
+            if abs(e.preload - held[e.name]) > PRELOAD_DIFFERENCE * abs(held[e.name])
         ]
         if changed:
             said = "preloads (N, N m) hold the design position at rest and stand for the file's"
             self.notes.append(f"{said}: {', '.join(changed)}")
-        bare = tuple(replace(element, held=0.0) for element in vehicle.joint_elements)
+        bare = tuple(replace(element, preload=0.0) for element in vehicle.joint_elements)
         return replace(vehicle, joint_elements=bare, notes=tuple(self.notes))
 
 

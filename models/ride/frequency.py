@@ -27,7 +27,7 @@ from scipy.special import eval_legendre, spherical_jn
 
 from models.ride.marginal import Unstable
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle, poles
+from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 
 GAUSS_POINTS = 16
 """Count of Gauss points of a panel."""
@@ -154,7 +154,7 @@ def variances_by_quadrature(
 
 def _check_stable(vehicle: LinearVehicle) -> None:
     """Raise Unstable if a motion grows faster than rounding alone can make a free motion grow."""
-    rates = poles(vehicle)
+    rates = eigenvalues(vehicle)
     worst = rates[rates.real.argmax()]
     if worst.real > GROWTH_SHARE * abs(rates).max():
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))

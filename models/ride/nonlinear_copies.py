@@ -17,7 +17,7 @@ from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
 from models.road.excitation import Excitation
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.linear_vehicle import LinearVehicle, poles
+from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
 from models.vehicles.spatial_linear import Gains, linearise, preloads
 
@@ -174,19 +174,21 @@ class CopiesMarch:
 
 def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
     """Step (s) for a nonlinear vehicle, from the rates of its statistically linearised ``equivalent``."""
-    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(equivalent)).max()), longest_resolving_step(vehicle, speed))
+    return min(
+        LARGEST_RATE_TIMES_STEP / float(abs(eigenvalues(equivalent)).max()), longest_resolving_step(vehicle, speed)
+    )
 
 
 def settling_time(equivalent: LinearVehicle) -> float:
     """Time (s) after which copies no longer depend on their initial state."""
-    decay = abs(poles(equivalent).real)
+    decay = abs(eigenvalues(equivalent).real)
     return SETTLING_EXPONENT / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
 def longest_resolving_step(vehicle: SpatialVehicle, speed: float) -> float:
     """Longest step (s) that resolves the vehicle's motion when its springs are as stiff as they can become."""
     steepest = linearise(vehicle, speed, {s.name: _steepest_gains(s) for s in nonlinear_springs(vehicle)})
-    return LARGEST_STIFF_RATE_TIMES_STEP / float(abs(poles(steepest)).max())
+    return LARGEST_STIFF_RATE_TIMES_STEP / float(abs(eigenvalues(steepest)).max())
 
 
 def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PER_READING) -> int:

@@ -101,7 +101,7 @@ class StatisticallyLinear:
 
 def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
     """Springs of the vehicle that have curves or friction."""
-    return tuple(spring for spring in vehicle.springs if spring.bent)
+    return tuple(spring for spring in vehicle.springs if spring.is_nonlinear)
 
 
 def statistically_linear(

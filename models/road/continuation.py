@@ -21,7 +21,7 @@ from models.core.errors import InputError
 from models.road.profile import OVERRUN_SHARE, RoadProfile, SplineProfile
 
 CONTINUATION_RULES = ("mirrored", "refused")
-RUN_IN = 5.0
+RUN_IN_LENGTH = 5.0
 """Default length (m) of the run-in."""
 MOST_POINTS = 5_000_000
 """Largest count of points of a mirrored road: about 400 MB with its coefficients and the fit."""
@@ -79,7 +79,7 @@ def _mirrored_points(profile: SplineProfile, needed_distance: float, file: objec
     return np.concatenate(stations), np.concatenate(heights)
 
 
-def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | None = None) -> SplineProfile:
+def run_in(profile: SplineProfile, length: float = RUN_IN_LENGTH, reference: float | None = None) -> SplineProfile:
     """Road that rises from the flat: height 0 up to its first point, then w(s / length) (zeta - reference).
 
     w is the quintic smoothstep, so height, slope and curvature are continuous; beyond ``length`` the road
@@ -105,7 +105,7 @@ def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | No
     return replace(profile, coefficients=coefficients, window_length=float(length))
 
 
-def reference_height(profile: SplineProfile, length: float = RUN_IN) -> float:
+def reference_height(profile: SplineProfile, length: float = RUN_IN_LENGTH) -> float:
     """Mean height (m, positive down) over the first ``length`` m of a road, which must be as long."""
     if not 0.0 < length <= profile.end - profile.start:
         allowed = f"must be above 0 and at most the road's own {profile.end - profile.start:.6g} m"

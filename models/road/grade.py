@@ -13,7 +13,7 @@ TRANSITION_LENGTH = 40.0
 
 
 @dataclass(frozen=True, eq=False)
-class Graded:
+class GradedRoad:
     """A road profile on a grade: zeta(s) = profile(s) - tan(grade) TRANSITION_LENGTH W((s - start) /
     TRANSITION_LENGTH).
 

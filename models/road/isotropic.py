@@ -28,7 +28,7 @@ from models.vehicles.linear_vehicle import WheelPosition
 
 
 @dataclass(frozen=True)
-class DensityPart:
+class DensityTerm:
     """Term of a track's spectral density, level / (corner^2 + Omega^2)^(waviness / 2), two-sided, with its cross
     density in closed form.
 
@@ -66,7 +66,7 @@ class IsotropicRoad:
     """Random road with the same statistics in all directions; its track density is the sum of several terms
     ``DensityPart``."""
 
-    parts: tuple[DensityPart, ...]
+    parts: tuple[DensityTerm, ...]
 
     def spectrum(self, wavenumber: np.ndarray) -> np.ndarray:
         """Two-sided spectral density (m^3) of any track over the wavenumber (rad/m)."""
@@ -81,7 +81,7 @@ class IsotropicRoad:
         return self.cross_spectrum(wavenumber, distance) / self.spectrum(wavenumber)
 
 
-def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
+def isotropic_road_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
     """Isotropic road with the same spectrum as the two-track road has on its track at y (m); both roads must be of
     first order."""
     if road.mean.cutoff is not None or road.roll.cutoff is not None:
@@ -89,14 +89,14 @@ def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
     shares = ((road.mean, 1.0), (road.roll, y * y))
     return IsotropicRoad(
         tuple(
-            DensityPart(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity
+            DensityTerm(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity
         )
     )
 
 
 def isotropic_class(road_class: str, corner: float = 0.0, level_convention: str = "one-sided") -> IsotropicRoad:
     """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
-    return IsotropicRoad((DensityPart(level_of_class(road_class, level_convention), corner),))
+    return IsotropicRoad((DensityTerm(level_of_class(road_class, level_convention), corner),))
 
 
 def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:

@@ -43,7 +43,7 @@ def smoothstep(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def faded_in(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
+def fade_in(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
     """Height (m) and slope of ``w(distance / window) * height``, w the smoothstep; 0 for distances up to 0; a window of
     0 means no windowing."""
     if distance <= 0.0:
@@ -64,7 +64,7 @@ def sines_at(s, amplitude, wavenumber, phase, window):
             angle = wavenumber[i] * s + phase[i]
             height -= amplitude[i] * math.sin(angle)
             slope -= amplitude[i] * wavenumber[i] * math.cos(angle)
-    return faded_in(s, window, height, slope)
+    return fade_in(s, window, height, slope)
 
 
 @njit(cache=True)
@@ -109,11 +109,11 @@ def sines_uniform(start_station, step, waves, height, slope):
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
         for j in range(first, min(first + RESYNCHRONISE, height.size)):
             value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
-            height[j], slope[j] = faded_in(start_station + j * step, window, value, rate)
+            height[j], slope[j] = fade_in(start_station + j * step, window, value, rate)
 
 
 @njit(cache=True)
-def segment(stations, s, guessed_piece):
+def piece_index(stations, s, guessed_piece):
     """Index of the spline's piece that contains station ``s``; the search starts at the piece found last,
     ``guessed_piece``."""
     last_piece = stations.size - 2
@@ -139,14 +139,14 @@ def cubic_at(s, piece, stations, coefficients, window):
     height = ((a * d + b) * d + c) * d + e
     slope = (3.0 * a * d + 2.0 * b) * d + c
     if window > 0.0:
-        return faded_in(s - stations[0], window, height, slope)
+        return fade_in(s - stations[0], window, height, slope)
     return height, slope
 
 
 @njit(cache=True)
-def cubic_one(s, stations, coefficients, window):
+def cubic_at_station(s, stations, coefficients, window):
     """Height (m, down) and slope of a piecewise cubic road at a station s (m)."""
-    return cubic_at(s, segment(stations, s, 0), stations, coefficients, window)
+    return cubic_at(s, piece_index(stations, s, 0), stations, coefficients, window)
 
 
 @njit(cache=True)
@@ -155,7 +155,7 @@ def fill_cubics(s, stations, coefficients, window, height, slope):
     (m)."""
     piece = 0
     for j in range(s.size):
-        piece = segment(stations, s[j], piece)
+        piece = piece_index(stations, s[j], piece)
         height[j], slope[j] = cubic_at(s[j], piece, stations, coefficients, window)
 
 
@@ -165,5 +165,5 @@ def cubics_uniform(start_station, step, stations, coefficients, window, height, 
     piece = 0
     for j in range(height.size):
         s = start_station + j * step
-        piece = segment(stations, s, piece)
+        piece = piece_index(stations, s, piece)
         height[j], slope[j] = cubic_at(s, piece, stations, coefficients, window)

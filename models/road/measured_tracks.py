@@ -52,7 +52,7 @@ class TrackSpectra:
     mean: np.ndarray
     roll: np.ndarray
     mean_roll: np.ndarray
-    windows: int
+    window_count: int
     degrees_of_freedom: float
 
     @property

@@ -37,7 +37,7 @@ _KEYWORD_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
 
 
 @dataclass(frozen=True)
-class _Promise:
+class _AnnouncedLayout:
     """Data layout that the header of a file announces: records, channels, bytes per value, text or binary."""
 
     records: int
@@ -152,7 +152,7 @@ def _unreadable_file_error(path: str | Path, error: Exception) -> InputError:
     return InputError(path, "", None, f"not a readable OpenCRG file: {reason or type(error).__name__}")
 
 
-def _check_header(path: str | Path) -> _Promise:
+def _check_header(path: str | Path) -> _AnnouncedLayout:
     """Read the header, check it, and compare the number of bytes that follow with the number that the header gives."""
     try:
         header = read_ipl(path, meta_only=True)
@@ -164,7 +164,7 @@ def _check_header(path: str | Path) -> _Promise:
         formats = ", ".join(_BYTES_PER_VALUE)
         raise InputError(path, "$KD_DEFINITION", None, f"the data channels and one of the formats {formats} are needed")
     text = header.fmt.startswith("L")
-    promise = _Promise(
+    promise = _AnnouncedLayout(
         _count_of_records(path, header), len(header.kd_def), _BYTES_PER_VALUE[header.fmt], text, header.data_offset
     )
     (_check_text if text else _check_binary)(path, promise, data)
@@ -202,7 +202,7 @@ def _header_number(path: str | Path, values: dict[str, str], key: str, default: 
     return number
 
 
-def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
+def _check_binary(path: str | Path, promise: _AnnouncedLayout, data: bytes) -> None:
     """Check that binary data are records without gaps, padded to a multiple of 80 bytes."""
     wanted = math.ceil(promise.records * promise.channels * promise.width / _HEADER_LINE_LENGTH) * _HEADER_LINE_LENGTH
     if len(data) != wanted:
@@ -212,7 +212,7 @@ def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
         )
 
 
-def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
+def _check_text(path: str | Path, promise: _AnnouncedLayout, data: bytes) -> None:
     """Check that text data are lines of full width with line ends; a number cut short makes its line shorter."""
     body = data.rstrip(b"\r\n")
     lines, ended = body.split(b"\n"), len(body) < len(data)

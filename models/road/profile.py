@@ -195,7 +195,7 @@ class SplineProfile:
     @property
     def points(self) -> HeightsAndSlopes:
         """Stations (m) and heights (m, positive down, without the window) of the road's points, each of shape (n,)."""
-        end_height = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
+        end_height = kernels.cubic_at_station(self.end, self.station, self.coefficients, 0.0)[0]
         return self.station, np.append(self.coefficients[:, 3], end_height)
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
@@ -220,7 +220,7 @@ class SplineProfile:
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
         self._check_extent(s, s)
-        return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
+        return kernels.cubic_at_station(float(s), self.station, self.coefficients, self.window_length)
 
     def _check_extent(self, first_station: float, last_station: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""

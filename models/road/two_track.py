@@ -107,7 +107,7 @@ def half_track(wheels: Sequence[WheelPosition]) -> float:
     return (max(front) - min(front)) / 2.0
 
 
-def on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
+def wheels_on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
     """The wheels moved laterally to the track at y (m); so a quarter or half car, drawn on the centre line, drives on
     one track of a road."""
     return tuple(replace(wheel, y=y) for wheel in wheels)

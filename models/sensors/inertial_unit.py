@@ -19,10 +19,16 @@ from scipy.special import hyp1f1
 
 from models.core.errors import InputError
 from models.core.noise import GYRO, GYRO_BIAS, normal_samples
-from models.sensors.rotations import conjugate_quaternion, integrate, quaternion_product, rotation_matrix, skew_matrix
+from models.sensors.rotations import (
+    conjugate_quaternion,
+    integrate_attitude,
+    quaternion_product,
+    rotation_matrix,
+    skew_matrix,
+)
 
 
-def random_walk(deviation: float, rate: float) -> float:
+def angle_random_walk_of(deviation: float, rate: float) -> float:
     """Angle random walk s (rad per sqrt(s)) of gyro samples with standard deviation ``deviation`` (rad/s) at ``rate``
     (Hz), eq. (5).
 
@@ -38,7 +44,7 @@ def measured_attitude(
     sample_period: float,
     deviation: np.ndarray,
     start_attitude: np.ndarray,
-    paths: range,
+    path_numbers: range,
     seed: int = 0,
 ) -> np.ndarray:
     """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are constant over each period and
@@ -47,14 +53,14 @@ def measured_attitude(
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
     its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
-    noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
+    noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in path_numbers], axis=1)
     return true_attitude(rates[:, None, :] + deviation * noise, sample_period, start_attitude)
 
 
 def true_attitude(rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
     """Quaternions (n + 1, ..., 4) of the attitude from rates (n, ..., 3) in rad/s that are constant over each period
     (s), integrated exactly."""
-    return integrate(np.concatenate([rates, rates[-1:]]), sample_period, start_attitude, "held")
+    return integrate_attitude(np.concatenate([rates, rates[-1:]]), sample_period, start_attitude, "held")
 
 
 def error_rotation(measured: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
@@ -63,14 +69,14 @@ def error_rotation(measured: np.ndarray, true_attitudes: np.ndarray) -> np.ndarr
     return quaternion_product(measured, conjugate_quaternion(true_attitudes))
 
 
-def mean_scalar(walks: np.ndarray, time: float) -> float:
+def mean_scalar(angle_random_walks: np.ndarray, time: float) -> float:
     """Expected scalar part q1 of the attitude's error quaternion after ``time`` (s), on any motion: exp(-sum of s^2 t /
     8) with the angle random walks s.
 
-    walks : (k,) in rad per sqrt(s). It holds for unequal noise and on a turning body alike, because the squares of
-    the three matrices of eq. (26) are all -1: the quaternion's mean cannot see which axis is the noisy one.
+    angle_random_walks : (k,) in rad per sqrt(s). It holds for unequal noise and on a turning body alike, because the
+    squares of the three matrices of eq. (26) are all -1: the quaternion's mean cannot see which axis is the noisy one.
     """
-    return float(np.exp(-np.sum(np.square(walks)) * time / 8))
+    return float(np.exp(-np.sum(np.square(angle_random_walks)) * time / 8))
 
 
 def mean_trace(angle_random_walk: float, time: float) -> float:
@@ -82,23 +88,23 @@ def mean_trace(angle_random_walk: float, time: float) -> float:
     return float(3 * np.exp(-(angle_random_walk**2) * time))
 
 
-def mean_error(walks: np.ndarray, rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
+def mean_error(
+    angle_random_walks: np.ndarray, rates: np.ndarray, sample_period: float, start_attitude: np.ndarray
+) -> np.ndarray:
     """Mean rotation matrix E[E] (3, 3) of the attitude error, for unequal noise on a turning body.
 
-    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis
-    i, and therefore
-        d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T,
-    turned by the true motion S; or, for the measured attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2
-    G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
-    rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,).
-    """
+    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis i,
+    and therefore d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T, turned by the true motion S; or, for the measured
+    attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2 G_i^2). The latter has constant coefficients over
+    each period and is stepped by its matrix exponential: exact for rates that are held. angle_random_walks : (3,) in
+    rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,)."""
     mean = rotation_matrix(start_attitude)
-    for step in _exponentials((skew_matrix(rates) + noise_decay_matrix(walks)) * sample_period):
+    for step in _matrix_exponentials((skew_matrix(rates) + noise_decay_matrix(angle_random_walks)) * sample_period):
         mean = mean @ step
     return mean @ rotation_matrix(true_attitude(rates, sample_period, start_attitude)[-1]).T
 
 
-def _exponentials(m: np.ndarray) -> np.ndarray:
+def _matrix_exponentials(m: np.ndarray) -> np.ndarray:
     """Matrix exponentials of all matrices m (n, 3, 3): power series of m / 2^k with small entries, squared k times.
 
     scipy's own goes matrix by matrix through a threaded library, and takes many times as long where others run.
@@ -112,22 +118,22 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
     return exponential
 
 
-def noise_decay_matrix(walks: np.ndarray) -> np.ndarray:
+def noise_decay_matrix(angle_random_walks: np.ndarray) -> np.ndarray:
     """Matrix 1/2 sum s_i^2 G_i^2 (3, 3) in 1/s, the rate at which noise with angle random walks s_i reduces the mean
     rotation matrix, in local components (G_i: generator of a rotation about axis i)."""
-    return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
+    return 0.5 * np.diag(np.square(angle_random_walks) - np.sum(np.square(angle_random_walks)))
 
 
-def ito_norm(walks: np.ndarray, time: float) -> float:
+def ito_norm(angle_random_walks: np.ndarray, time: float) -> float:
     """Norm |q| of the quaternion of eq. (28) after ``time`` (s): exp(sum of s^2 t / 8) with the angle random walks s,
     without any scatter."""
-    return 1 / mean_scalar(walks, time)
+    return 1 / mean_scalar(angle_random_walks, time)
 
 
-def euler_mean_square(angle_random_walk: float, axes: int, sample_period: float, steps: int) -> float:
+def euler_mean_square(angle_random_walk: float, axis_count: int, sample_period: float, step_count: int) -> float:
     """Expected squared norm E[|q|^2] of the quaternion by explicit Euler steps on eq. (25) at rest: (1 + k s^2 D / 4)^n
     for k axes, angle random walk s, period D and n steps, exactly."""
-    return float(np.exp(steps * np.log1p(axes * angle_random_walk**2 * sample_period / 4)))
+    return float(np.exp(step_count * np.log1p(axis_count * angle_random_walk**2 * sample_period / 4)))
 
 
 def euler_quaternions(turn_vectors: np.ndarray, start_attitude: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from models.core.errors import InputError
-from models.sensors.rigid_body_motion import Spin, own_acceleration
+from models.sensors.rigid_body_motion import Spin, array_angular_acceleration
 
 SYMMETRIC_ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
 """Index pairs of the entries of a symmetric (3, 3) matrix; for sensors in a plane only the first three are known."""
@@ -45,12 +45,12 @@ def filter_rates(
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
     filter_.x, filter_.P = np.asarray(start_rates) @ frame, deviation**2 * UNIT_MATRIX
-    filter_.Q = np.diag((sample_period * noise * spins.array.own_gains(planar)) ** 2)
+    filter_.Q = np.diag((sample_period * noise * spins.array.array_noise_gains(planar)) ** 2)
     squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
     values = np.column_stack([0.5 * (spins.rate_matrix[:, i, j] + spins.rate_matrix[:, j, i]) for i, j in pairs])
-    known, rows = own_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
+    known, rows = array_angular_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
         _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), sample_period, planar)
         filter_.update(values[i], _rate_product_jacobian, _skew_squared_entries, args=indices, hx_args=indices)

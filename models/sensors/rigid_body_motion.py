@@ -14,8 +14,8 @@ from models.core.errors import InputError
 from models.sensors.rotations import (
     cardan_angles,
     cubic_integrals,
-    from_cardan,
-    integrate,
+    integrate_attitude,
+    quaternion_from_cardan,
     rotation_matrix,
     skew_matrix,
 )
@@ -85,7 +85,7 @@ class StartState:
     @staticmethod
     def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "StartState":
         """Start of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
-        level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
+        level = tuple(quaternion_from_cardan(0.0, pitch, 0.0).tolist())
         return StartState((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 
 
@@ -97,7 +97,7 @@ class CutOffs:
     position.
     """
 
-    turning: float | None = None
+    rotation: float | None = None
     position: float | None = None
 
 
@@ -148,10 +148,10 @@ def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
 
     The rates are read by the formula for a plane alone: alpha_1 = n.M e2 - w2 w3, alpha_2 = -n.M e1 + w1 w3.
     """
-    return own_acceleration(spins, rates @ spins.array.frame) @ spins.array.frame.T
+    return array_angular_acceleration(spins, rates @ spins.array.frame) @ spins.array.frame.T
 
 
-def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
+def array_angular_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
     """Angular acceleration (n, 3) in rad/s^2 in the array's axes from the ``Spin`` of the readings; w (n, 3), rad/s, in
     the same axes."""
     m = spins.rate_matrix
@@ -192,14 +192,14 @@ def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
     return np.hstack([within, about_normal])
 
 
-def unexplained(spins: Spin) -> np.ndarray:
+def unexplained_accelerations(spins: Spin) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 that no rigid motion explains, in the array's axes.
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
     flat = _unsigned_in_plane(spins.rate_matrix)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += [] if spins.array.flat else [_unsigned_in_space(spins.rate_matrix)]
+    offers += [] if spins.array.lies_in_plane else [_unsigned_in_space(spins.rate_matrix)]
     left = np.stack([spins.relative_acceleration - _nearest_rigid(spins, w) for w in offers])
     sensor_with_least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[sensor_with_least, np.arange(len(sensor_with_least))]
@@ -239,7 +239,7 @@ def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) ->
 
 def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
     spins = spin_from_readings(array, readings)
-    left = unexplained(spins)
+    left = unexplained_accelerations(spins)
     count = 3 * len(array.names)
     size = float(np.sqrt(np.mean(spins.relative_acceleration**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
@@ -276,7 +276,10 @@ def integrate_rates(spins: Spin, sample_period: float, start_rates: np.ndarray) 
         raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
     first = np.asarray(start_rates) @ spins.array.frame
     if not spins.array.planar:
-        return time_integral(own_acceleration(spins, np.zeros((1, 3))), sample_period, first) @ spins.array.frame.T
+        return (
+            time_integral(array_angular_acceleration(spins, np.zeros((1, 3))), sample_period, first)
+            @ spins.array.frame.T
+        )
     m = spins.rate_matrix
     w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), sample_period, first[2])
     turn = np.exp(1j * time_integral(w3, sample_period, np.array(0.0)))
@@ -289,30 +292,29 @@ def recovered_motion(
     readings: np.ndarray,
     sample_period: float,
     start_state: StartState | None = None,
-    zeroed: bool = False,
+    gravity_corrected: bool = False,
     rates: np.ndarray | None = None,
     cut_offs: CutOffs | None = None,
 ) -> RecoveredMotion:
     """Motion of the body's reference point and axes from accelerometer readings, steps 1 to 6 of the paper.
 
-    readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
-    ground, as sensors with a correction for gravity give it (17); sample_period : s
-    rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
-    Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
-    """
+    readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``gravity_corrected`` set to zero at rest on
+    level ground, as sensors with a correction for gravity give it (17); sample_period : s rates : (n, 3) in rad/s,
+    local, from a gyro or a filter, in the place of the integrated ones Raises InputError for unusable readings,
+    GimbalLock if angles are filtered where they are not defined."""
     start_state, cut_offs = start_state or StartState(), cut_offs or CutOffs()
     spins = spin_from_readings(array, readings)
     w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates
-    w = _high_passed(w, sample_period, cut_offs.turning)
-    orientation = integrate(w, sample_period, np.array(start_state.orientation))
-    if cut_offs.turning is not None:
-        orientation = from_cardan(
-            *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.turning).T
+    w = _high_passed(w, sample_period, cut_offs.rotation)
+    orientation = integrate_attitude(w, sample_period, np.array(start_state.orientation))
+    if cut_offs.rotation is not None:
+        orientation = quaternion_from_cardan(
+            *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.rotation).T
         )
     alpha = angular_acceleration(spins, w)
     gravity_vector = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(
-        array, readings - gravity_vector if zeroed else readings, orientation, alpha, w, gravity_vector
+        array, readings - gravity_vector if gravity_corrected else readings, orientation, alpha, w, gravity_vector
     )
     velocity = _high_passed(
         time_integral(acceleration, sample_period, np.array(start_state.velocity)), sample_period, cut_offs.position

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from models.core.errors import InputError
 from models.machine.compiled import njit
 
-Rule = Literal["held", "mean", "cubic"]
+IntegrationRule = Literal["held", "mean", "cubic"]
 """How an angular rate runs between its samples: constant ("held"), at the mean of both, or along a cubic; order 1, 2, 4
 of the orientation in the sampling period."""
 HALF_TURN = np.pi
@@ -65,7 +65,7 @@ def conjugate_quaternion(q: np.ndarray) -> np.ndarray:
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def exponential(turn: np.ndarray) -> np.ndarray:
+def quaternion_of_rotation_vector(turn: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad; exact to rounding and regular at all angles."""
     half = 0.5 * np.linalg.norm(turn, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * turn], axis=-1)
@@ -79,7 +79,9 @@ def rotation_vector(q: np.ndarray) -> np.ndarray:
     return near[..., 1:] * np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
 
 
-def turns_between_samples(rates: np.ndarray, sample_period: float, integration_rule: Rule = "cubic") -> np.ndarray:
+def turns_between_samples(
+    rates: np.ndarray, sample_period: float, integration_rule: IntegrationRule = "cubic"
+) -> np.ndarray:
     """Rotation vectors (n - 1, ..., 3) in rad from each sample of local angular rates (n, ..., 3) in rad/s to the next.
 
     "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
@@ -90,8 +92,8 @@ def turns_between_samples(rates: np.ndarray, sample_period: float, integration_r
     held."""
     if not 0.0 < sample_period < np.inf:
         raise InputError("", "period", sample_period, "must be above 0, in s")
-    if integration_rule not in get_args(Rule):
-        raise InputError("", "rule", integration_rule, "is not known", get_args(Rule))
+    if integration_rule not in get_args(IntegrationRule):
+        raise InputError("", "rule", integration_rule, "is not known", get_args(IntegrationRule))
     if len(rates) < (needed := 4 if integration_rule == "cubic" else 2):
         raise ValueError(
             f"{len(rates)} samples of the angular velocity: the rule {integration_rule!r} needs at least {needed}"
@@ -124,8 +126,8 @@ def cubic_integrals(values: np.ndarray, sample_period: float) -> np.ndarray:
     return sample_period / 24 * np.concatenate([first_integral[None], inner, last_integral[None]])
 
 
-def integrate(
-    rates: np.ndarray, sample_period: float, start_attitude: np.ndarray, integration_rule: Rule = "cubic"
+def integrate_attitude(
+    rates: np.ndarray, sample_period: float, start_attitude: np.ndarray, integration_rule: IntegrationRule = "cubic"
 ) -> np.ndarray:
     """Quaternions (n, ..., 4) of the orientation at the samples of local angular rates (n, ..., 3) in rad/s, eq. (22);
     start_attitude (..., 4).
@@ -136,15 +138,15 @@ def integrate(
     """
     if not np.abs(np.linalg.norm(np.asarray(start_attitude, dtype=float), axis=-1) - 1.0).max() <= UNIT_NORM_TOLERANCE:
         raise InputError("", "start", start_attitude, "must be unit quaternions")
-    steps = exponential(turns_between_samples(rates, sample_period, integration_rule))
+    steps = quaternion_of_rotation_vector(turns_between_samples(rates, sample_period, integration_rule))
     count, middle = len(steps), steps.shape[1:-1]
     first = np.broadcast_to(np.asarray(start_attitude, dtype=float), (*middle, 4)).reshape(-1, 4)
     flat = np.ascontiguousarray(steps.reshape(count, -1, 4))
-    return _chain_rotations(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
+    return _chained_rotations(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
 
 
 @njit(cache=True)
-def _chain_rotations(start_attitude, steps):
+def _chained_rotations(start_attitude, steps):
     """Normalised running products of quaternions, start, start steps[0], start steps[0] steps[1] ...: from shapes (m,
     4) and (n, m, 4) to (n + 1, m, 4)."""
     attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
@@ -173,7 +175,7 @@ def rotation_matrix(q: np.ndarray) -> np.ndarray:
     return (a * a - square) * np.eye(3) + 2 * outer + 2 * a * skew_matrix(v)
 
 
-def from_matrix(s: np.ndarray) -> np.ndarray:
+def quaternion_from_matrix(s: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4), scalar 0 or more, of rotation matrices (..., 3, 3). Raises ValueError if one is no
     rotation."""
     departure = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
@@ -181,14 +183,15 @@ def from_matrix(s: np.ndarray) -> np.ndarray:
         raise ValueError(
             f"not a rotation: S^T S departs from the identity by {departure:.3g}, or S turns left into right"
         )
-    return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
+    return Rotation.quaternion_from_matrix(s).as_quat(canonical=True, scalar_first=True)
 
 
-def from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
+def quaternion_from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
     """Unit quaternions (..., 4) of the rotation S = Rz(yaw) Ry(pitch) Rx(roll) by Cardan angles, all in rad."""
     axes = np.eye(3)
     parts = [
-        exponential(np.asarray(angle, dtype=float)[..., None] * axes[i]) for i, angle in enumerate((roll, pitch, yaw))
+        quaternion_of_rotation_vector(np.asarray(angle, dtype=float)[..., None] * axes[i])
+        for i, angle in enumerate((roll, pitch, yaw))
     ]
     return quaternion_product(quaternion_product(parts[2], parts[1]), parts[0])
 

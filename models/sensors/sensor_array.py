@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from models.core.errors import InputError
-from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix, skew_matrix
 
 Formula = Literal["auto", "spatial", "plane"]
 LINE_SPREAD_RATIO = 1e-3
@@ -50,7 +50,7 @@ class SensorArray:
         return 3 * (len(self.names) - 1) - 6
 
     @property
-    def flat(self) -> bool:
+    def lies_in_plane(self) -> bool:
         """Whether the sensors lie in a plane, except for rounding."""
         return self.weights.shape[1] == 2
 
@@ -61,13 +61,13 @@ class SensorArray:
         The readings' noise is independent and the same on all axes of all sensors. For sensors in a plane the spatial
         formula gives infinite gains.
         """
-        squares = self.own_gains(self.planar if planar is None else planar) ** 2
+        squares = self.array_noise_gains(self.planar if planar is None else planar) ** 2
         shares = np.where(
             np.abs(self.frame) > PLANE_SPREAD_RATIO, self.frame**2, 0.0
         )  # infinity times a rounding error
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
-    def own_gains(self, planar: bool) -> np.ndarray:
+    def array_noise_gains(self, planar: bool) -> np.ndarray:
         """Noise gains (3,) as ``noise_gains`` gives, but about the array's axes e1, e2, n."""
         first, second_axis, three = self.inverse_squares
         return np.sqrt(
@@ -80,7 +80,7 @@ class SensorArray:
     def inverse_squares(self) -> np.ndarray:
         """Inverse squares 1 / spreads^2 (3,) in 1/m^2: variances of the columns of M for readings with unit
         variance."""
-        return np.append(1 / self.spreads[:2] ** 2, np.inf if self.flat else 1 / self.spreads[2] ** 2)
+        return np.append(1 / self.spreads[:2] ** 2, np.inf if self.lies_in_plane else 1 / self.spreads[2] ** 2)
 
     def describe(self) -> list[str]:
         """Sentences on the strengths and weaknesses of the sensor arrangement."""
@@ -89,10 +89,10 @@ class SensorArray:
         spreads = ", ".join(f"{value:.3g}" for value in self.spreads)
         lines = [f"{len(self.names)} sensors, spread {spreads} m along their principal directions"]
         if self.planar:
-            lies = "lie in a plane" if self.flat else f"lie nearly in a plane (flatness {flatness:.2g})"
+            lies = "lie in a plane" if self.lies_in_plane else f"lie nearly in a plane (flatness {flatness:.2g})"
             lines += [
                 f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
-                f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified_noise()}; "
+                f"{'gives half the angular acceleration plus a bias' if self.lies_in_plane else self._amplified_noise()}; "
                 "the formula for a plane is used, integrated together with the rates"
             ]
         gains = ", ".join(f"{value:.2f}" for value in self.noise_gains())
@@ -158,13 +158,15 @@ def sensor_readings(
     """
     count = len(pitch)
     no_angles = np.zeros(count)
-    turn = rotation_matrix(from_cardan(no_angles, pitch, no_angles))
+    turn = rotation_matrix(quaternion_from_cardan(no_angles, pitch, no_angles))
     alpha, w = (np.column_stack([no_angles, values, no_angles]) for values in (pitch_acceleration, rate))
     felt = (heave_acceleration - gravity)[:, None] * turn[:, 2]  # S^T along the global vertical
-    return in_space(sensor_positions, felt, w, alpha)
+    return specific_forces_on_body(sensor_positions, felt, w, alpha)
 
 
-def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+def specific_forces_on_body(
+    sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray
+) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2 at sensors on a body in any motion, in the body's axes, eqs (16), (17).
 
     sensor_positions : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3),
@@ -174,7 +176,7 @@ def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.nd
     return specific_forces[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def on_bracket(mount: np.ndarray, sample_period: float, frequency: float, damping: float) -> np.ndarray:
+def reading_on_bracket(mount: np.ndarray, sample_period: float, frequency: float, damping: float) -> np.ndarray:
     """Reading (n, 3) of a sensor on a light flexible bracket from that of a rigid mount (n, 3), sampled every
     ``sample_period`` (s).
 

@@ -43,7 +43,7 @@ def net(cells: int) -> Grid:
     return grid(cells, int(strips_of(np.array(1.0), cells)), "parabolic")
 
 
-def shape_factor(cells: int) -> float:
+def cornering_stiffness_factor(cells: int) -> float:
     """Ratio, near the exact 8/3, of the cornering stiffness to a^2 b k (half length a, half width b, bristle stiffness
     k), for a patch with ``cells`` cells."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)

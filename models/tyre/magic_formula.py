@@ -31,7 +31,7 @@ ANGLE_NODES, SLIP_NODES = graded_nodes(np.pi / 2.0, 0.03, 261), graded_nodes(1.0
 friction coefficient."""
 
 
-def by_similarity(
+def table_by_similarity(
     friction_along: Friction,
     friction_across: Friction,
     loads: np.ndarray,
@@ -50,7 +50,7 @@ def by_similarity(
     mu_x = np.stack([friction_along(total, load) * slips / safe for load in loads], axis=1)
     mu_y = np.stack([friction_across(total, load) * tangent / safe for load in loads], axis=1)
     g, h = product_factors(mu_y)
-    g[0] = _at_no_angle(friction_across, slips, loads)
+    g[0] = _limit_at_zero_angle(friction_across, slips, loads)
     excess = np.maximum(np.hypot(mu_x, g[:, None, :] * h[:, :, None]) / max(mu_x.max(), mu_y.max()), 1.0)
     return TyreTable(angles, slips, loads, mu_x / excess, g / excess.max(axis=1), h, name)
 
@@ -69,7 +69,7 @@ def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return g, h
 
 
-def _at_no_angle(friction_across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
+def _limit_at_zero_angle(friction_across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
     """Limit of the factor g for slip angles towards 0: ratio of the slope of lateral friction at a slip to that without
     slip."""
     little = np.full(1, 1e-9)
@@ -162,7 +162,7 @@ def table_of_surface(name: str, friction_scale: float = 1.0, load: float = 1e4, 
     def load_factor(load_there: float) -> float:
         return friction_scale * (1.0 - fall * (load_there / load - 1.0))
 
-    return by_similarity(
+    return table_by_similarity(
         lambda k, load_there: load_factor(load_there) * law_along(k),
         lambda k, load_there: load_factor(load_there) * across(k),
         loads,

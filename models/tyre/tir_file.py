@@ -16,7 +16,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.tables import whole_text
-from models.tyre.magic_formula import MagicFormulaCurve, by_similarity
+from models.tyre.magic_formula import MagicFormulaCurve, table_by_similarity
 from models.tyre.tyre_table import TyreTable
 
 ACCEPTED_UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}
@@ -24,7 +24,7 @@ ACCEPTED_UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "
 FITTYP_VERSIONS = (5.0, 6.0, 50.0, 51.0, 52.0)
 """Values of the key FITTYP of the property files whose equations are read here."""
 NEEDED_KEYS = ("FNOMIN", "FZMIN", "FZMAX", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-UNIT_SCALES = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
+SCALING_FACTORS = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
 """Names of scaling factors, 1 where the file has none; all other coefficients are then 0."""
 COEFFICIENT_PATTERN = re.compile(r"P[CDEK][XY]\d")
 LOAD_NODES = 9
@@ -32,7 +32,7 @@ LOAD_NODES = 9
 
 
 @dataclass(frozen=True)
-class Property:
+class TirProperty:
     """Value of a key of a property file as text, and its line number."""
 
     text: str
@@ -43,8 +43,10 @@ def tir_table(path: str | Path) -> TyreTable:
     """Tyre table from a `.tir` file. Raises InputError with file, line, key, value and the allowed values."""
     properties = _keys_of_sections(path)
     _check_properties(path, properties)
-    named = (name for name in properties if name in (*NEEDED_KEYS, *UNIT_SCALES) or COEFFICIENT_PATTERN.fullmatch(name))
-    c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {
+    named = (
+        name for name in properties if name in (*NEEDED_KEYS, *SCALING_FACTORS) or COEFFICIENT_PATTERN.fullmatch(name)
+    )
+    c = defaultdict(float, dict.fromkeys(SCALING_FACTORS, 1.0)) | {
         name: _number_of(path, properties, name) for name in named
     }
     least_load, largest_load, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
@@ -60,7 +62,7 @@ def tir_table(path: str | Path) -> TyreTable:
     )
     curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
     _check_curves(path, curves)
-    return by_similarity(
+    return table_by_similarity(
         lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
     )
 
@@ -92,9 +94,9 @@ def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
     return nominal, (load - nominal) / nominal
 
 
-def _keys_of_sections(path: str | Path) -> dict[str, Property]:
+def _keys_of_sections(path: str | Path) -> dict[str, TirProperty]:
     """Keys of all sections of a property file, in capital letters."""
-    properties: dict[str, Property] = {}
+    properties: dict[str, TirProperty] = {}
     for line, row in enumerate(whole_text(path).splitlines(), start=1):
         plain = row.partition("$")[0].partition("!")[0].strip()
         name, equals, value = plain.partition("=")
@@ -104,11 +106,11 @@ def _keys_of_sections(path: str | Path) -> dict[str, Property]:
                 raise InputError(
                     path, f"line {line}, {key}", value.strip(), f"stands in line {properties[key].line} already"
                 )
-            properties[key] = Property(value.strip().strip("'\""), line)
+            properties[key] = TirProperty(value.strip().strip("'\""), line)
     return properties
 
 
-def _check_properties(path: str | Path, properties: dict[str, Property]) -> None:
+def _check_properties(path: str | Path, properties: dict[str, TirProperty]) -> None:
     for name, allowed in ACCEPTED_UNITS.items():
         if name not in properties:
             raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
@@ -126,7 +128,7 @@ def _check_properties(path: str | Path, properties: dict[str, Property]) -> None
             raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED_KEYS))
 
 
-def _number_of(path: str | Path, properties: dict[str, Property], name: str) -> float:
+def _number_of(path: str | Path, properties: dict[str, TirProperty], name: str) -> float:
     try:
         value = float(properties[name].text)
     except ValueError:
@@ -136,7 +138,7 @@ def _number_of(path: str | Path, properties: dict[str, Property], name: str) -> 
     return value
 
 
-def _wrong_value(path: str | Path, properties: dict[str, Property], name: str, allowed: str) -> InputError:
+def _wrong_value(path: str | Path, properties: dict[str, TirProperty], name: str, allowed: str) -> InputError:
     return InputError(path, f"line {properties[name].line}, {name}", properties[name].text, allowed)
 
 

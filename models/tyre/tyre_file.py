@@ -21,7 +21,7 @@ FRICTION_COLUMNS: Columns = {
     "mu_y": SHARES,
 }
 COLUMN_SETS: tuple[Columns, ...] = (FRICTION_COLUMNS, {**FRICTION_COLUMNS, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
-ANY_LOAD = 1e4
+LOAD_OF_SINGLE_NODE = 1e4
 """Load (N) of the only node of a table whose file has no column of the load."""
 PRODUCT_TOLERANCE = 0.03
 """Largest difference between the product g h and lateral friction mu_y, as a share of the largest friction."""
@@ -31,7 +31,7 @@ MOST_NODES = 3_000_000
 def tyre_table(path: str | Path) -> TyreTable:
     """Tyre table from a CSV file. Raises InputError that names file, line, column, value and what is allowed."""
     lines, columns = _columns_in_si(Path(path))
-    columns.setdefault("load", np.full(len(lines), ANY_LOAD))
+    columns.setdefault("load", np.full(len(lines), LOAD_OF_SINGLE_NODE))
     _check_ranges(path, lines, columns)
     axes = [np.unique(columns[name], return_inverse=True) for name in ("slip angle", "load", "slip")]
     angles, loads, slips = (nodes for nodes, _ in axes)
@@ -43,7 +43,9 @@ def tyre_table(path: str | Path) -> TyreTable:
             int(np.prod(shape)),
             "combinations of slip angle, load and slip are too many: are the same values repeated with other digits?",
         )
-    row = _row_of_each(path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes)
+    row = _row_of_each_combination(
+        path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes
+    )
     mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
     g, h = product_factors(mu_y)
     _check_product(path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
@@ -87,7 +89,9 @@ def _error_in_row(
     return InputError(path, f"line {lines[row]}, column {name!r}", float(wrong_value), f"{allowed} (in SI units)")
 
 
-def _row_of_each(path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list) -> np.ndarray:
+def _row_of_each_combination(
+    path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list
+) -> np.ndarray:
     """Index of the row for each combination of nodes; every combination must occur exactly once."""
     shape = tuple(nodes.size for nodes, _ in axes)
     order = np.argsort(combination_number, kind="stable")

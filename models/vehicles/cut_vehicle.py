@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.vehicles.free_vehicle import guided
+from models.vehicles.free_vehicle import with_chassis_as_parent
 from models.vehicles.sliding_springs import sliding_springs
 from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import Preloads, preloads
@@ -41,17 +41,17 @@ class Element:
     axis: np.ndarray
     stiffness: float
     damping: float
-    held: float
+    preload: float
     frame: str
     travel_force: Curve | None = None
     rate_force: Curve | None = None
     friction: float = 0.0
     friction_rate: float = 1.0
 
-    def gauge(self) -> "Element":
+    def travel_gauge(self) -> "Element":
         """A copy of the element whose force equals its travel d, so that a simulation records the travel."""
         straight = replace(self, travel_force=None, rate_force=None, friction=0.0)
-        return replace(straight, stiffness=1.0, damping=0.0, held=0.0)
+        return replace(straight, stiffness=1.0, damping=0.0, preload=0.0)
 
     @property
     def design(self) -> float:
@@ -95,7 +95,7 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     """The cut vehicle: the tyres of a vehicle whose body ``chassis`` has all six freedoms are removed. Raises
     InputError if the vehicle cannot be cut."""
     _check(vehicle, chassis)
-    sprung = sliding_springs(guided(vehicle, chassis))
+    sprung = sliding_springs(with_chassis_as_parent(vehicle, chassis))
     whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
@@ -169,7 +169,7 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
 
 
 @dataclass(frozen=True)
-class Rigid:
+class RigidVehicle:
     """The cut vehicle as a single rigid body, which describes its drift when the springs have settled.
 
     mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it (kg m^2), arms (h, 3) of the hubs.
@@ -199,7 +199,7 @@ class Rigid:
         inverse = np.linalg.inv(self.inertia)
         return inverse @ (rows.T * deviation**2) @ rows @ inverse
 
-    def toppling(self) -> np.ndarray:
+    def toppling_rates(self) -> np.ndarray:
         """Growth rates (2,) of roll and pitch, 1/s, under forces whose directions are fixed in space."""
         loads = -self.arms[:, 2].mean() * self.mass * GRAVITY
         return np.sqrt(np.maximum(loads, 0.0) / np.diag(self.inertia)[:2])
@@ -220,7 +220,7 @@ class Rigid:
         return variances
 
 
-def rigid(vehicle: CutVehicle) -> Rigid:
+def rigid_vehicle(vehicle: CutVehicle) -> RigidVehicle:
     """``Rigid`` with the mass properties of all bodies of a cut vehicle, combined in the design position."""
     bodies = vehicle.uncut.bodies
     mass = sum(body.mass for body in bodies)
@@ -229,4 +229,4 @@ def rigid(vehicle: CutVehicle) -> Rigid:
     for body in bodies:
         arm = np.subtract(body.position, centre)
         inertia += np.array(body.inertia) + steiner(body.mass, arm)
-    return Rigid(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.uncut.tyres]) - centre)
+    return RigidVehicle(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.uncut.tyres]) - centre)

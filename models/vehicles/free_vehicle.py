@@ -18,10 +18,10 @@ from models.core.errors import InputError
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, Freedom, SpatialVehicle, Tyre, Vector
 
 CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"
-SPECK = 1e-9
+ROTOR_MASS = 1e-9
 """Mass (kg) of a rotor: Exudyn divides by the mass of every body that has inertia."""
-PLANE: tuple[Freedom, ...] = ("x", "y", "rz")
-RESTING_COORDINATES: tuple[Freedom, ...] = ("z", "rx", "ry")
+CARRIER_FREEDOMS: tuple[Freedom, ...] = ("x", "y", "rz")
+SWAY_FREEDOMS: tuple[Freedom, ...] = ("z", "rx", "ry")
 
 
 def free_vehicle(
@@ -37,19 +37,19 @@ def free_vehicle(
     _check_headings(vehicle, chassis.name)
     x, y, _ = chassis.position
     bodies = [
-        Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE),
-        Body(SWAY, 0.0, (x, y, 0.0), RESTING_COORDINATES, parent=CARRIER),
+        Body(CARRIER, 0.0, (0.0, 0.0, 0.0), CARRIER_FREEDOMS),
+        Body(SWAY, 0.0, (x, y, 0.0), SWAY_FREEDOMS, parent=CARRIER),
     ]
     bodies += [
         replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
-        for body in guided(vehicle, chassis.name).bodies
+        for body in with_chassis_as_parent(vehicle, chassis.name).bodies
     ]
     bodies += [
-        Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
+        Body(rotor(tyre.name), ROTOR_MASS, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
         for tyre in vehicle.tyres
         if spin_inertia and tyre.name not in fixed
     ]
-    bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
+    bars = tuple(_bar_on_sway(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
     free = replace(
         vehicle, bodies=_bodies_before_riders(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity
     )
@@ -65,7 +65,7 @@ def _about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
     return (0.0, 0.0, 0.0), (0.0, inertia, 0.0), (0.0, 0.0, 0.0)
 
 
-def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
+def with_chassis_as_parent(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
     """The vehicle with the chassis as the parent of every body that had none, so that these move in the chassis'
     axes."""
     return replace(
@@ -113,14 +113,14 @@ def rotor(tyre: str) -> str:
     return f"{tyre} {ROTOR}"
 
 
-def anchor(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
+def last_coordinate_and_joint(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
     """Index of the last coordinate that moves a body, -1 if none does, and the position (m) of that coordinate's joint
     in the design position."""
     given_body = vehicle.body(body)
     last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body]
     if last:
         return last[-1], given_body.position
-    return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else anchor(vehicle, given_body.parent)
+    return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else last_coordinate_and_joint(vehicle, given_body.parent)
 
 
 def joints(vehicle: SpatialVehicle) -> np.ndarray:
@@ -128,20 +128,22 @@ def joints(vehicle: SpatialVehicle) -> np.ndarray:
     (-1: none), and the vector (m) from the joint below to its own in the design position."""
     rows = []
     for body in vehicle.bodies:
-        below, origin = (-1, (0.0, 0.0, 0.0)) if body.parent is None else anchor(vehicle, body.parent)
+        below, origin = (
+            (-1, (0.0, 0.0, 0.0)) if body.parent is None else last_coordinate_and_joint(vehicle, body.parent)
+        )
         for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
             rows.append([FREEDOMS.index(freedom), below, *np.subtract(body.position, origin)])
             below, origin = len(rows) - 1, body.position
     return np.array(rows)
 
 
-def frames(vehicle: SpatialVehicle) -> np.ndarray:
+def freedom_axes(vehicle: SpatialVehicle) -> np.ndarray:
     """Axes (n, 3, 3), as columns, of the freedoms of each coordinate's body in the design position."""
     axes = [vehicle.body(name).axes for name, _ in vehicle.coordinates()]
     return np.array(axes, float).reshape(-1, 3, 3).transpose(0, 2, 1)
 
 
-def _swaying(bar: AntiRollBar) -> AntiRollBar:
+def _bar_on_sway(bar: AntiRollBar) -> AntiRollBar:
     return replace(bar, body=SWAY)
 
 

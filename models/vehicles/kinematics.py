@@ -8,11 +8,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, SpatialVehicle, Vector
 
-End = tuple[str | None, Vector]
+SpringEnd = tuple[str | None, Vector]
 """End of a spring: a body, None for the ground, and a point (m) that is fixed to it, in the design position."""
-UNIT = np.eye(3)
+UNIT_AXES = np.eye(3)
 """Unit matrix, whose rows are the axes x, y, z."""
-TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
+ROTATION_GENERATORS = np.array([np.cross(unit, UNIT_AXES).T for unit in UNIT_AXES])
 """Generators (3, 3, 3) of rotations about the axes: e_i x v = TURN[i] @ v."""
 
 
@@ -51,7 +51,9 @@ class Kinematics:
         columns = np.zeros((3, self.size))
         for rider, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
-            columns[:, i] = UNIT[along] if along < 3 else TURN[along - 3] @ np.subtract(point, rider.position)
+            columns[:, i] = (
+                UNIT_AXES[along] if along < 3 else ROTATION_GENERATORS[along - 3] @ np.subtract(point, rider.position)
+            )
         return columns
 
     def turn(self, body: str) -> np.ndarray:
@@ -60,10 +62,10 @@ class Kinematics:
         for _, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
             if along >= 3:
-                columns[:, i] = UNIT[along - 3]
+                columns[:, i] = UNIT_AXES[along - 3]
         return columns
 
-    def bend(self, body: str | None, point: Vector) -> np.ndarray:
+    def second_derivatives(self, body: str | None, point: Vector) -> np.ndarray:
         """Second derivatives (3, n, n) of a point's displacement (m) with respect to the coordinates."""
         first = self.shift(body, point)
         second = np.zeros((3, self.size, self.size))
@@ -72,24 +74,33 @@ class Kinematics:
             along = FREEDOMS.index(freedom)
             if along >= 3:
                 for _, _, inner in motions[k:]:
-                    second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
+                    second[:, outer, inner] = second[:, inner, outer] = ROTATION_GENERATORS[along - 3] @ first[:, inner]
         return second
 
     def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
         """Change (3, n) of an axis fixed in a body, per coordinate; zeros for an axis fixed in space, None."""
-        return np.zeros((3, self.size)) if frame is None else -np.tensordot(axis, TURN, 1) @ self.turn(frame)
+        return (
+            np.zeros((3, self.size))
+            if frame is None
+            else -np.tensordot(axis, ROTATION_GENERATORS, 1) @ self.turn(frame)
+        )
 
-    def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
+    def travel_second_derivatives(
+        self, first_end: SpringEnd, second_end: SpringEnd, axis: Vector, frame: str | None
+    ) -> np.ndarray:
         """Second derivatives (n, n) of the travel axis . (second point - first point) with respect to the coordinates;
         the axis is fixed in ``frame``, a body or space."""
-        ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
+        ends, second = (
+            self.shift(*second_end) - self.shift(*first_end),
+            self.second_derivatives(*second_end) - self.second_derivatives(*first_end),
+        )
         total = np.tensordot(axis, second, 1)
         if frame is None:
             return total
         mixed, (x, y, z) = self.turned_axis(frame, axis).T @ ends, self._bodies[frame].position
         beyond = x + axis[0], y + axis[1], z + axis[2]
-        bent = self.bend(frame, beyond) - self.bend(frame, (x, y, z))
-        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], first[1]), bent, 1))
+        bent = self.second_derivatives(frame, beyond) - self.second_derivatives(frame, (x, y, z))
+        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(second_end[1], first_end[1]), bent, 1))
 
     def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
         """Coordinates that move a body, from the ground outwards: (body that has the coordinate, freedom, index)."""
@@ -101,7 +112,7 @@ class Kinematics:
 
 
 @lru_cache(maxsize=16)
-def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[End, np.ndarray]:
+def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[SpringEnd, np.ndarray]:
     """Cache of points' displacements (3, n), shared by all vehicles with the same ``bodies``: name, parent, position
     and freedoms."""
     return {}

@@ -87,7 +87,7 @@ class LinearVehicle:
         )
 
 
-def poles(vehicle: LinearVehicle) -> np.ndarray:
+def eigenvalues(vehicle: LinearVehicle) -> np.ndarray:
     """Eigenvalues (2 n,) of a linear vehicle in 1/s in order of increasing magnitude; of a conjugate pair, the
     eigenvalue with negative imaginary part comes first."""
     n = len(vehicle.mass)
@@ -96,13 +96,13 @@ def poles(vehicle: LinearVehicle) -> np.ndarray:
     return values[np.lexsort((values.imag, np.round(np.abs(values), 6)))]
 
 
-def shift(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
+def eigenvalue_shifts(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
     """Complex change (1/s) of each eigenvalue (2 n,) of the unloaded vehicle by the load.
 
     Eigenvalues of both vehicles are paired such that the sum of all distances is smallest.
     """
     from scipy.optimize import linear_sum_assignment
 
-    before, after = poles(unloaded), poles(loaded)
+    before, after = eigenvalues(unloaded), eigenvalues(loaded)
     rows, columns = linear_sum_assignment(np.abs(before[:, None] - after[None, :]))
     return after[columns] - before[rows]

@@ -23,7 +23,7 @@ from models.vehicles.description import Geometry, Vehicle
 from models.vehicles.pitch_plane import Parameters
 
 
-def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
+def parameter_numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
     """Array of numbers for the compiled equations: the parameters (15,), then stiffness, damping and dead band of each
     pitch spring."""
     springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
@@ -31,7 +31,7 @@ def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
 
 
 @register_jitable
-def suspension(y, p, sine, cosine):
+def suspension_forces(y, p, sine, cosine):
     """Suspension forces f3, f4 (N, compression positive), eq. (35)."""
     a, b = p[0], p[1]
     f3 = p[8] * (y[2] - y[0] - b * sine) + p[12] * (y[6] - y[4] - b * y[7] * cosine)
@@ -44,12 +44,12 @@ def suspension_loads(y: Any, p: Parameters, geometry: Geometry) -> tuple[np.ndar
     eight arrays (n,); eqs (35), (36)."""
     exact = geometry == "exact"
     sine, cosine = (np.sin(y[3]), np.cos(y[3])) if exact else (y[3], np.ones_like(y[3]))
-    f3, f4 = suspension(y, p.array(), sine, cosine)
+    f3, f4 = suspension_forces(y, p.array(), sine, cosine)
     return f3, f4, cosine * (p.b * f3 - p.a * f4)
 
 
 @register_jitable
-def tyres(y, u, p):
+def linear_tyres(y, u, p):
     """Tyre forces f1, f2 (N, up on the wheel) of the linear tyres on a road u, eqs (33) and (35)."""
     f1 = p[6] * (y[0] - u[0]) + p[10] * (y[4] - u[2])
     f2 = p[7] * (y[1] - u[1]) + p[11] * (y[5] - u[3])
@@ -83,39 +83,39 @@ def newton_euler(y, wheels, struts, cosine, p, dy):
 def road_exact(y, u, p, dy):
     """Fill the time derivatives of the road-excited vehicle, nonlinear in pitch (38)."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, tyres(y, u, p), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, linear_tyres(y, u, p), suspension_forces(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def road_linear(y, u, p, dy):
     """Fill the time derivatives of the road-excited vehicle, linearised about zero pitch (38 with A(0))."""
-    newton_euler(y, tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
+    newton_euler(y, linear_tyres(y, u, p), suspension_forces(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def lift_off_exact(y, u, p, dy):
     """Fill the time derivatives of the vehicle on tyres that never pull, nonlinear in pitch."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, pushing_tyres(y, u, p), suspension_forces(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def lift_off_linear(y, u, p, dy):
     """Fill the time derivatives of the vehicle on tyres that never pull, linearised about zero pitch."""
-    newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
+    newton_euler(y, pushing_tyres(y, u, p), suspension_forces(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def force_exact(y, u, p, dy):
     """Fill the time derivatives of the force-excited vehicle, wheel forces vertical in the inertial frame (37)."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def force_linear(y, u, p, dy):
     """Fill the time derivatives of the force-excited vehicle, linearised about zero pitch (37 with A(0))."""
-    newton_euler(y, (u[0], u[1]), suspension(y, p, y[3], 1.0), 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
@@ -127,7 +127,7 @@ def force_body(y, u, p, dy):
     Without wheel mass the moment is b f1 - a f2 at every pitch: no cosine, hence no instability.
     """
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, (u[0] * cosine, u[1] * cosine), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0] * cosine, u[1] * cosine), suspension_forces(y, p, sine, cosine), cosine, p, dy)
     dy[7] += sine * sine * (p[1] * u[0] - p[0] * u[1]) / p[5]
 
 
@@ -137,7 +137,7 @@ def pitch_exact(y, u, p, dy):
     from u."""
     sine, cosine = math.sin(u[2]), math.cos(u[2])
     y[3], y[7] = u[2], u[3]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, sine, cosine), cosine, p, dy)
     dy[7] = u[4]
 
 
@@ -145,7 +145,7 @@ def pitch_exact(y, u, p, dy):
 def pitch_linear(y, u, p, dy):
     """Fill the time derivatives of the force-excited vehicle with prescribed pitch, linearised about zero pitch."""
     y[3], y[7] = u[2], u[3]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, u[2], 1.0), 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, u[2], 1.0), 1.0, p, dy)
     dy[7] = u[4]
 
 
@@ -154,7 +154,7 @@ def heave_pitch_exact(y, u, p, dy):
     """Fill the time derivatives of two wheels under a chassis whose heave and pitch are prescribed in u."""
     sine, cosine = math.sin(u[3]), math.cos(u[3])
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, sine, cosine), cosine, p, dy)
     dy[6], dy[7] = u[6], u[7]
 
 
@@ -162,7 +162,7 @@ def heave_pitch_exact(y, u, p, dy):
 def heave_pitch_linear(y, u, p, dy):
     """Fill the time derivatives of the vehicle with prescribed heave and pitch, linearised about zero pitch."""
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, u[3], 1.0), 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, u[3], 1.0), 1.0, p, dy)
     dy[6], dy[7] = u[6], u[7]
 
 
@@ -199,5 +199,5 @@ def pitch_moment(y, u, p, dy):
     dy[7] += u[-1] / p[5]
 
 
-ADDED = {"springs": pitch_springs, "moment": pitch_moment}
+ADDED_TERMS = {"springs": pitch_springs, "moment": pitch_moment}
 """Further terms by which a right-hand side may be followed."""

@@ -13,10 +13,10 @@ UP = (0.0, 0.0, 1.0)
 def plausible_plane(p: Parameters, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
     """Findings on implausible values of a pitch-plane parameter set, as ``plausible`` gives them, under the parameters'
     symbols."""
-    return plausible(in_space(p), accept)
+    return plausible(equivalent_spatial_vehicle(p), accept)
 
 
-def in_space(p: Parameters) -> SpatialVehicle:
+def equivalent_spatial_vehicle(p: Parameters) -> SpatialVehicle:
     """Vehicle in space without width that is equivalent to a pitch-plane parameter set."""
     chassis, still = "chassis: m3, I", ((0.0,) * 3,) * 3
     ends = (

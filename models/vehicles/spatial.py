@@ -74,7 +74,7 @@ class JointElement:
     factors: tuple[float, ...]
     stiffness: float = 0.0
     damping: float = 0.0
-    held: float = 0.0
+    preload: float = 0.0
     inertia: float = 0.0
 
 
@@ -151,7 +151,7 @@ class SpringDamper:
     frame: str | None = None
 
     @property
-    def bent(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether the spring is nonlinear: it has curves or dry friction."""
         return bool(self.travel_force or self.rate_force or self.friction)
 

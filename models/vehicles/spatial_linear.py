@@ -51,8 +51,8 @@ def linearise(
     for row, k, c in (*parts.values(), *tyres.values()):
         stiffness += k * np.outer(row, row)
         damping += c * np.outer(row, row)
-    stiffness += _geometric(vehicle, motion)
-    _speed_forces(vehicle, motion, speed, damping, stiffness)
+    stiffness += _geometric_stiffness(vehicle, motion)
+    _add_speed_forces(vehicle, motion, speed, damping, stiffness)
     whole = LinearVehicle(
         mass=mass(vehicle),
         damping=damping,
@@ -65,7 +65,11 @@ def linearise(
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
     limits = vehicle.limits
-    return limited(whole, massless(vehicle, limits.massless), free(vehicle, limits)) if limits else whole
+    return (
+        reduced_vehicle(whole, mass_matrix_without(vehicle, limits.massless), remaining_motions(vehicle, limits))
+        if limits
+        else whole
+    )
 
 
 def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
@@ -139,7 +143,7 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     return Preloads({name: k * float(row @ sunk) for name, (row, k, _) in parts.items()}, loads)
 
 
-Part = tuple[np.ndarray, float, float]
+DeformationRow = tuple[np.ndarray, float, float]
 """A spring, bar or tyre for small motion: row (n,) of its deformation per coordinate, stiffness, damping."""
 
 
@@ -147,9 +151,11 @@ def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
     return {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
 
 
-def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
+def _parts_by_name(
+    vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]
+) -> dict[str, DeformationRow]:
     """Rows and gains of a vehicle's spring-dampers, bars and joint elements, by name."""
-    rows = dict[str, Part]()
+    rows = dict[str, DeformationRow]()
     for spring in vehicle.springs:
         ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
             spring.first_body, spring.first_point
@@ -159,7 +165,7 @@ def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[s
             motion.turned_axis(spring.frame, spring.axis),
         )
         rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
-    rows |= {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
+    rows |= {bar.name: (_bar_twist_row(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
     return rows | {e.name: (_joint_row(motion, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
 
 
@@ -170,7 +176,7 @@ def _joint_row(motion: Kinematics, element: JointElement) -> np.ndarray:
     return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
 
 
-def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
+def _bar_twist_row(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
     """Row (n,) of the coordinates' factors in the twist angle of a bar, whose vertical direction turns with its
     frame."""
     risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
@@ -179,13 +185,13 @@ def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
     return rolls - risen / bar.track + turning / bar.track
 
 
-def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
+def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, DeformationRow]:
     return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
 
 
-def preloaded(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
+def with_preloads(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
     """The vehicle with the preloads of its joint elements included in these."""
-    elements = tuple(replace(element, held=preloads.parts[element.name]) for element in vehicle.joint_elements)
+    elements = tuple(replace(element, preload=preloads.parts[element.name]) for element in vehicle.joint_elements)
     return replace(vehicle, joint_elements=elements)
 
 
@@ -195,7 +201,7 @@ def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
-def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+def _geometric_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     """Geometric stiffness (n, n) from weights and preloads whose lever arms change: -sum of force times second
     derivative."""
     total = np.zeros((motion.size, motion.size))
@@ -203,19 +209,19 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
         return total
     held = preloads(vehicle)
     for body in vehicle.bodies:
-        total += body.mass * vehicle.gravity * motion.bend(body.name, body.position)[2]
+        total += body.mass * vehicle.gravity * motion.second_derivatives(body.name, body.position)[2]
     for spring in vehicle.springs:
         ends = (spring.first_body, spring.first_point), (spring.second_body, spring.second_point)
-        total += held.parts[spring.name] * motion.travel_bend(*ends, spring.axis, spring.frame)
+        total += held.parts[spring.name] * motion.travel_second_derivatives(*ends, spring.axis, spring.frame)
     for bar in vehicle.bars:
         ends = (bar.left, bar.point_left), (bar.right, bar.point_right)
-        total += held.parts[bar.name] / bar.track * motion.travel_bend(*ends, (0.0, 0.0, 1.0), bar.frame)
+        total += held.parts[bar.name] / bar.track * motion.travel_second_derivatives(*ends, (0.0, 0.0, 1.0), bar.frame)
     for tyre in vehicle.tyres:
-        total -= held.tyres[tyre.name] * motion.bend(tyre.body, tyre.point)[2]
+        total -= held.tyres[tyre.name] * motion.second_derivatives(tyre.body, tyre.point)[2]
     return total
 
 
-def _speed_forces(
+def _add_speed_forces(
     vehicle: SpatialVehicle, motion: Kinematics, speed: float | None, damping: np.ndarray, stiffness: np.ndarray
 ) -> None:
     """Add the contributions of side forces and drag at a speed (m/s) to the damping and stiffness matrices in place."""
@@ -255,8 +261,8 @@ def _output(
     spec: SpatialOutput,
     vehicle: SpatialVehicle,
     motion: Kinematics,
-    parts: Mapping[str, Part],
-    tyres: Mapping[str, Part],
+    parts: Mapping[str, DeformationRow],
+    tyres: Mapping[str, DeformationRow],
 ) -> Output:
     """``Output`` with the factors of an output of the vehicle."""
     rows = np.zeros((3, motion.size))  # of q, q', q''
@@ -285,7 +291,7 @@ def _is_angle(element: JointElement) -> bool:
     return all(freedom.startswith("r") for _, freedom in element.coordinates)
 
 
-def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
+def reduced_vehicle(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
     """Linear vehicle in the remaining coordinates r of a reduced vehicle, with q = N r; the mass matrix may be
     singular.
 
@@ -310,7 +316,7 @@ def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> Li
     )
 
 
-def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
+def mass_matrix_without(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
     """Mass matrix (n, n) of a vehicle without the mass of the given bodies; no rounding residue of them remains."""
     light = tuple(
         replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
@@ -318,7 +324,7 @@ def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
     return mass(replace(vehicle, bodies=light))
 
 
-def free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+def remaining_motions(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
     """Matrix N (n, r) of the motions that remain to a reduced vehicle: unit vectors where only coordinates are locked,
     else a basis of motions that leave the rigid springs' lengths unchanged."""
     coordinates = vehicle.coordinates()

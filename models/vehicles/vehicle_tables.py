@@ -19,7 +19,7 @@ UP = [0.0, 0.0, 1.0]
 FRAME = "body in whose axes the direction is fixed; by default what the system of the scene takes"
 
 
-def of(unit: str, meaning: str, default: Any = ...) -> Any:
+def quantity_list(unit: str, meaning: str, default: Any = ...) -> Any:
     """Schema field for a list of quantities with a unit and a meaning."""
     return Field(default, description=meaning, json_schema_extra={"unit": unit})
 
@@ -40,12 +40,14 @@ class BodyTable(Entry):
     """[[bodies]]: a rigid body, the position of its centre of mass and its freedoms."""
 
     mass: float = quantity("kg", "mass")
-    position: Triple = of("m", "centre of mass: x forward, y left, z above the ground")
+    position: Triple = quantity_list("m", "centre of mass: x forward, y left, z above the ground")
     freedoms: list[Freedom] = Field(description="which of x, y, z, rx (roll), ry (pitch), rz (yaw) it has")
-    inertia: NotNegativeTriple = of("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
-    products: Triple = of("kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0])
+    inertia: NotNegativeTriple = quantity_list("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
+    products: Triple = quantity_list("kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0])
     parent: str | None = Field(None, description="body it rides on; its freedoms then count relative to that body")
-    hitch: Triple | None = of("m", "where its parent tows it, as a trailer: its freedoms are turns about it", None)
+    hitch: Triple | None = quantity_list(
+        "m", "where its parent tows it, as a trailer: its freedoms are turns about it", None
+    )
 
 
 class CurveTable(Strict):
@@ -59,9 +61,13 @@ class SpringTable(Entry):
     """[[springs]]: spring, damper, curves and friction between points of two bodies along a direction."""
 
     bodies: Names = Field(description='two bodies; the second may be "ground"')
-    point: Triple | None = of("m", "the place of both points", None)
-    points: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = of("m", "one point on each body", None)
-    direction: Triple | None = of("", "up where nothing else is said, or from the second point to the first", None)
+    point: Triple | None = quantity_list("m", "the place of both points", None)
+    points: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = quantity_list(
+        "m", "one point on each body", None
+    )
+    direction: Triple | None = quantity_list(
+        "", "up where nothing else is said, or from the second point to the first", None
+    )
     stiffness: float = quantity("N/m", "spring", default=0.0, zero=True)
     damping: float = quantity("N s/m", "damper", default=0.0, zero=True)
     travel_force: CurveTable | None = Field(None, description="force over travel beside the spring, as a bump stop")
@@ -75,9 +81,9 @@ class MountTable(Entry):
     """[[mounts]]: three springs and dampers along x, y, z at one place; outputs call them NAME.x, NAME.y, NAME.z."""
 
     bodies: Names = Field(description='two bodies; the second may be "ground"')
-    point: Triple = of("m", "its place")
-    stiffness: NotNegativeTriple = of("N/m", "along x, y, z")
-    damping: NotNegativeTriple = of("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
+    point: Triple = quantity_list("m", "its place")
+    stiffness: NotNegativeTriple = quantity_list("N/m", "along x, y, z")
+    damping: NotNegativeTriple = quantity_list("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
     frame: str | None = Field(None, description=FRAME)
 
 
@@ -86,7 +92,7 @@ class SeatTable(Entry):
 
     body: str = Field(description="body that carries the seat")
     mass: float = quantity("kg", "mass of the occupant")
-    position: Triple = of("m", "the occupant, and the foot of the seat under it")
+    position: Triple = quantity_list("m", "the occupant, and the foot of the seat under it")
     stiffness: float = quantity("N/m", "spring")
     damping: float = quantity("N s/m", "damper", zero=True)
 
@@ -148,8 +154,8 @@ class OutputTable(Strict):
     name: Name
     kind: Kind
     body: str | None = Field(None, description="body, for accelerations and other motion")
-    point: Triple | None = of("m", "point of the body, its centre of mass where nothing is said", None)
-    direction: Triple = of("", "direction or axis", UP)
+    point: Triple | None = quantity_list("m", "point of the body, its centre of mass where nothing is said", None)
+    direction: Triple = quantity_list("", "direction or axis", UP)
     part: str | None = Field(None, description="spring, mount (NAME.z), seat or bar, for travel, travel rate, force")
     tyre: str | None = Field(None, description="tyre, for tyre force and deflection")
 

@@ -12,7 +12,7 @@ from models.machine.compiled import compiled
 from models.machine.stack import array, at, beyond, doubles
 from models.multibody.cut_mechanics import PER_JOINT, PER_MOTION, ROTATES, add_wrench, joint_velocity, locate, move
 from models.multibody.tree import dot, plus, three, times
-from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
 from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 from validation.adams_joints.mechanism import Spring
 
@@ -29,7 +29,7 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
     chain = joints(vehicle)
     kinds = chain[:, 0].astype(int)
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
-    last_body, origin = anchor(vehicle, vehicle.bodies[-1].name)
+    last_body, origin = last_coordinate_and_joint(vehicle, vehicle.bodies[-1].name)
     laws = [
         [
             last_body if spring.turns else -1,

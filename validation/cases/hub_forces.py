@@ -20,7 +20,7 @@ from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
-from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
+from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid_vehicle
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -130,7 +130,7 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
     not change."""
     run = _tilted(vehicle, "hub", TILT, 1.0)
     fall = -0.5 * GRAVITY * np.array([np.sin(TILT), 1 - np.cos(TILT)]) * run.times[:, None] ** 2
-    preloads = np.array([element.held for element in vehicle.elements])
+    preloads = np.array([element.preload for element in vehicle.elements])
     return [
         Observed(
             "hub_forces.gravity_error",
@@ -156,7 +156,7 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
 
 def _toppling(vehicle: CutVehicle) -> Row:
     """Row: under forces that keep their directions in space, the vehicle topples like an inverted pendulum."""
-    run, expected = _tilted(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
+    run, expected = _tilted(vehicle, "inertial", 1e-6, 2.0), float(rigid_vehicle(vehicle).toppling_rates()[0])
     late = np.abs(run.states[[1000, 2000], ROLL])
     return Observed(
         "hub_forces.toppling",
@@ -233,7 +233,7 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
             for path in range(COPIES)
         ]
     )
-    body, at = rigid(vehicle), np.array([LASTING])
+    body, at = rigid_vehicle(vehicle), np.array([LASTING])
     law = body.angle_variance(deviation, step, at)[0]
     sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
     low, high = chi2.ppf([5e-4, 1 - 5e-4], COPIES) / COPIES

@@ -11,7 +11,7 @@ from models.core.noise import normal_samples
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
-from models.vehicles.linear_vehicle import LinearVehicle, OutputRows, poles, shift
+from models.vehicles.linear_vehicle import LinearVehicle, OutputRows, eigenvalue_shifts, eigenvalues
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -113,7 +113,7 @@ def _frequencies() -> list[Row]:
             SYSTEM,
             f"difference of the 19 eigenfrequencies of R19-ride in {engine} from the published ones",
             largest_relative_error(
-                np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES
+                np.abs(eigenvalues(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES
             ),
             "relative",
         ).at_most(1e-5, "six decimals of the expected ones are known", "published")
@@ -212,9 +212,9 @@ def _shift() -> list[Row]:
     move by rounding."""
     rows = []
     for name in SHARES[1]:
-        analytic = shift(*(linearise(of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
+        analytic = eigenvalue_shifts(*(linearise(of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
         for engine in ENGINES:
-            shifted = shift(
+            shifted = eigenvalue_shifts(
                 *(build(engine, of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
             )
             rows.append(

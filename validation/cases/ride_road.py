@@ -12,7 +12,7 @@ from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.frequency import output_densities, signed_wavenumbers, variances_over_wavenumbers
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import Excitation
-from models.road.isotropic import DensityPart, IsotropicRoad, cross_spectrum_of, isotropic_like, spectral_matrix
+from models.road.isotropic import DensityTerm, IsotropicRoad, cross_spectrum_of, isotropic_road_like, spectral_matrix
 from models.road.two_track import (
     CORRELATION_CASES,
     TRACK_DENSITY_LEVEL,
@@ -149,9 +149,9 @@ def _isotropic_rows() -> list[Row]:
     """Rows: closed forms of an isotropic road by Bessel functions, compared with the integrals that define them; effect
     of isotropy."""
     road, apart, k = road_of_level(HALF_TRACK), 2.0 * HALF_TRACK, np.array([0.05, 0.3, 1.0, 3.0])
-    closed = isotropic_like(road, HALF_TRACK).cross_spectrum(k, apart)
+    closed = isotropic_road_like(road, HALF_TRACK).cross_spectrum(k, apart)
     along = cross_spectrum_of(lambda r: float(road.covariance(np.array(r), HALF_TRACK, HALF_TRACK)), list(k), apart)
-    density_part = DensityPart(1e-5, 0.3, 2.6)
+    density_part = DensityTerm(1e-5, 0.3, 2.6)
     across = np.array([_by_surface_density(density_part, float(wavenumber), apart) for wavenumber in k])
     hankel = density_part.density(k, apart)
     return [
@@ -175,7 +175,7 @@ def _isotropic_rows() -> list[Row]:
     ]
 
 
-def _by_surface_density(spectrum_part: DensityPart, k: float, track_distance: float) -> float:
+def _by_surface_density(spectrum_part: DensityTerm, k: float, track_distance: float) -> float:
     """S(k, d) = int Phi(sqrt(k^2 + l^2)) cos(l d) dl, Phi the Hankel transform of the track's autocovariance."""
     w = spectrum_part.waviness
     height = spectrum_part.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
@@ -204,7 +204,7 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
         vehicle,
     )
     by_frequency, isotropic = (
-        _by_frequency(vehicle, road_model) for road_model in (road, isotropic_like(road, HALF_TRACK))
+        _by_frequency(vehicle, road_model) for road_model in (road, isotropic_road_like(road, HALF_TRACK))
     )
     rows = [
         Observed(

@@ -16,7 +16,7 @@ from models.ride.weighting import WEIGHTINGS, weighting_of_standard
 from models.road import two_track
 from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, poles
+from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, eigenvalues
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
@@ -36,7 +36,7 @@ def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[Lin
 
 
 def _one_track(vehicle: LinearVehicle) -> Excitation:
-    return two_track.road_excitation(two_track.road_of_level(1.0), two_track.on_track(vehicle.wheels, 1.0))
+    return two_track.road_excitation(two_track.road_of_level(1.0), two_track.wheels_on_track(vehicle.wheels, 1.0))
 
 
 @cache
@@ -92,7 +92,7 @@ def _published_road() -> float:
 
 def _frequencies() -> float:
     """Errors of the 19 eigenfrequencies of R19-ride, against those that belong to its data."""
-    rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
+    rates = eigenvalues(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
     return largest_relative_error(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
@@ -272,7 +272,9 @@ FAULTS = (
     CampaignFault("a and b swapped", "vehicle", _vehicle(_mirrored_body)),
     CampaignFault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
     CampaignFault(
-        "sign of the anti-roll bar", "vehicle", attribute_patch("models.vehicles.spatial_linear:_twist", _other_twist)
+        "sign of the anti-roll bar",
+        "vehicle",
+        attribute_patch("models.vehicles.spatial_linear:_bar_twist_row", _other_twist),
     ),
     CampaignFault(
         "tyre stiffness per axle for per wheel",

@@ -17,14 +17,14 @@ from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.road_path import RoadPath, road_path
 from models.road.excitation import Excitation
-from models.road.two_track import on_track, road_excitation, road_of_level
+from models.road.two_track import road_excitation, road_of_level, wheels_on_track
 from models.sensors.inertial_unit import (
+    angle_random_walk_of,
     error_rotation,
     euler_mean_square,
     euler_quaternions,
     mean_trace,
     measured_attitude,
-    random_walk,
 )
 from models.sensors.rotations import rotation_matrix
 from models.systems.ride.of_scene import linear_vehicle
@@ -143,7 +143,7 @@ def attitude(implementation: str, folder: Path) -> float:
     attitudes = measured_attitude(rates, 1.0 / SAMPLING_RATE, deviation, start, range(PATHS), seed=5)[-1]
     true = measured_attitude(rates, 1.0 / SAMPLING_RATE, np.zeros(3), start, range(1))[-1]
     traces = np.trace(rotation_matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
-    wanted = mean_trace(random_walk(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
+    wanted = mean_trace(angle_random_walk_of(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
@@ -188,7 +188,9 @@ def indefinite(implementation: str, folder: Path) -> float:
     for speed in (2.0, 7.0, 20.0, 60.0):
         half_car = vehicle(speed)
         P = stationary_covariance(
-            vehicle_with_road(half_car, road_excitation(road_of_level(1.0), on_track(half_car.wheels, 1.0)), speed)
+            vehicle_with_road(
+                half_car, road_excitation(road_of_level(1.0), wheels_on_track(half_car.wheels, 1.0)), speed
+            )
         ).P
         scale = np.sqrt(np.diag(P))
         values = np.linalg.eigvalsh(P / np.outer(scale, scale))

@@ -154,7 +154,7 @@ def _lyapunov_point(ride: PricedRide) -> RoutePoint:
 def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
-    with mock.patch.object(module, "modes", wraps=module.modes_of_matrix) as watched_modes:
+    with mock.patch.object(module, "modes_of_matrix", wraps=module.modes_of_matrix) as watched_modes:
         deviations = swept_deviations(ride, speeds)
     return RoutePoint(
         f"sweep, one of {5 * speeds} points", "decompositions", watched_modes.call_count, ride.errors(deviations), 0.0

@@ -23,7 +23,7 @@ from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import free, limited, linearise, massless
+from models.vehicles.spatial_linear import linearise, mass_matrix_without, reduced_vehicle, remaining_motions
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class Vehicles:
 
     def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         N = self._free_directions(scene)
-        left = limited(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
+        left = reduced_vehicle(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
         states = vehicle_states(left)
         if not len(states.A):
             raise InputError("", "effects", None, "the reduced vehicle has no degree of freedom left")
@@ -184,7 +184,7 @@ class Vehicles:
         names = scene.limits.massless
         key = *self._numbers.of_parts(scene.vehicle, "bodies", "joint_elements"), names
         if key not in self._masses:
-            self._masses[key] = massless(scene.vehicle, names)
+            self._masses[key] = mass_matrix_without(scene.vehicle, names)
         return self._masses[key]
 
     def _free_directions(self, scene: ReducedScene) -> np.ndarray:
@@ -192,7 +192,7 @@ class Vehicles:
         limits = scene.limits
         key = *self._numbers.of_parts(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
         if key not in self._free:
-            self._free[key] = free(scene.vehicle, limits)
+            self._free[key] = remaining_motions(scene.vehicle, limits)
         return self._free[key]
 
 

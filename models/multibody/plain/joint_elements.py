@@ -53,7 +53,7 @@ def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
 
 def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
     """Stiffness, damping, preload and inertia (4, e) of every joint element."""
-    numbers = [(e.stiffness, e.damping, e.held, e.inertia) for e in vehicle.joint_elements]
+    numbers = [(e.stiffness, e.damping, e.preload, e.inertia) for e in vehicle.joint_elements]
     return np.array(numbers).reshape(-1, 4).T
 
 

@@ -77,7 +77,7 @@ def element_travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     """Travel (m,) of every spring, mount and bar over a run, by name: from the design position in m, rad of a bar,
     positive in compression.
     """
-    gauges = tuple(element.gauge() for element in vehicle.elements)
+    gauges = tuple(element.travel_gauge() for element in vehicle.elements)
     still = HubInputs(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
     values = reported(gauged, table(gauged, still, float(run.times[1])), run.times, run.states).elements

@@ -389,7 +389,7 @@ def _outputs_at_steps(
         [accelerations, run.rates[step_numbers], run.positions[step_numbers], table[2 * step_numbers]]
     )
     outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
-    bent = {spring.name for spring in vehicle.springs if spring.bent}
+    bent = {spring.name for spring in vehicle.springs if spring.is_nonlinear}
     pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
     for spec, output, values in zip(vehicle.outputs, linear.outputs, outputs.T, strict=True):
         if spec.kind == "force" and spec.part in bent:

@@ -12,10 +12,10 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.sensors.rotations import (
-    Rule,
+    IntegrationRule,
     conjugate_quaternion,
-    from_cardan,
-    integrate,
+    integrate_attitude,
+    quaternion_from_cardan,
     quaternion_product,
     rotation_vector,
 )
@@ -33,7 +33,11 @@ SINES = {
 """Amplitude (rad), circular frequency (rad/s) and phase of the sines of each angle."""
 TURN = 0.02
 """Steady part of the yaw rate, rad/s: two turns in ten minutes."""
-RULES: dict[str, tuple[Rule, int]] = {"held rates": ("held", 1), "mean rates": ("mean", 2), "cubic rates": ("cubic", 4)}
+RULES: dict[str, tuple[IntegrationRule, int]] = {
+    "held rates": ("held", 1),
+    "mean rates": ("mean", 2),
+    "cubic rates": ("cubic", 4),
+}
 """What ``models.sensors.rotations`` offers, and the order."""
 FIRST_ORDER_METHODS = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
 """Methods of first order; all others are of second, because rates are linear between samples."""
@@ -69,7 +73,7 @@ def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def attitude(times: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) of the motion at times (n,) in s."""
-    return from_cardan(*angles(times)[0].T)
+    return quaternion_from_cardan(*angles(times)[0].T)
 
 
 def gyro(times: np.ndarray) -> np.ndarray:
@@ -99,7 +103,7 @@ def magnus(step: float) -> np.ndarray:
     second_commutator = np.cross(middle, 2 * bend + odd) / 60
     turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + second_commutator) / 240
     # a chain of rotations is what rates that are held for one second each make
-    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
+    return integrate_attitude(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
 
 
 def apart(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
@@ -123,7 +127,7 @@ class AttitudeSolver:
         count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), attitude(np.zeros(1))[0]
         if engine != "reference":
             return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, stride, start, gyro)
-        attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
+        attitudes = integrate_attitude(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
         return Attitudes(attitudes[::stride], {"steps": count, "force calls": count})
 
 
