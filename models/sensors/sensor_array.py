@@ -16,6 +16,7 @@ better known."""
 FLAT_SPREAD_RATIO = 0.1
 """Ratio of the third spread of the sensors to the second below which "auto" takes the formula for sensors in a
 plane."""
+HALF_AND_BIAS = "gives half the angular acceleration plus a bias"
 PLANE_SPREAD_RATIO = 1e-6
 """Ratio of the third spread of the sensors to the second below which they lie in a plane to rounding, so that there is
 no choice."""
@@ -92,7 +93,7 @@ class SensorArray:
             lies = "lie in a plane" if self.lies_in_plane else f"lie nearly in a plane (flatness {flatness:.2g})"
             lines += [
                 f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
-                f"{'gives half the angular acceleration plus a bias' if self.lies_in_plane else self._amplified_noise()}; "
+                f"{HALF_AND_BIAS if self.lies_in_plane else self._amplified_noise()}; "
                 "the formula for a plane is used, integrated together with the rates"
             ]
         gains = ", ".join(f"{value:.2f}" for value in self.noise_gains())

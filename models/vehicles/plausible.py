@@ -125,7 +125,8 @@ def _masses(figures: VehicleFigures) -> Iterator[Finding]:
         yield _query(
             "mass",
             "mass of the vehicle",
-            f"{figures.total_mass:.4g} kg; usual are {USUAL_MASS[0]:g} to {USUAL_MASS[1]:g} kg. {_tonnes(figures.total_mass)}",
+            f"{figures.total_mass:.4g} kg; usual are {USUAL_MASS[0]:g} to {USUAL_MASS[1]:g} kg. "
+            f"{_tonnes(figures.total_mass)}",
             figures.total_mass,
             "kg",
         )
@@ -298,7 +299,8 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
             "frequency",
             f"bodies[{figures.sprung_body.name}]",
             f"sinks {sunk:.4g} m under the vehicle's weight, a "
-            f"natural frequency of {bounce:.3g} Hz; usual are {USUAL_BOUNCE_FREQUENCY[0]:g} to {USUAL_BOUNCE_FREQUENCY[1]:g} Hz. {remedy}",
+            f"natural frequency of {bounce:.3g} Hz; usual are {USUAL_BOUNCE_FREQUENCY[0]:g} to "
+            f"{USUAL_BOUNCE_FREQUENCY[1]:g} Hz. {remedy}",
             bounce,
             "Hz",
         )
@@ -308,7 +310,8 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
             yield _query(
                 "frequency",
                 f"bodies[{wheel}]",
-                f"between road and body it hops at {hop:.3g} Hz; usual are {USUAL_HOP_FREQUENCY[0]:g} to {USUAL_HOP_FREQUENCY[1]:g} Hz. {remedy}",
+                f"between road and body it hops at {hop:.3g} Hz; usual are {USUAL_HOP_FREQUENCY[0]:g} to "
+                f"{USUAL_HOP_FREQUENCY[1]:g} Hz. {remedy}",
                 hop,
                 "Hz",
             )
@@ -319,7 +322,8 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
                 "frequency",
                 f"tyres[{tyre.name}].stiffness",
                 f"{tyre.stiffness:.4g} N/m gives way by "
-                f"{pressed:.3g} m under {figures.static_forces[tyre.name]:.4g} N; usual are {USUAL_TYRE_DEFLECTION[0]:g} to "
+                f"{pressed:.3g} m under {figures.static_forces[tyre.name]:.4g} N; usual are "
+                f"{USUAL_TYRE_DEFLECTION[0]:g} to "
                 f"{USUAL_TYRE_DEFLECTION[1]:g} m. {remedy}",
                 pressed,
                 "m",
@@ -359,7 +363,8 @@ def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
                 "damping",
                 f"springs[{name}].damping",
                 f"{strut.damping:.4g} N s/m is {share:.2g} of the "
-                f"critical damping of what rests on it; usual are {USUAL_DAMPING_RATIO[0]:g} to {USUAL_DAMPING_RATIO[1]:g}. Damping "
+                f"critical damping of what rests on it; usual are {USUAL_DAMPING_RATIO[0]:g} to "
+                f"{USUAL_DAMPING_RATIO[1]:g}. Damping "
                 "is in N s/m, not in N s/mm",
                 share,
                 "1",
