@@ -207,7 +207,7 @@ def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
     plain, _, road = free
     one = vehicle_with_road(plain, road, 20.0)
     split = split_marginal(one.A)
-    assert (split.count_of_marginal_states, split.zeros) == (3, 3)
+    assert (split.count_of_marginal_states, split.zero_count) == (3, 3)
     assert np.linalg.matrix_rank(split.M, 1e-6) == 1  # y and yaw are one Jordan pair
     found = stationary_covariance(one)
     assert set(found.status) == {FINITE}

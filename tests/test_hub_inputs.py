@@ -33,7 +33,7 @@ def test_held_forces_move_the_centre_of_mass_along_parabolas():
     sizes = {engine: centre_gap(r19(), engine, "held") for engine in (*ENGINES, PLAIN)}
     assert max(sizes.values()) < 1e-10  # Runge-Kutta 4 in joint coordinates leaves 5e-12 m
     real = HubForces.hub_inputs
-    with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), held=False)):
+    with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), constant_in_step=False)):
         assert centre_gap(r19(), "reference", "held") > 1e-6  # the last stage of a step reads the next sample
 
 
@@ -123,7 +123,7 @@ def test_an_engine_is_not_asked_for_what_it_lacks():
     with pytest.raises(Refused, match="DOPRI5 is not offered: RK4 or DOP853 or Radau or LSODA"):
         HubModel("reference", r19(), forces.hub_inputs(2e-3, 44), Settings("DOPRI5", 2e-3, 0.088))
     with pytest.raises(Refused, match="held forces change within a step"):
-        HubModel("mujoco", r19(), replace(shaken_rows(), held=True), settings())
+        HubModel("mujoco", r19(), replace(shaken_rows(), constant_in_step=True), settings())
 
 
 def shaken_rows() -> HubInputs:

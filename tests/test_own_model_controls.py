@@ -56,7 +56,11 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
         factors = {"late": 1.0, "constant": 0.0, "small": 1.0 + 1e-6}
         changed = [leg._replace(twin=with_constant_controls(twin, factors[fault] * leg.controls)) for leg in legs]
         first, *rest = changed
-        late = [first._replace(steps=first.steps + 1), *rest[:-1], rest[-1]._replace(steps=rest[-1].steps - 1)]
+        late = [
+            first._replace(step_count=first.step_count + 1),
+            *rest[:-1],
+            rest[-1]._replace(step_count=rest[-1].step_count - 1),
+        ]
         return honest(late if fault == "late" else changed, *words)
 
     honest = marching.path_of_build
@@ -79,7 +83,7 @@ def test_the_ledger_sees_other_controls(twin, tmp_path):
 
 def test_rows_become_legs_that_fill_the_path(twin, tmp_path):
     legs = read_controls(tmp_path / "controls.csv", twin.model).path_sections(twin, 500, 0.002)
-    assert [leg.steps for leg in legs] == [50, 125, 175, 150] and all(isinstance(leg, PathSection) for leg in legs)
+    assert [leg.step_count for leg in legs] == [50, 125, 175, 150] and all(isinstance(leg, PathSection) for leg in legs)
     assert np.array_equal(legs[1].controls, [0.5, 1.0, -3.0, 1.0])  # in the order of the actuators
 
 

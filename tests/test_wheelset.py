@@ -72,7 +72,7 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
 @pytest.mark.grounds("closed form")
 def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     y = 1e-5
-    pose = (y, 0.0, -CHOSEN_WHEELSET.tilt * y, 0.0)
+    pose = (y, 0.0, -CHOSEN_WHEELSET.roll_per_displacement * y, 0.0)
     right, left = (cone_on_rail(side, Pose(*pose), CONE) for side in (RIGHT, LEFT))
     assert (right[0], left[0]) == pytest.approx((0.0, 0.0), abs=3e-11)  # second order: tilt y^2 = 7e-12
     assert (right[1] - left[1]) / (2 * y) == pytest.approx(CHOSEN_WHEELSET.equivalent_conicity, rel=1e-6)
