@@ -186,7 +186,10 @@ def _recover_motions(readings_source: Source, array: SensorArray, options: Optio
     readings_source.quality = fit_quality(array, readings_source.readings, parameters.deviation)
     suspect, readings = readings_source.quality.suspect, readings_source.readings
     recover = partial(
-        recovered_motion, sample_period=readings_source.period, start_state=readings_source.start, zeroed=options.zeroed
+        recovered_motion,
+        sample_period=readings_source.period,
+        start_state=readings_source.start,
+        gravity_corrected=options.zeroed,
     )
     if suspect:
         readings_source.recovered_motions["all sensors, integrated"] = recover(array, readings)

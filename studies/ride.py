@@ -12,7 +12,7 @@ from models.core.result import Result, join_results
 from models.core.strict import Strict, quantity, read
 from models.core.told import derived_result
 from models.core.whole_files import write_whole
-from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
+from models.ride.measures import dynamic_load_factor, exceedance_rate, time_share_beyond
 from models.ride.sweep import Sweep
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import (
@@ -159,13 +159,13 @@ def _save_system(scene: RideScene, linear_vehicle: LinearVehicle, speed: float, 
     """Save the matrices of the linear system at a speed (m/s), and its covariance, for other programs."""
     from models.ride.covariance import stationary_covariance
     from models.ride.excited import vehicle_with_road
-    from models.ride.export import save
+    from models.ride.export import write_exports
     from models.ride.weighting import system_with_weightings
 
     system = system_with_weightings(
         vehicle_with_road(linear_vehicle, excitation_of(scene, linear_vehicle.wheels), speed), scene.weighting
     )
-    save(system, stationary_covariance(system), folder / "system")
+    write_exports(system, stationary_covariance(system), folder / "system")
 
 
 def _summary_of_deviations(sweep: Sweep) -> dict[str, Any]:
@@ -243,10 +243,10 @@ def _travel_lines(vehicle: SpatialVehicle, deviations: Mapping[str, float], free
     for output in parts:
         if output.kind == "travel" and free_travel is not None:
             deviation = deviations[output.name]
-            share = share_beyond(deviation, free_travel)
+            share = time_share_beyond(deviation, free_travel)
             text = f"  {output.name}: beyond {1e3 * free_travel:g} mm for {share:.3g} of the time"
             if output.part in rates:
-                text += f", {3600 * exceedances(deviation, rates[output.part], free_travel):.3g} times an hour"
+                text += f", {3600 * exceedance_rate(deviation, rates[output.part], free_travel):.3g} times an hour"
             lines.append(text)
     return lines
 

@@ -27,13 +27,13 @@ from models.drawing.figures import (
     wrapped_text,
 )
 from models.drawing.figures import COLOURS as ENGINES
-from models.ride.frequency import one_sided
+from models.ride.frequency import one_sided_densities
 from models.ride.statistical_linearisation import ERROR_GRADES
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
 from models.road.excitation import Excitation
 from models.road.fitted import FittedRoad
-from models.road.isotropic import isotropic_like
+from models.road.isotropic import isotropic_road_like
 from models.road.two_track import TwoTrackRoad
 from models.systems.ride.nonlinear import Nonlinear, Ride
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -178,7 +178,7 @@ def spectra_figure(
     """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
     (m/s); no figure if all are 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
-    densities = one_sided(linear_vehicle, excitation, speed, frequency)
+    densities = one_sided_densities(linear_vehicle, excitation, speed, frequency)
     moving_kinds = {output.kind for i, output in enumerate(linear_vehicle.outputs) if densities[:, i].any()}
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moving_kinds]
     if not shown:
@@ -213,7 +213,7 @@ def road_figure(
     left.loglog(wavenumber, road.spectrum(wavenumber, half_track), "k", label="mean and roll process")
     right.semilogx(wavenumber, road.coherency(wavenumber, half_track, -half_track), "k", label="mean and roll process")
     if road.mean.cutoff is None:
-        isotropic_road = isotropic_like(road, half_track)
+        isotropic_road = isotropic_road_like(road, half_track)
         right.semilogx(
             wavenumber,
             isotropic_road.coherency(wavenumber, 2 * half_track),
@@ -366,7 +366,7 @@ def engine_spectra_figure(
     """Save a figure of the spectra of the engines' runs, by Welch's method, and of the statistically linearised
     vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
-    expected = one_sided(linear_vehicle, road, speed, frequency)
+    expected = one_sided_densities(linear_vehicle, road, speed, frequency)
     first = next(iter(runs.values()))
     shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
     figure, axes = _few_panels(len(shown))

@@ -14,7 +14,7 @@ from models.rail.energy import energy_ledger
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.equations import Y
 from models.rail.limit_cycle import positive_maxima
-from models.rail.linear import critical_or_why, kinematic_wavelength, klingel_wavelength
+from models.rail.linear import critical_speed_or_reason, kinematic_wavelength, klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset import conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
@@ -133,7 +133,7 @@ def _stability_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> l
     """Lines for the screen on the critical speed in every engine, or the reason why there is none."""
     lines = [
         "  critical speed with linear creep",
-        f"    {'lateral and yaw motion alone':<34}" + _critical_speed_text(*critical_or_why(wheelset)),
+        f"    {'lateral and yaw motion alone':<34}" + _critical_speed_text(*critical_speed_or_reason(wheelset)),
     ]
     first = next((linear_run.critical_speed for linear_run in linear_results.values()), None)
     return lines + [

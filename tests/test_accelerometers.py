@@ -6,7 +6,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.time_series import write_time_series
 from models.sensors import rigid_body_motion, sensor_array
-from models.sensors.sensor_array import on_bracket, sensor_readings
+from models.sensors.sensor_array import reading_on_bracket, sensor_readings
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from validation.hard_cases import accelerometers as family
@@ -127,7 +127,7 @@ def test_a_bracket_answers_a_ramp_exactly():
     wd, sigma = w0 * np.sqrt(1 - damping**2), damping * w0
     for period in (1e-4, 1e-3, 2e-2):
         t = period * np.arange(round(0.4 / period) + 1)
-        got = on_bracket(np.column_stack([t, 2 * t, 0 * t]), period, frequency, damping)
+        got = reading_on_bracket(np.column_stack([t, 2 * t, 0 * t]), period, frequency, damping)
         # passed on: (2 zeta w0 s + w0^2) / (s^2 (s^2 + 2 zeta w0 s + w0^2)) = 1/s^2 - 1 / (s^2 + 2 zeta w0 s + w0^2)
         truth = t - np.exp(-sigma * t) * np.sin(wd * t) / wd
         assert np.abs(got[:, 0] - truth).max() < 1e-12 and np.abs(got[:, 1] - 2 * truth).max() < 1e-12
@@ -135,9 +135,9 @@ def test_a_bracket_answers_a_ramp_exactly():
 
 def test_a_stiff_bracket_is_a_rigid_mount_and_gravity_passes():
     still_ = np.tile([0.1, 0.0, -9.81], (100, 1))
-    assert np.abs(on_bracket(still_, 1e-3, 5.0, 0.0) - still_).max() < 1e-9
+    assert np.abs(reading_on_bracket(still_, 1e-3, 5.0, 0.0) - still_).max() < 1e-9
     moved = np.sin(0.02 * np.arange(500))[:, None] * [1.0, 0.0, 0.5]  # 3 Hz at 1 kHz
-    assert np.abs(on_bracket(moved, 1e-3, 3000.0, 0.7) - moved).max() < 1e-3
+    assert np.abs(reading_on_bracket(moved, 1e-3, 3000.0, 0.7) - moved).max() < 1e-3
 
 
 @pytest.mark.parametrize(

@@ -238,7 +238,7 @@ def test_shared_by_rule_are_the_laws_and_not_what_only_one_engine_has():
         modules
     )
     assert "models.tyre.bristles:tyre_forces" in compiled and len(compiled) > 200
-    python = "models.tyre.bristles:shape_factor"
+    python = "models.tyre.bristles:cornering_stiffness_factor"
     assert python not in compiled and python in shared_functions([python, "models.core.errors:InputError"])
     assert python not in shared_functions([])
 

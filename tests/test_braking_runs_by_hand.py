@@ -9,7 +9,7 @@ from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.systems.braking.procedures import steer_angles, vehicle_and_start
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
-from models.tyre.tyre_source import named_tyre
+from models.tyre.tyre_source import table_of_named_tyre
 
 pytestmark = pytest.mark.grounds("closed form")
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -26,7 +26,9 @@ def scene(speed, duration, **tables):
 
 def locked_friction(surface):
     """Of a locked wheel of the truck, by wheel."""
-    return np.array([named_tyre(surface).characteristic_values(float(load))["locked"] for load in PLANE.static])
+    return np.array(
+        [table_of_named_tyre(surface).characteristic_values(float(load))["locked"] for load in PLANE.static]
+    )
 
 
 @pytest.mark.parametrize("engine", ENGINES)

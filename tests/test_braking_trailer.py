@@ -22,7 +22,7 @@ from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop, wheel_names
 from models.tyre.magic_formula import table_of_surface
 from models.vehicles.spatial import hitch_of
-from models.vehicles.vehicle_file import SHIPPED
+from models.vehicles.vehicle_file import SHIPPED_FOLDER
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as closed
 from validation.braking.sprung_box import braked_vehicle, car, remaining_speed, steady_torques
@@ -157,7 +157,7 @@ def test_what_is_left_out_is_the_trailer_alone():
 
 
 def test_a_train_that_cannot_brake_is_told(tmp_path):
-    (tmp_path / "mine.toml").write_text((SHIPPED / "r19_caravan.toml").read_text())
+    (tmp_path / "mine.toml").write_text((SHIPPED_FOLDER / "r19_caravan.toml").read_text())
     own = scene(vehicle={"file": str(tmp_path / "mine.toml"), "spin_inertia": 1.7})
     with pytest.raises(InputError, match=r"vehicle\.file = .*: has bodies with a hitch: name a vehicle file"):
         scene_without(own, "towed")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, Curves, Laws, PushingTyres, march
+from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, Curves, ForceLaws, PushingTyres, march
 
 pytestmark = pytest.mark.grounds("plain counterpart")
 N, WHEELS, SPRINGS, OUTPUTS, STEPS, STEP = 3, 2, 2, 2, 12, 2e-3
@@ -21,7 +21,7 @@ def laws(random):
     """Random laws; the second wheel has a tyre that only pushes."""
     forces = SPRINGS + 1
     tyres = PushingTyres(np.array([1]), np.array([0.3]), np.array([2.0]), np.array([0.4]), random.normal(size=(1, N)))
-    return Laws(
+    return ForceLaws(
         random.normal(size=(SPRINGS, N)),
         random.normal(size=(N, 2 * N + 2 * WHEELS + forces)),
         random.normal(size=(OUTPUTS, 3 * N + 2 * WHEELS + forces)),
@@ -45,16 +45,16 @@ def on_curve(of, spring, x):
 def rates(x, road, of):
     """Rates (2 N, copies) and nonlinear forces (s + u, copies) by the laws' definitions."""
     q, v, tyre = x[:N], x[N:], of.tyres
-    travel, slip = of.rows @ q, of.rows @ v
+    travel, slip = of.travel_rows @ q, of.travel_rows @ v
     bent = [on_curve(of.by_travel, s, travel[s]) + on_curve(of.by_rate, s, slip[s]) for s in range(SPRINGS)]
-    dry = of.friction[:, None] * np.tanh(slip / of.turning[:, None])
+    dry = of.friction[:, None] * np.tanh(slip / of.friction_rate[:, None])
     off = []
     for u, wheel in enumerate(tyre.wheel):
         elastic = tyre.load[u] + tyre.stiffness[u] * (road[wheel] - tyre.heights[u] @ q)
         linear = elastic + tyre.damping[u] * (road[WHEELS + wheel] - tyre.heights[u] @ v)
         off.append(np.where(elastic > 0.0, np.clip(linear, 0.0, 2.0 * np.abs(elastic)), 0.0) - linear)
     force = np.vstack((bent + dry, off))
-    return np.vstack((v, of.motion @ np.vstack((x, road, force)))), force
+    return np.vstack((v, of.acceleration_rows @ np.vstack((x, road, force)))), force
 
 
 def marched(x, roads, of, first, every):
@@ -64,7 +64,7 @@ def marched(x, roads, of, first, every):
         begin, middle, end = roads[2 * i : 2 * i + 3]
         k1, force = rates(x, begin, of)
         if i >= first and (i - first) % every == 0:
-            y = of.read @ np.vstack((x, begin, k1[N:], force))
+            y = of.output_rows @ np.vstack((x, begin, k1[N:], force))
             sums += np.array([y**power for power in (1, 2, 3, 4)])
         k2 = rates(x + 0.5 * STEP * k1, middle, of)[0]
         k3 = rates(x + 0.5 * STEP * k2, middle, of)[0]

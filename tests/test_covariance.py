@@ -11,7 +11,7 @@ from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covar
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.frequency import spectral_densities, variances_by_quadrature
 from models.ride.marginal import Unstable, split_marginal
-from models.ride.sweep import ASKED_FOR, variance_sweep
+from models.ride.sweep import DIRECT_BY_REQUEST, variance_sweep
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import Excitation
 from models.road.two_track import CORRELATION_CASES, road_excitation, road_of_level
@@ -207,7 +207,7 @@ def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
     plain, _, road = free
     one = vehicle_with_road(plain, road, 20.0)
     split = split_marginal(one.A)
-    assert (split.count_of_marginal_states, split.zeros) == (3, 3)
+    assert (split.count_of_marginal_states, split.zero_count) == (3, 3)
     assert np.linalg.matrix_rank(split.M, 1e-6) == 1  # y and yaw are one Jordan pair
     found = stationary_covariance(one)
     assert set(found.status) == {FINITE}
@@ -289,7 +289,7 @@ def test_the_fast_route_equals_the_direct_one(truck):
     filters = {"driver": "Wk", "cab": "Wk", "frame centre": "Wd"}  # repeated poles
     quick = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters)
     slow = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, fast=False)
-    assert quick.direct_counts == {} and slow.direct_counts == {ASKED_FOR: 10}
+    assert quick.direct_counts == {} and slow.direct_counts == {DIRECT_BY_REQUEST: 10}
     assert quick.outputs[-1] == "frame centre Wd" and (quick.status == slow.status).all()
     told = slow.variance > 1e-20  # below, an output is zero by symmetry
     np.testing.assert_allclose(quick.variance[told], slow.variance[told], rtol=1e-10)

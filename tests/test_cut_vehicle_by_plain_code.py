@@ -9,7 +9,7 @@ from models.engines.cut_vehicle import PLAIN_ENGINE, build
 from models.multibody.cut_kernel import set_joint_forces
 from models.multibody.cut_table import HubInputs
 from models.multibody.plain.hubs import PlainHubs
-from models.multibody.plain.motion import FIRST, PLACE, REST
+from models.multibody.plain.motion import BIAS, FIRST_DERIVATIVE, PLACE
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from validation.spatial.cars import r19, rough_car, static_forces, twin
@@ -84,7 +84,7 @@ def test_points_feel_the_second_derivative_of_their_places():
     motion, q2 = plain.bodies.move(q, v), plain.acceleration(0.0, q, v)
     for point in points:
         at = motion.at(plain.bodies.points([(point.body, point.position)]))[0]
-        space = at[REST] + q2 @ at[FIRST:] + np.array([0.0, 0.0, vehicle.tree.gravity * point.gravity])
+        space = at[BIAS] + q2 @ at[FIRST_DERIVATIVE:] + np.array([0.0, 0.0, vehicle.tree.gravity * point.gravity])
         expected = space @ motion.axes(plain.bodies.row[point.body])[PLACE]
         names = [name for name in felt if name.startswith(point.name)]
         assert [felt[name] for name in names] == pytest.approx(expected.tolist(), rel=1e-9, abs=1e-9), names

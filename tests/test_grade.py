@@ -10,7 +10,7 @@ from models.engines.assembly import Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
 from models.road import SineProfile, SplineProfile
-from models.road.grade import TRANSITION_LENGTH, Graded
+from models.road.grade import TRANSITION_LENGTH, GradedRoad
 from models.road.signal import RoadUnderWheels
 from models.road.study import hills_road
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -22,7 +22,7 @@ FLAT = SineProfile(np.zeros(1), np.ones(1), np.zeros(1), 0.0, "flat")
 @pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("grade", [0.1, -0.3])
 def test_height_is_that_of_its_definition(grade):
-    road, slope = Graded(FLAT, grade, 40.0), math.tan(grade)
+    road, slope = GradedRoad(FLAT, grade, 40.0), math.tan(grade)
     s = np.array([-5.0, 40.0, 40.0 + TRANSITION_LENGTH, 1000.0])
     # up to rounding of some 100 m
     climbed = np.array([0.0, 0.0, TRANSITION_LENGTH / 2, 940.0])
@@ -31,7 +31,7 @@ def test_height_is_that_of_its_definition(grade):
 
 
 def test_slope_is_the_derivative_and_both_have_no_jump():
-    road, step = Graded(hills_road(), 0.2, 40.0), 1e-4
+    road, step = GradedRoad(hills_road(), 0.2, 40.0), 1e-4
     s = 60.0 + step * np.arange(-250_000, 250_000)
     height, slope = road.height_and_slope(s)
     # trapezoidal rule: third derivatives of about 1e-3 / m^2 times 1e-12 m^3 / 12 per step, then rounding of heights
@@ -42,7 +42,7 @@ def test_slope_is_the_derivative_and_both_have_no_jump():
 
 
 def test_three_ways_to_ask_agree():
-    road = Graded(hills_road(), 0.1, 40.0)
+    road = GradedRoad(hills_road(), 0.1, 40.0)
     uniform = np.array(road.sample_uniform(3.0, 0.7, 200))
     every = np.array([road.height_slope_at(3.0 + 0.7 * i) for i in range(200)]).T
     np.testing.assert_allclose(uniform, np.array(road.height_and_slope(3.0 + 0.7 * np.arange(200))), atol=1e-12)
@@ -52,9 +52,9 @@ def test_three_ways_to_ask_agree():
 @pytest.mark.grounds("closed form")
 def test_its_extent_and_finest_detail_are_the_profiles():
     spline = SplineProfile.through(np.arange(9.0), np.zeros(9))
-    assert Graded(spline, 0.1, 1.0).extent == (0.0, 8.0)
-    assert Graded(spline, 0.1, 1.0).finest == 1.0
-    assert Graded(FLAT, 0.1, 0.0).finest == math.pi / 2
+    assert GradedRoad(spline, 0.1, 1.0).extent == (0.0, 8.0)
+    assert GradedRoad(spline, 0.1, 1.0).finest == 1.0
+    assert GradedRoad(FLAT, 0.1, 0.0).finest == math.pi / 2
 
 
 @pytest.mark.grounds("closed form")
@@ -74,7 +74,7 @@ def test_steady_climb_has_the_pitch_of_the_grade(engine, parameters, geometry):
     )
     assembly = assembly_of_scene(own)
     rest, wheelbase = assembly.initial[3], assembly.parameters.a + assembly.parameters.b
-    road = RoadUnderWheels(Graded(FLAT, grade, 0.0), 20.0, wheelbase)
+    road = RoadUnderWheels(GradedRoad(FLAT, grade, 0.0), 20.0, wheelbase)
     run = build(engine, assembly.with_input("road", road), Settings(RECOMMENDED[engine], 1e-3, duration)).run()
     exact = geometry == "exact"
     pitch = math.asin(math.sin(rest) + math.tan(grade)) if exact else rest + math.tan(grade)
@@ -101,7 +101,7 @@ def test_grade_of_a_scene_is_added_after_the_fade_in(source, keys):
 
 
 def test_a_grade_that_is_not_named_is_not_computed():
-    assert not isinstance(assembly_of_scene(scene("hills")).input.profile, Graded)
+    assert not isinstance(assembly_of_scene(scene("hills")).input.profile, GradedRoad)
 
 
 @pytest.mark.parametrize("grade", [0.5, -0.6, float("nan")])

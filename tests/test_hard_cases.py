@@ -131,9 +131,9 @@ def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypa
         form, (scale, _) = marginal.matrix_balance(A, permute=False, separate=True)
         return form, scale, float(np.linalg.norm(form, 2))
 
-    undamped = marginal._of_undamped
+    undamped = marginal._growth_by_undamped
     monkeypatch.setattr(marginal, "_balanced_matrix", balanced)
-    monkeypatch.setattr(marginal, "_of_undamped", lambda *own: undamped(*own[:-1], np.inf))
+    monkeypatch.setattr(marginal, "_growth_by_undamped", lambda *own: undamped(*own[:-1], np.inf))
     assert found(ride, "no damping, road that next to walks", "reference", tmp_path) == "SILENT"
 
 

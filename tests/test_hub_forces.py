@@ -16,7 +16,7 @@ from models.systems.hub_forces.measurement import Angles, HubForces, recorded_me
 from models.systems.hub_forces.run import run, with_angles
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate, inputs_with_moments
-from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
+from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid_vehicle
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save
 from validation.cases import hub_forces as case
@@ -46,7 +46,7 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
         car,
         tree=replace(car.tree, gravity=0.0),
         loads=0 * car.loads,
-        elements=tuple(replace(element, held=0.0) for element in car.elements),
+        elements=tuple(replace(element, preload=0.0) for element in car.elements),
     )
     model = build("reference", bare, HubInputs(np.zeros((3, 8)), speed=20.0), 1e-3, 1e-3)
     small = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (2, n))
@@ -100,7 +100,7 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
 
 @pytest.mark.grounds("closed form")
 def test_the_laws_of_the_rigid_vehicle():
-    car = rigid(r19())
+    car = rigid_vehicle(r19())
     # two equal forces up, left and right, do not roll; one alone does by its arm
     both = np.zeros((2, 24))
     both[0, [2, 8]], both[1, 2] = 100.0, 100.0

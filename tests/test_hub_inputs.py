@@ -40,15 +40,15 @@ def test_held_forces_move_the_centre_of_mass_along_parabolas():
     sizes = {engine: centre_of_mass_error(r19(), engine, "held") for engine in (*ENGINES, PLAIN_ENGINE)}
     assert max(sizes.values()) < 1e-10  # Runge-Kutta 4 in joint coordinates leaves 5e-12 m
     real = HubForces.hub_inputs
-    with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), held=False)):
+    with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), constant_in_step=False)):
         assert centre_of_mass_error(r19(), "reference", "held") > 1e-6  # the last stage of a step reads the next sample
 
 
 def test_spans_end_where_samples_change_and_the_guide_goes_on():
     hubs = np.repeat([[1.0], [1.0], [2.0], [2.0], [2.0]], 2, axis=0)[:-1]
-    hub_inputs = HubInputs(hubs, guide=np.arange(9.0)[:, None] * np.ones(6), held=True)
-    assert hub_inputs.spans() == [(0, 2), (2, 4)]
-    part = hub_inputs.during(2, 4)
+    hub_inputs = HubInputs(hubs, guide=np.arange(9.0)[:, None] * np.ones(6), constant_in_step=True)
+    assert hub_inputs.constant_force_spans() == [(0, 2), (2, 4)]
+    part = hub_inputs.in_steps(2, 4)
     assert part.hubs.ravel().tolist() == [2.0] * 5 and part.guide[:, 0].tolist() == [4.0, 5.0, 6.0, 7.0, 8.0]
 
 
@@ -130,7 +130,7 @@ def test_an_engine_is_not_asked_for_what_it_lacks():
     with pytest.raises(Refused, match="DOPRI5 is not offered: RK4 or DOP853 or Radau or LSODA"):
         HubModel("reference", r19(), forces.hub_inputs(2e-3, 44), Settings("DOPRI5", 2e-3, 0.088))
     with pytest.raises(Refused, match="held forces change within a step"):
-        HubModel("mujoco", r19(), replace(shaken_rows(), held=True), settings())
+        HubModel("mujoco", r19(), replace(shaken_rows(), constant_in_step=True), settings())
 
 
 def shaken_rows() -> HubInputs:

@@ -17,7 +17,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
-from models.vehicles.vehicle_file import SHIPPED, load_vehicle, shipped
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, load_vehicle, shipped_vehicles
 from studies.command.asked import findings_of, load_scene
 from validation.common.scenes import road_scene
 
@@ -96,7 +96,7 @@ def test_doubts_about_a_vehicle_stand_beside_its_refusal(twinrig, capsys):
 
 def test_a_wheel_that_carries_nothing_is_told_and_ends_no_run(twinrig, capsys, tmp_path):
     """The centre of mass lies ahead of both axles: the rear wheel pulls on the road."""
-    vehicle = (SHIPPED / "half_car.toml").read_text()
+    vehicle = (SHIPPED_FOLDER / "half_car.toml").read_text()
     ahead = vehicle.replace("position = [-0.011052666963241803,", "position = [5.0,")
     assert ahead != vehicle
     (tmp_path / "car.toml").write_text(ahead)
@@ -216,7 +216,7 @@ def test_an_error_refuses_the_run_unless_it_is_accepted(tmp_path):
 
 
 def test_shipped_vehicles_raise_no_query():
-    assert not [finding for name in shipped() for finding in plausible(load_vehicle(name, towing=True))]
+    assert not [finding for name in shipped_vehicles() for finding in plausible(load_vehicle(name, allows_towing=True))]
     assert not plausible_plane(itwm_drift.PARAMETERS) and not plausible_plane(TWIN)
 
 

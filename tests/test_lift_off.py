@@ -194,15 +194,15 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
     own = scene({"road": ROAD}, duration=1.5)
     truth = simulate(own, "exudyn")
     for law in (
-        lambda y, u, p: pitch_plane_equations.tyres(y, u, p),
-        lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.tyres(y, u, p)),
+        lambda y, u, p: pitch_plane_equations.linear_tyres(y, u, p),
+        lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.linear_tyres(y, u, p)),
     ):
         assembly = assembly_of_scene(own)
         model = build("reference", assembly, settings_of(own, "reference"))
         dy = np.empty(8)
 
         def wrong(y, u, p, law=law, dy=dy):
-            struts = pitch_plane_equations.suspension(y, p, np.sin(y[3]), np.cos(y[3]))
+            struts = pitch_plane_equations.suspension_forces(y, p, np.sin(y[3]), np.cos(y[3]))
             pitch_plane_equations.newton_euler(y, law(y, u, p), struts, np.cos(y[3]), p, dy)
             return dy
 
@@ -289,7 +289,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     assert force.min() == pytest.approx(-load) and 0.1 < (force <= -load + 1e-9).mean() < 0.6
     march = CopiesMarch(vehicle, 20.0, road.step, 1)
     march.states = np.zeros((2 * len(vehicle.coordinates()), 1))  # the engines begin at rest in the design position
-    march.march_over(road.table(runs[0].run.counts["steps"], 2)[:, :, None], 0)
+    march.march_over(road.wheel_heights_and_rates(runs[0].run.counts["steps"], 2)[:, :, None], 0)
     # a quarter car goes up and down alone, so that small motion is all that it has
     assert np.abs(march.states[:, 0] - np.concatenate([runs[1].run.positions[-1], runs[1].run.rates[-1]])).max() < 1e-11
 

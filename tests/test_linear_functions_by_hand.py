@@ -17,12 +17,18 @@ from models.multibody.numbers import _frame, _put_curves
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.multibody.plain.motion import generator
 from models.rail.equations import ROLL, YAW, Equations, Y
-from models.rail.linear import _contact_kinematics, critical_or_why, kalker_matrix, largest_growth, linear_matrices
+from models.rail.linear import (
+    _contact_kinematics,
+    critical_speed_or_reason,
+    kalker_matrix,
+    largest_growth,
+    linear_matrices,
+)
 from models.rail.wheel_forces import plain_rails
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.ride.covariance import rounding_thresholds
 from models.ride.excited import _range_and_kernel
-from models.ride.sweep import modes, variance_sweep
+from models.ride.sweep import modes_of_matrix, variance_sweep
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, _both_filters, half_track
 from models.systems.bicycle.run import assumptions
@@ -150,7 +156,7 @@ def test_a_singular_matrix_is_split_into_its_range_and_its_null_space():
 
 def test_rounding_of_the_slowest_decay_is_that_of_the_fastest_motion():
     """An uncoupled system, whose eigenvectors are perpendicular: 8 against 0.25."""
-    system = modes(np.diag([-8.0, -0.25, -2.0]))
+    system = modes_of_matrix(np.diag([-8.0, -0.25, -2.0]))
     assert system.condition == 1.0
     assert system.rate_rounding == pytest.approx(np.finfo(float).eps * 8.0 / 0.25, rel=1e-12, abs=0.0)
 
@@ -217,7 +223,7 @@ def test_creepages_of_cones_are_those_of_their_rolling_radii():
 
 
 def test_at_its_critical_speed_a_motion_neither_grows_nor_dies():
-    critical, why = critical_or_why(W)
+    critical, why = critical_speed_or_reason(W)
     assert why == "" and abs(largest_growth(W, critical)) < 1e-9 * abs(largest_growth(W, 0.9 * critical))
     assert largest_growth(W, 0.995 * critical) < 0.0 < largest_growth(W, 1.005 * critical)
 
@@ -242,7 +248,7 @@ def test_the_fastest_rate_of_a_wheelset_is_its_matrix_s_spectral_radius():
 
 
 def test_a_growth_that_is_written_out_has_its_own_critical_speed():
-    assert critical_or_why(W, lambda _, speed: speed - 62.5)[0] == pytest.approx(62.5, rel=1e-9)
+    assert critical_speed_or_reason(W, lambda _, speed: speed - 62.5)[0] == pytest.approx(62.5, rel=1e-9)
 
 
 def wheelset_scene(**run):
@@ -253,7 +259,7 @@ def wheelset_scene(**run):
 
 def test_paths_of_a_wheelset_begin_where_their_scene_says_at_speeds_about_the_critical_one():
     assert path_speeds(wheelset_scene(speeds=[12.5, 30.25])) == [12.5, 30.25]
-    critical, _ = critical_or_why(W)
+    critical, _ = critical_speed_or_reason(W)
     assert path_speeds(wheelset_scene()) == [round(0.9 * critical, 2), round(1.1 * critical, 2)]
     # the wheel that bears more yields more: 0.2 % of the roll
     scene = wheelset_scene(displacement=2.5e-3, yaw=1.25e-3, speeds=[12.5])

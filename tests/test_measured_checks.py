@@ -34,7 +34,7 @@ from models.systems.measured.inputs import Inputs
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import filter_doubts
 from models.systems.measured.virtual import VirtualMeasurement, recording_of_samples
-from models.vehicles.cut_vehicle import rigid
+from models.vehicles.cut_vehicle import rigid_vehicle
 from validation.cases import measured_checks as case
 from validation.measured import planted as bench
 from validation.spatial.cars import r19
@@ -187,7 +187,7 @@ def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
         weight.mean_hub_moments(Evidence(recording_of_samples(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
         for i, own in enumerate(values)
     )
-    arm = rigid(ridden.vehicle).arms[0]
+    arm = rigid_vehicle(ridden.vehicle).arms[0]
     assert not clean.any() and off == pytest.approx([30 * arm[1], -30 * arm[0]], rel=0.1)
 
 
@@ -207,7 +207,7 @@ def test_hub_forces_explain_the_motion_through_the_vehicle_and_only_with_their_s
 def test_slow_forces_on_a_free_vehicle_are_felt_as_force_by_mass(axis):
     # at 0.01 Hz nothing inside the car moves: 1 N shared out as the loads are makes 1 / m at the centre of mass, along
     # y too, where the vehicle rolls far and what a sensor feels of its weight takes the sideways acceleration back
-    car, whole = r19(), rigid(r19())
+    car, whole = r19(), rigid_vehicle(r19())
     felt = Signal("a", "", "a", "acceleration", "body", "xyz"[axis], "body", 1, "m/s^2", 1.0)
     place = TransducerPlace("body", tuple(whole.centre))
     response = SensorResponse(car, "hub").at(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]

@@ -24,7 +24,7 @@ from models.systems.measured.verdict import Band, ChannelComparison, disagreemen
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
 from models.systems.measured.virtual import check as check_virtual
 from models.systems.pitch_plane.run import run as simulate
-from models.vehicles.cut_vehicle import CutVehicle, cut, rigid
+from models.vehicles.cut_vehicle import CutVehicle, cut, rigid_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.scenes import road_scene
 
@@ -164,7 +164,7 @@ def test_transducers_agree_with_one_another(car: CutVehicle, driven: VirtualMeas
     assert np.abs(lever + roll)[5:-5].max() < 0.1 * np.abs(roll).max()  # about x, upwards is leftwards turned round
     spring = car.elements[[element.name for element in car.elements].index("front left")]
     law = (
-        spring.held
+        spring.preload
         + spring.stiffness * value["front left_travel"]
         + spring.damping * np.gradient(value["front left_travel"], driven.step)
     )
@@ -173,7 +173,7 @@ def test_transducers_agree_with_one_another(car: CutVehicle, driven: VirtualMeas
 
 @pytest.mark.grounds("closed form")
 def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
-    own, deviation = rigid(car), np.tile([8.0] * 3 + [1.0] * 3, 4)
+    own, deviation = rigid_vehicle(car), np.tile([8.0] * 3 + [1.0] * 3, 4)
     bias = np.zeros(24)
     bias[2] = 5.0
     level = Level(8.0, 1.0, bias, tilt=(0.01, 0.0), rate=(0.0, 0.02))
@@ -185,7 +185,9 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     assert np.allclose(hub.mean_errors["tilt at the start"][-1], [0.01, 0.0, 0.0])
     space = predicted_drift(car, level, PERIOD, 2.0, "inertial")
     late = space.mean_errors["tilt at the start"][[1000, 2000], 0]
-    assert abs(np.log(late[1] / late[0]) / own.toppling()[0] - 1) < 0.01  # cosh has become exp, products are small
+    assert (
+        abs(np.log(late[1] / late[0]) / own.toppling_rates()[0] - 1) < 0.01
+    )  # cosh has become exp, products are small
     assert hub.passing_time(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
     assert hub.angle > space.angle and space.trusted_time < hub.trusted_time == 8.0
     off = position(car, Level(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]

@@ -6,8 +6,14 @@ from scipy.linalg import block_diag, expm
 
 from models.core.errors import InputError
 from models.ride.covariance import stationary_covariance
-from models.ride.monte_carlo import LEGENDRE_MODES, _Cells, at_constant_speed, path_cell, variances_along_drive
-from models.ride.road_in_path import at_speed
+from models.ride.monte_carlo import (
+    LEGENDRE_MODES,
+    _Cells,
+    path_cell,
+    variances_along_drive,
+    variances_at_constant_speed,
+)
+from models.ride.road_in_path import system_at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
 from validation.cases.ride_varying_speed import vehicle_and_road
@@ -56,14 +62,14 @@ def test_copies_along_a_drive_agree_with_the_covariance():
 def test_copies_at_constant_speed_agree_with_the_covariance(case):
     vehicle, road = vehicle_and_road("half_car")
     road = road if case == "delayed" else type(road)(road.F, road.G, road.heights, road.lengths, independent=True)
-    found = at_constant_speed(vehicle, road, 15.0, 6.0, copies=512, seed=SEED)
-    exact = stationary_covariance(at_speed(vehicle, road, 15.0))
+    found = variances_at_constant_speed(vehicle, road, 15.0, 6.0, copies=512, seed=SEED)
+    exact = stationary_covariance(system_at_speed(vehicle, road, 15.0))
     assert (found.error / found.variance).max() < 0.03  # sharp enough to tell the two cases, 30 % apart at the centre
     assert np.abs(found.z(exact.deviation[None])).max() < 4.0
 
 
 def test_outputs_with_white_noise_have_no_variance_and_no_z():
-    found = at_constant_speed(*vehicle_and_road("half_car", 100.0), 15.0, 0.1, copies=16, seed=SEED)
+    found = variances_at_constant_speed(*vehicle_and_road("half_car", 100.0), 15.0, 0.1, copies=16, seed=SEED)
     force = found.names.index("tyre force front left")
     assert np.isinf(found.variance[0, force])
     assert np.isnan(found.z(np.full((1, len(found.names)), np.inf))[0, force])

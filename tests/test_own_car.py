@@ -16,7 +16,7 @@ from models.engines.export import ExportSubject
 from models.engines.spatial_protocol import build as build_spatial
 from models.multibody.numbers import Controls, Handling
 from models.multibody.plain.rolling import PlainRolling
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.own_model.car import vehicle_of_file
 from models.systems.braking import plan as braking_plan
 from models.systems.handling import plan as handling_plan
@@ -112,7 +112,7 @@ def test_engines_accelerate_it_as_the_plain_equations_do(saloon, drives):
 
 def test_loads_at_rest_are_those_of_the_plain_statics(saloon):
     handling = Handling(saloon)
-    held, loads = held_at_rest(handling.vehicle, CARRIER)
+    held, loads = preloads_at_rest(handling.vehicle, CARRIER)
     assert loads == pytest.approx(list(handling.held.tyres.values()), rel=1e-10)
     assert held == pytest.approx([handling.held.parts[e.name] for e in saloon.joint_elements], rel=1e-9, abs=1e-6)
     assert sum(loads) == pytest.approx(9.81 * sum(body.mass for body in saloon.bodies), rel=1e-9)

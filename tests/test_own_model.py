@@ -14,17 +14,24 @@ from models.advice.own_model_price import recommended_settings
 from models.core.errors import InputError, RunFailed
 from models.engines.free_vehicle import free_model
 from models.own_model import certificate as certifying
-from models.own_model.builds import ALL_BUILDS, SOFT_BUILD, as_parsed, equations_of_build, largest_gap, sliding_states
+from models.own_model.builds import (
+    ALL_BUILDS,
+    SOFT_BUILD,
+    equations_of_build,
+    equations_of_file,
+    largest_gap,
+    sliding_states,
+)
 from models.own_model.certificate import (
     agreement_of_build,
     certificate,
-    moved_at,
+    comparison_states,
+    motion_at,
     reference_of_file,
     softness_difference,
-    states_of,
 )
-from models.own_model.coordinates import turned_by_angles
-from models.own_model.elements import elements_of_model, told_apart
+from models.own_model.coordinates import rotation_by_angles
+from models.own_model.elements import distinct_texts, elements_of_model
 from models.own_model.explain import compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
@@ -87,7 +94,7 @@ def as_drawn(twin):
 
 def test_dry_friction_and_couplings_are_those_of_the_file(geared):
     """To rounding; a coupling or a friction that is 1 % off is seen in every build."""
-    states = states_of(geared, 20)
+    states = comparison_states(geared, 20)
     assert (
         len(sliding_states(geared, states)) == len(states) > len(sliding_states(geared, as_drawn(geared)))
     )  # faster rates slide
@@ -102,13 +109,13 @@ def test_dry_friction_and_couplings_are_those_of_the_file(geared):
 
 def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geared):
     """Far from rigid, and the law all the same: to 1e-8, MuJoCo's tolerance; the fault: another impedance."""
-    states = states_of(geared, 10)
+    states = comparison_states(geared, 10)
     assert softness_difference(geared, 10) > 1e-3
     soft = reference_of_file(geared, states, SOFT_BUILD)
-    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(geared), states)).acceleration < 1e-8
+    assert agreement_of_build("", soft, motion_at(soft_constraint_equations(geared), states)).acceleration < 1e-8
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
-    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(other), states)).acceleration > 1e-4
+    assert agreement_of_build("", soft, motion_at(soft_constraint_equations(other), states)).acceleration > 1e-4
 
 
 SPRUNG = model_with_change(
@@ -188,12 +195,12 @@ def test_a_tendon_without_length_is_not_damped_in_mujoco(tmp_path, height):
 def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
     """To rounding, rigid in two builds; what gives way in MuJoCo is its law; ends that are 1 mm off are seen in all."""
     twin = _read(tmp_path, text).twin
-    states = states_of(twin, 5)
+    states = comparison_states(twin, 5)
     for row in certificate(twin, 5):
         assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
     soft = reference_of_file(twin, states, SOFT_BUILD)
     assert softness_difference(twin, 5) > 1e-3
-    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(twin), states)).acceleration < 1e-8
+    assert agreement_of_build("", soft, motion_at(soft_constraint_equations(twin), states)).acceleration < 1e-8
     ties = twin.driven.connections
     for i, tie in enumerate(ties):
         body, (x, y, z) = tie.ends[0]
@@ -202,7 +209,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
         other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
         yielding = replace(twin, driven=replace(twin.driven, connections=other))
-        assert agreement_of_build("", soft, moved_at(soft_constraint_equations(yielding), states)).acceleration > 1e-5
+        assert agreement_of_build("", soft, motion_at(soft_constraint_equations(yielding), states)).acceleration > 1e-5
 
 
 def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
@@ -211,8 +218,10 @@ def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
     loop, grip = twin.driven.connections
     turned = replace(grip, axes=(grip.axes[0] @ Rotation.from_rotvec((0.0, 0.02, 0.0)).as_matrix(), grip.axes[1]))
     wrong = replace(twin.driven, connections=(loop, turned))
-    assert all(largest_gap(twin, build, states_of(twin, 5)) < 1e-11 for build in ALL_BUILDS)
-    assert all(largest_gap(replace(twin, driven=wrong), build, states_of(twin, 5)) > 1e-3 for build in ALL_BUILDS)
+    assert all(largest_gap(twin, build, comparison_states(twin, 5)) < 1e-11 for build in ALL_BUILDS)
+    assert all(
+        largest_gap(replace(twin, driven=wrong), build, comparison_states(twin, 5)) > 1e-3 for build in ALL_BUILDS
+    )
     monkeypatch.setattr("models.own_model.builds.free_model", lambda build, driven: free_model(build, wrong))
     assert [row.alike for row in certificate(twin, 5)] == [False, False, True]
 
@@ -273,7 +282,7 @@ def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
 )
 def test_differences_of_couplings_and_friction_are_named(tmp_path, geared, name, old, new, kind, owner):
     comparison = compare(geared, _read(tmp_path, model_with_change(GEARED, name, old, new), "b.xml").twin, 5)
-    assert not comparison.alike and comparison.unexplained < 1e-10
+    assert not comparison.alike and comparison.unexplained_difference < 1e-10
     assert [(each.kind, each.owner) for each in comparison.influential] == [(kind, owner)]
 
 
@@ -351,7 +360,7 @@ def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old
     first = comparison.influential[0]
     said = first.sentence(("a.xml", "b.xml"))
     assert said.startswith(f"{kind} of {owner}: ") and size in said, said
-    assert comparison.unexplained < 1e-10
+    assert comparison.unexplained_difference < 1e-10
 
 
 def test_difference_without_influence_is_listed_as_such(tmp_path, original):
@@ -379,12 +388,15 @@ def test_an_actuator_that_one_file_lacks_explains_the_difference(tmp_path, origi
     text = JOINTED.replace("</actuator>", '<position name="hold" joint="hinge" kp="4"/></actuator>')
     comparison = compare(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
     assert {each.owner for each in comparison.influential} == {"actuator 'hold'"}
-    assert comparison.unexplained < 1e-10
+    assert comparison.unexplained_difference < 1e-10
 
 
 def test_joints_without_a_partner_are_named(tmp_path, original):
     comparison = compare(original.twin, _read(tmp_path, CART, "cart.xml").twin, 3)
-    assert comparison.acceleration_agreement is None and "joint 'hinge' of a has no partner" in comparison.unmatched
+    assert (
+        comparison.acceleration_agreement is None
+        and "joint 'hinge' of a has no partner" in comparison.unmatched_coordinates
+    )
 
 
 def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
@@ -422,12 +434,12 @@ LIMITED = model_with_change(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-
 def test_inside_their_ranges_limits_do_nothing(tmp_path):
     """The file's own model with its limits accelerates as without; the fault: states that reach beyond."""
     twin = _read(tmp_path, LIMITED).twin
-    states, struck = states_of(twin, 30), limits_struck(twin)
+    states, struck = comparison_states(twin, 30), limits_struck(twin)
     with_limits = copy(twin.model)
     with_limits.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
 
     def apart(states):
-        moved = moved_at(as_parsed(replace(twin, model=with_limits)), states)
+        moved = motion_at(equations_of_file(replace(twin, model=with_limits)), states)
         return agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved).acceleration
 
     assert apart(states) == 0.0 and not any(struck(q) for q, _ in states)
@@ -450,7 +462,9 @@ def test_what_a_limit_adds_is_no_stop_of_springs(tmp_path):
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_DIAGEXACT)
     model.jnt_solimp[:], model.jnt_solref[:] = (impedance, impedance, 1e-3, 0.5, 2.0), (time, ratio)
     q, v = np.array((0.1, 0.4)), np.array((0.2, 0.3))
-    (free,), (seen,) = (moved_at(as_parsed(replace(twin, model=each)), [(q, v)]) for each in (twin.model, model))
+    (free,), (seen,) = (
+        motion_at(equations_of_file(replace(twin, model=each)), [(q, v)]) for each in (twin.model, model)
+    )
     depth = q[1] - (twin.model.jnt_range[1, 1] - twin.model.jnt_margin[1])
     stiffness, damping = 1.0 / (impedance * time**2 * ratio**2), 2.0 / (impedance * time)
     law = (1.0 - impedance) * free.acceleration[1] - impedance * (stiffness * depth + damping * v[1])
@@ -492,7 +506,7 @@ def test_content_without_an_equal_is_refused_by_name_and_line(tmp_path, kind, el
         read(path)
     assert said in str(error.value) and f"--without {kind}" in str(error.value)
     file = read(path, (kind,))
-    assert [content.kind for content in file.left_out] == [kind]
+    assert [content.kind for content in file.removed_contents] == [kind]
     assert all(row.alike for row in certificate(file.twin, 5))
 
 
@@ -629,8 +643,8 @@ def test_a_hundred_spoilt_files_are_answered(tmp_path):
 def test_angular_velocity_of_the_angles():
     """G rates is the angular velocity in turned axes, and G' rates its rate at constant rates, by differences."""
     angles, rates, h = np.array((0.3, -0.5, 0.8)), np.array((0.7, 1.1, -0.4)), 1e-6
-    before, after = turned_by_angles(angles - h * rates, rates), turned_by_angles(angles + h * rates, rates)
-    rotation, gains, bias = turned_by_angles(angles, rates)
+    before, after = rotation_by_angles(angles - h * rates, rates), rotation_by_angles(angles + h * rates, rates)
+    rotation, gains, bias = rotation_by_angles(angles, rates)
     spin = rotation.T @ (after[0] - before[0]) / (2 * h)
     assert np.allclose([spin[2, 1], spin[0, 2], spin[1, 0]], gains @ rates, atol=1e-9)
     assert np.allclose((after[1] - before[1]) @ rates / (2 * h), bias, atol=1e-9)
@@ -664,5 +678,5 @@ def test_a_mass_that_no_force_moves_is_no_silent_difference(tmp_path):
 
 def test_two_values_are_shown_in_digits_that_tell_them_apart():
     first, second = (np.array([value]) for value in (10.0, 10.00000001))
-    assert told_apart(first, second, "N/m") == ("10 N/m", "10.00000001 N/m")
-    assert told_apart(first, np.zeros(0), "N/m") == ("10 N/m", "none")
+    assert distinct_texts(first, second, "N/m") == ("10 N/m", "10.00000001 N/m")
+    assert distinct_texts(first, np.zeros(0), "N/m") == ("10 N/m", "none")

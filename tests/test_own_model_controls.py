@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.own_model import path as marching
-from models.own_model.control_table import PathSection, constant_leg, held_at, read_controls
+from models.own_model.control_table import PathSection, constant_sections, read_controls, with_constant_controls
 from models.own_model.file import read
 from models.own_model.path import FILE_BUILD_NAME, compare_paths
 from models.own_model.states import random_states
@@ -54,13 +54,17 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
 
     def wrong(legs, *words):
         factors = {"late": 1.0, "constant": 0.0, "small": 1.0 + 1e-6}
-        changed = [leg._replace(twin=held_at(twin, factors[fault] * leg.controls)) for leg in legs]
+        changed = [leg._replace(twin=with_constant_controls(twin, factors[fault] * leg.controls)) for leg in legs]
         first, *rest = changed
-        late = [first._replace(steps=first.steps + 1), *rest[:-1], rest[-1]._replace(steps=rest[-1].steps - 1)]
+        late = [
+            first._replace(step_count=first.step_count + 1),
+            *rest[:-1],
+            rest[-1]._replace(step_count=rest[-1].step_count - 1),
+        ]
         return honest(late if fault == "late" else changed, *words)
 
-    honest = marching.path_by
-    monkeypatch.setattr(marching, "path_by", wrong)
+    honest = marching.path_of_build
+    monkeypatch.setattr(marching, "path_of_build", wrong)
     report = compare_paths(twin, table=table)
     assert not report.alike and report.distances[FILE_BUILD_NAME] > 1e-8
 
@@ -68,18 +72,18 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
 def test_the_ledger_sees_other_controls(twin, tmp_path):
     """The fault: work of the constant controls of the file."""
     legs = read_controls(tmp_path / "controls.csv", twin.model).path_sections(twin, 500, 0.002)
-    path = marching.path_by(legs, "plain", tuple(rows[0] for rows in random_states(twin, 1)), 0.002)
+    path = marching.path_of_build(legs, "plain", tuple(rows[0] for rows in random_states(twin, 1)), 0.002)
     assert (
         marching._energy_imbalance(legs, path, 0.002)
         < 1e-5
         < 1e-2
-        < marching._energy_imbalance(constant_leg(twin, 500), path, 0.002)
+        < marching._energy_imbalance(constant_sections(twin, 500), path, 0.002)
     )
 
 
 def test_rows_become_legs_that_fill_the_path(twin, tmp_path):
     legs = read_controls(tmp_path / "controls.csv", twin.model).path_sections(twin, 500, 0.002)
-    assert [leg.steps for leg in legs] == [50, 125, 175, 150] and all(isinstance(leg, PathSection) for leg in legs)
+    assert [leg.step_count for leg in legs] == [50, 125, 175, 150] and all(isinstance(leg, PathSection) for leg in legs)
     assert np.array_equal(legs[1].controls, [0.5, 1.0, -3.0, 1.0])  # in the order of the actuators
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from models.own_model.explain import compare
 from models.own_model.file import read
-from models.own_model.two_paths import paths_apart
+from models.own_model.two_paths import compare_two_paths
 from studies.command.twin import _comparison_lines
 
 FLAGS = '<option><flag gravity="enable"/></option>'
@@ -52,7 +52,7 @@ def test_what_is_no_number_is_named_with_both_values(tmp_path, old, new, said):
     lines = _comparison_lines(comparison, ("a", "b"))
     assert not comparison.alike and any(said in line for line in lines), lines
     assert all(each.influence is not None for each in comparison.influential)
-    assert comparison.unexplained < 1e-10 and any("both move alike" in line for line in lines)
+    assert comparison.unexplained_difference < 1e-10 and any("both move alike" in line for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -78,12 +78,12 @@ def test_what_makes_another_tree_is_named_and_said_to_be_left(tmp_path, moved, s
     comparison = _compared(tmp_path, text)
     lines = _comparison_lines(comparison, ("a", "b"))
     assert not comparison.alike and any(said in line and "cannot be tried" in line for line in lines), lines
-    assert comparison.unexplained > 1e-3 and any("still differ by" in line for line in lines)
+    assert comparison.unexplained_difference > 1e-3 and any("still differ by" in line for line in lines)
 
 
 def test_a_spring_that_one_file_lacks_brings_its_reference(tmp_path):
     comparison = _compared(tmp_path, MODEL.replace('type="slide"', 'type="slide" stiffness="5" springref=".4"'))
-    assert not comparison.alike and comparison.unexplained < 1e-10
+    assert not comparison.alike and comparison.unexplained_difference < 1e-10
 
 
 def test_paths_of_two_files_are_compared_joint_by_joint(tmp_path):
@@ -95,7 +95,7 @@ def test_paths_of_two_files_are_compared_joint_by_joint(tmp_path):
         _twin(tmp_path, text, f"{i}.xml") for i, text in enumerate((MODEL, turned, MODEL.replace('"3"', '"4"')))
     )
     assert first.names == second.names[::-1]
-    same, other = paths_apart(first, second), paths_apart(first, third)
+    same, other = compare_two_paths(first, second), compare_two_paths(first, third)
     assert same.distance < 1e-12 and same.horizon == 1.0
     assert other.distance > 1e-3 and other.worst == "joint 'a'" and "most at joint 'a'" in other.line()
 

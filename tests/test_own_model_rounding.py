@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from models.own_model import certificate as certifying
-from models.own_model.builds import SOFT_BUILD, Moved, equations_of_build
-from models.own_model.certificate import agreement_of_build, certificate, moved_at, reference_of_file, states_of
+from models.own_model.builds import SOFT_BUILD, Motion, equations_of_build
+from models.own_model.certificate import (
+    agreement_of_build,
+    certificate,
+    comparison_states,
+    motion_at,
+    reference_of_file,
+)
 from models.own_model.explain import compare
 from models.own_model.file import read
 from models.own_model.rounding import _with_solver_rounding
@@ -72,9 +78,9 @@ def test_rounding_of_a_stiff_constraint_is_no_difference(tmp_path, safe):
     twin = _read(tmp_path, stiff).twin
     assert all(row.alike for row in certificate(twin, 20))
     apart = 1.0 + 1e-3
-    state = [(q * apart, v) for q, v in states_of(twin, 5)]
+    state = [(q * apart, v) for q, v in comparison_states(twin, 5)]
     assert agreement_of_build(
-        "", reference_of_file(twin, state, SOFT_BUILD), moved_at(equations_of_build(twin, SOFT_BUILD), state)
+        "", reference_of_file(twin, state, SOFT_BUILD), motion_at(equations_of_build(twin, SOFT_BUILD), state)
     ).alike
 
 
@@ -106,6 +112,6 @@ def test_solving_rounds_a_light_coordinate_only_where_the_mass_matrix_couples_it
     """The second coordinate accelerates a million times as much; by hand |M^-1| |M| |a|."""
     none, acceleration = np.zeros(2), np.array([1.0, 1e6])
     for off, expected in ((0.0, acceleration), (0.5, np.array([[5.0, 4.0], [4.0, 5.0]]) / 3.0 @ acceleration)):
-        moved = Moved(np.array([[1.0, off], [off, 1.0]]), none, acceleration)
-        solved = _with_solver_rounding(Moved(np.zeros((2, 2)), none, none), moved)
+        moved = Motion(np.array([[1.0, off], [off, 1.0]]), none, acceleration)
+        solved = _with_solver_rounding(Motion(np.zeros((2, 2)), none, none), moved)
         assert solved.acceleration == pytest.approx(expected, rel=1e-12)

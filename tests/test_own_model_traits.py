@@ -7,7 +7,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.own_model.builds import sliding_states
-from models.own_model.certificate import certificate, states_of
+from models.own_model.certificate import certificate, comparison_states
 from models.own_model.constraints import plain_constraints
 from models.own_model.file import read
 from models.own_model.limits import limits_struck
@@ -80,7 +80,7 @@ def test_every_build_moves_as_the_file_does(tmp_path, text):
 def test_friction_that_sticks_in_mujoco_has_its_whole_force_elsewhere(tmp_path):
     """1 % more of it is seen in both builds with Coulomb's law; MuJoCo's holds still whatever it is."""
     twin = _twin(tmp_path, STUCK)
-    assert sliding_states(twin, states_of(twin, 20)) == [] and len(states_of(twin, 20)) >= 18
+    assert sliding_states(twin, comparison_states(twin, 20)) == [] and len(comparison_states(twin, 20)) >= 18
     more = tuple(replace(friction, force=1.01 * friction.force) for friction in twin.driven.frictions)
     wrong = certificate(replace(twin, driven=replace(twin.driven, frictions=more)), 20)
     assert [row.acceleration > 1e-5 for row in wrong] == [True, False, True]
@@ -136,5 +136,5 @@ def test_a_path_begins_where_dry_friction_slides_and_no_limit_acts(tmp_path):
 def test_states_that_close_a_finger_stay_in_its_ranges(tmp_path):
     twin = _twin(tmp_path, GRIPPER)
     low, high = file_limits(twin.model)
-    for q, _ in states_of(twin, 20):
+    for q, _ in comparison_states(twin, 20):
         assert ((low <= q) & (q <= high)).all() and abs(plain_constraints(twin).gap(q).size).max() < 1e-11

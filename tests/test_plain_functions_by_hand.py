@@ -17,7 +17,7 @@ from models.drift.score import low_pass, root_mean_square
 from models.multibody.numbers import Handling
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
-from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
 from models.vehicles.vehicle_file import load_vehicle
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -142,7 +142,7 @@ def test_arms_from_joint_to_joint_end_where_each_body_is():
     for (name, _), end in zip(car.coordinates(), ends, strict=True):
         assert end == pytest.approx(car.body(name).position, abs=1e-12)
     wheel = next(body for body in car.bodies if body.name == car.tyres[0].body)
-    coordinate, place = anchor(car, wheel.name)
+    coordinate, place = last_coordinate_and_joint(car, wheel.name)
     assert car.coordinates()[coordinate][0] == wheel.name and place == pytest.approx(ends[coordinate], abs=1e-12)
 
 

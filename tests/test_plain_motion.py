@@ -10,9 +10,9 @@ import pytest
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import plain
 from models.multibody.plain.march import march
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies
+from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import mass, preloads
 from models.vehicles.vehicle_file import load_vehicle
@@ -67,7 +67,9 @@ def test_rates_and_derivatives_are_those_of_the_places():
     here = bodies.move(q, v).at(points)
     assert here[:, RATE] == pytest.approx((places(h * v) - places(-h * v)) / (2 * h), abs=1e-8)
     for i, unit in enumerate(np.eye(bodies.size)):
-        assert here[:, FIRST + i] == pytest.approx((places(h * unit) - places(-h * unit)) / (2 * h), abs=1e-8)
+        assert here[:, FIRST_DERIVATIVE + i] == pytest.approx(
+            (places(h * unit) - places(-h * unit)) / (2 * h), abs=1e-8
+        )
     assert here[2, PLACE].tolist() == [1.0, 2.0, 3.0] and not here[2, RATE:].any()
 
 
@@ -76,7 +78,7 @@ def test_a_moment_does_the_work_of_its_angular_velocity(body):
     bodies, rng = Bodies(spatial_twin()), np.random.default_rng(7)
     q, v = rng.uniform(-0.5, 0.5, (2, bodies.size))
     motion, moment, row = bodies.move(q, v), np.array([3.0, -2.0, 5.0]), bodies.row[body]
-    assert motion.by_moment(row, moment) @ v == pytest.approx(moment @ motion.turning(row), abs=1e-13)
+    assert motion.moment_forces(row, moment) @ v == pytest.approx(moment @ motion.angular_velocity(row), abs=1e-13)
     spin = motion.axes(row)[RATE] @ motion.axes(row)[PLACE].T
     assert spin == pytest.approx(-spin.T, abs=1e-14)
 
@@ -84,7 +86,7 @@ def test_a_moment_does_the_work_of_its_angular_velocity(body):
 @pytest.mark.parametrize("car", [load_vehicle("r19_free"), twin(), spatial_twin(9.81)], ids=["r19", "twin", "spatial"])
 def test_preloads_are_those_of_the_description(car):
     car = replace(car, gravity=9.81, side_forces=(), drags=())
-    held, loads = held_at_rest(car, None)
+    held, loads = preloads_at_rest(car, None)
     wanted = preloads(car)
     assert held == pytest.approx([*wanted.parts.values()], abs=1e-9)
     assert loads == pytest.approx([*wanted.tyres.values()], rel=1e-12)

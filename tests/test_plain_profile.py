@@ -28,7 +28,7 @@ def test_touches_at_random_poses(side):
     profile = laid_profile(profiles, RADIUS)
     touches = np.zeros(int(profile.head[0].zones), TOUCH)
     for shift in SHIFTS:
-        z, roll = profiles.touching(RADIUS, shift)
+        z, roll = profiles.first_touch_pose(RADIUS, shift)
         for _ in range(4):
             pose = Pose(shift, z + draw.uniform(4e-5, 1.5e-4), roll + draw.normal(0.0, 2e-5), draw.uniform(-0.02, 0.02))
             profile_on_rail(side, pose, profile, MODULUS, touches)

@@ -10,7 +10,7 @@ from models.advice.ride_choice.modes import modes_of
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.response import Response
 from models.advice.ride_choice.screen import exact_variances, variances_from_modes
-from models.ride.covariance import noise_of
+from models.ride.covariance import noise_intensity_of_system
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene, reduced_without
 from models.systems.ride.scene import build
@@ -33,7 +33,7 @@ def test_motions_tell_covariance_adjoint_and_exponential(more):
     reduced = whole(**more).full
     A, C, modes = reduced.system.A, reduced.system.C[:2], reduced.modes
     assert modes is not None and np.abs((modes.V * modes.rates) @ modes.W - A).max() < 1e-10 * np.abs(A).max()
-    noise = noise_of(reduced.system)
+    noise = noise_intensity_of_system(reduced.system)
     assert reduced.noise == pytest.approx(noise, rel=1e-9, abs=1e-12 * np.abs(noise).max())
     P, size = solve_continuous_lyapunov(A, -noise), np.sqrt
     scale = size(np.outer(P.diagonal(), P.diagonal()))

@@ -10,7 +10,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.ride.export import state_space
-from models.ride.measures import exceedances, share_beyond
+from models.ride.measures import exceedance_rate, time_share_beyond
 from models.systems.ride import nonlinear
 from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import build
@@ -127,9 +127,9 @@ def test_the_system_as_python_control_has_it():
 
 def test_exceedance_of_a_gaussian_process():
     """Of a standard normal, 4.55 % lies beyond 2; a sine-like process of 1 Hz passes it 2 exp(-2) times a second."""
-    assert share_beyond(1.0, 2.0) == pytest.approx(0.0455003, rel=1e-6)
-    assert exceedances(1.0, 2 * np.pi, 2.0) == pytest.approx(2 * np.exp(-2.0))
-    assert share_beyond(0.0, 1.0) == exceedances(0.0, 1.0, 1.0) == 0.0
+    assert time_share_beyond(1.0, 2.0) == pytest.approx(0.0455003, rel=1e-6)
+    assert exceedance_rate(1.0, 2 * np.pi, 2.0) == pytest.approx(2 * np.exp(-2.0))
+    assert time_share_beyond(0.0, 1.0) == exceedance_rate(0.0, 1.0, 1.0) == 0.0
 
 
 REFUSED = [
@@ -255,9 +255,9 @@ def test_a_mass_in_grams_is_asked_about_and_no_shipped_vehicle_is():
     from dataclasses import replace
 
     from models.systems.ride.plan import frequency_doubts
-    from models.vehicles.vehicle_file import load_vehicle, shipped
+    from models.vehicles.vehicle_file import load_vehicle, shipped_vehicles
 
-    assert not any(frequency_doubts(load_vehicle(name, towing=True)) for name in shipped())
+    assert not any(frequency_doubts(load_vehicle(name, allows_towing=True)) for name in shipped_vehicles())
     own = load_vehicle("half_car")
     heavy = replace(own, bodies=tuple(replace(body, mass=1e3 * body.mass) for body in own.bodies))
     assert "SI units" in frequency_doubts(heavy)[0]

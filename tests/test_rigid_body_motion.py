@@ -7,7 +7,7 @@ from models.core.errors import InputError
 from models.sensors import rigid_body_motion as motion
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import high_pass
-from models.sensors.rotations import from_cardan, rotation_matrix
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import sensor_array
 from validation.spatial.spatial_motion import PATH, SENSOR_ARRANGEMENTS, sensor_readings, tilted_sensors
 
@@ -144,7 +144,9 @@ def test_zeroed_sensors_give_the_same_motion():
     array = sensor_array(SENSOR_ARRANGEMENTS["4"])
     clean = sensor_readings(array.positions)
     raw = motion.recovered_motion(array, clean, PATH.period, PATH.start)
-    zeroed = motion.recovered_motion(array, clean + np.array([0.0, 0.0, 9.81]), PATH.period, PATH.start, zeroed=True)
+    zeroed = motion.recovered_motion(
+        array, clean + np.array([0.0, 0.0, 9.81]), PATH.period, PATH.start, gravity_corrected=True
+    )
     assert np.abs(raw.position - zeroed.position).max() < 1e-11
 
 
@@ -152,7 +154,7 @@ def test_a_tilt_error_becomes_a_displacement():
     """At rest, level, but believed to be tilted by 1 mrad."""
     array, count, tilt = sensor_array(SENSOR_ARRANGEMENTS["4"]), 10001, 1e-3
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
-    start = motion.StartState(orientation=tuple(from_cardan(0.0, tilt, 0.0)))
+    start = motion.StartState(orientation=tuple(quaternion_from_cardan(0.0, tilt, 0.0)))
     found = motion.recovered_motion(array, still, 1e-3, start)
     law = motion.tilt_displacement(tilt, 1e-3 * np.arange(count))
     assert np.abs(-found.position[:, 0] - law).max() < 1e-9

@@ -159,7 +159,7 @@ def test_pieces_are_found_on_uneven_stations(gaps, place):
     s = station[0] + (station[-1] - station[0]) * np.clip(place, 0.0, 1.0)
     expected = min(max(int(np.searchsorted(station, s, side="right")) - 1, 0), station.size - 2)
     for guess in range(station.size - 1):
-        assert kernels.segment(station, s, guess) == expected
+        assert kernels.piece_index(station, s, guess) == expected
 
 
 def test_a_polyline_passes_its_points_and_has_corners():

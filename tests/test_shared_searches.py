@@ -102,7 +102,7 @@ def test_a_branch_of_cycles_is_the_same_by_workers():
                 ]
             )
     for alone, shared in zip(*runs, strict=True):
-        assert np.array_equal(alone.slopes, shared.slopes) and np.array_equal(alone.state, shared.state)
+        assert np.array_equal(alone.return_slopes, shared.return_slopes) and np.array_equal(alone.state, shared.state)
         assert (alone.speed, alone.period, alone.multiplier) == (shared.speed, shared.period, shared.multiplier)
     assert runs[0][0].speed != runs[0][1].speed and runs[0][1].error > 0.0
 

@@ -13,7 +13,7 @@ from models.multibody.numbers import Handling
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.free_vehicle import CARRIER, free_vehicle
 from models.vehicles.spatial_linear import linearise
-from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
 from validation.spatial.cars import twin
 
 
@@ -30,7 +30,7 @@ def test_every_system_names_its_frame():
 
 
 def _with_frame(frame):
-    table = parse(SHIPPED / "r19_free.toml")
+    table = parse(SHIPPED_FOLDER / "r19_free.toml")
     table["springs"][0]["frame"] = table["mounts"][0]["frame"] = frame
     return build_vehicle(table, "car.toml")
 

@@ -10,17 +10,22 @@ from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, fill_rates, march
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.frequency import standard_errors
-from models.ride.gaussian_laws import of_curve, of_friction
-from models.ride.nonlinear_copies import copies_in_time, laws_of
+from models.ride.gaussian_laws import mean_force_and_slope, mean_friction_slope
+from models.ride.nonlinear_copies import copies_in_time, force_laws
 from models.ride.road_path import road_path
-from models.ride.statistical_linearisation import ERROR_GRADES, nonlinear_springs, promised_error, statistically_linear
+from models.ride.statistical_linearisation import (
+    ERROR_GRADES,
+    largest_error_seen,
+    nonlinear_springs,
+    statistically_linear,
+)
 from models.road.two_track import (
     CORRELATION_CASES,
     half_track,
     input_covariance,
-    on_track,
     road_excitation,
     road_of_level,
+    wheels_on_track,
 )
 from models.systems.ride.nonlinear import drive_over_road
 from models.vehicles.spatial import Curve
@@ -49,7 +54,7 @@ def test_hinges_are_the_curve():
 def test_moments_of_a_curve_are_their_integrals(mean, deviation):
     curve = Curve((-1.0, -0.2, 0.0, 0.3, 2.0), (-500.0, -300.0, 0.0, 60.0, 90.0))
     cuts = [(x - mean) / deviation for x in curve.arguments[1:-1]]
-    force, gain = of_curve(curve, mean, deviation)
+    force, gain = mean_force_and_slope(curve, mean, deviation)
     assert force == pytest.approx(normal_expectation(lambda x: curve(mean + deviation * x), cuts), rel=1e-9)
     assert gain == pytest.approx(
         normal_expectation(lambda x: curve(mean + deviation * x) * x, cuts) / deviation, rel=1e-9
@@ -60,16 +65,16 @@ def test_moments_of_a_curve_are_their_integrals(mean, deviation):
 def test_gain_of_friction_is_its_integral(ratio):
     """Deviations of the rate from far below that of friction, where it is a damper, to far above, Coulomb's law."""
     gain = normal_expectation(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio
-    assert of_friction(40.0, 0.01, 0.01 * ratio) == pytest.approx(4000.0 * gain, rel=1e-9)
+    assert mean_friction_slope(40.0, 0.01, 0.01 * ratio) == pytest.approx(4000.0 * gain, rel=1e-9)
 
 
 def test_still_springs_have_their_slope_at_rest():
     curve = Curve((-1.0, 0.0, 1.0), (-500.0, 0.0, 100.0))
-    assert of_curve(curve, 0.0, 0.0) == (0.0, 300.0)
-    assert of_curve(curve, 0.5, 0.0) == pytest.approx((50.0, 100.0))
-    assert of_curve(curve, 0.0, 1e-9)[1] == pytest.approx(300.0)
-    assert of_friction(40.0, 0.01, 0.0) == 4000.0
-    assert of_friction(40.0, 0.01, 1e-9) == pytest.approx(4000.0)
+    assert mean_force_and_slope(curve, 0.0, 0.0) == (0.0, 300.0)
+    assert mean_force_and_slope(curve, 0.5, 0.0) == pytest.approx((50.0, 100.0))
+    assert mean_force_and_slope(curve, 0.0, 1e-9)[1] == pytest.approx(300.0)
+    assert mean_friction_slope(40.0, 0.01, 0.0) == 4000.0
+    assert mean_friction_slope(40.0, 0.01, 1e-9) == pytest.approx(4000.0)
 
 
 def test_laws_that_are_lines_give_the_linear_vehicle():
@@ -95,8 +100,11 @@ def test_gains_are_those_of_their_own_covariance():
     spring, own = vehicle.springs[0], found.springs["front left"]
     travel = found.covariance.deviation[found.covariance.names.index("travel front left")]
     assert own.deviation == pytest.approx(travel, rel=1e-11)
-    stops, damper = of_curve(spring.travel_force, own.travel, travel), of_curve(spring.rate_force, 0.0, own.rate)
-    dry = of_friction(spring.friction, spring.friction_rate, own.rate)
+    stops, damper = (
+        mean_force_and_slope(spring.travel_force, own.travel, travel),
+        mean_force_and_slope(spring.rate_force, 0.0, own.rate),
+    )
+    dry = mean_friction_slope(spring.friction, spring.friction_rate, own.rate)
     assert own.equivalent_gains == pytest.approx((spring.stiffness + stops[1], damper[1] + dry), rel=1e-11)
     assert spring.stiffness * own.travel + stops[0] + damper[0] == pytest.approx(0.0, abs=1e-8)
     assert own.travel > 0.005, "a damper that is harder in rebound pulls the body down: mm, in compression"
@@ -109,7 +117,9 @@ def test_sentences_say_when_the_covariance_is_no_longer_good():
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 16.0)
     found = statistically_linear(vehicle, road, SPEED)
     assert all("no longer good" in sentence and "Monte Carlo" in sentence for sentence in found.sentences)
-    assert promised_error(0.0) == ERROR_GRADES[0][1] < promised_error(ERROR_GRADES[1][0]) < promised_error(0.2)
+    assert (
+        largest_error_seen(0.0) == ERROR_GRADES[0][1] < largest_error_seen(ERROR_GRADES[1][0]) < largest_error_seen(0.2)
+    )
 
 
 def test_no_fixed_point_is_told(monkeypatch):
@@ -134,12 +144,12 @@ def test_road_in_time_has_the_roads_covariance(case):
 
 def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
     vehicle = load_vehicle("half_car")
-    own = on_track(wheels(vehicle), 1.0)
+    own = wheels_on_track(wheels(vehicle), 1.0)
     road = road_path(road_excitation(road_of_level(1.0, cutoff=3.0), own), SPEED, 1e-3)
-    table = road.table(400, 3)
-    lag = round((own[0].x - own[1].x) / SPEED / road.half)
+    table = road.wheel_heights_and_rates(400, 3)
+    lag = round((own[0].x - own[1].x) / SPEED / road.half_step)
     assert np.abs(table[lag:, 1] - table[:-lag, 0]).max() == 0.0
-    slope = (table[2:, 0] - table[:-2, 0]) / (2 * road.half)
+    slope = (table[2:, 0] - table[:-2, 0]) / (2 * road.half_step)
     assert road.has_rates
     # the rate walks by cutoff v (q v h)^(1/2) = 0.06 m/s over a half step; a sum over 800 of them tells
     assert np.std(slope - table[1:-1, 2]) < 0.06 < np.std(table[:, 2])
@@ -184,10 +194,10 @@ def test_a_copy_goes_where_an_engine_goes():
     """The quarter car's motion is small at any size: the copies' laws step by step are MuJoCo's, so is the force."""
     vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE, 16.0)
     road = road_path(excitation_, SPEED, 1e-3)
-    run, table = drive_over_road("mujoco", vehicle, road, 0.3, seed=5).run, road.table(300, 5)
+    run, table = drive_over_road("mujoco", vehicle, road, 0.3, seed=5).run, road.wheel_heights_and_rates(300, 5)
     springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
-    laws, x = laws_of(vehicle, plain, springs, SPEED), np.zeros((4, 1))
+    laws, x = force_laws(vehicle, plain, springs, SPEED), np.zeros((4, 1))
     sums, force, rate = np.zeros((4, len(plain.outputs), 1)), np.empty((1, 1)), np.empty((4, 1))
     march(x, table[:, :, None], road.step, 300, 1, laws, sums)
     assert not sums.any(), "nothing is read before its time"
@@ -205,7 +215,7 @@ def test_copies_side_by_side_go_where_each_goes_alone():
     road, copies = road_path(excitation_, SPEED, 1e-3), 2 * COPIES_SIDE_BY_SIDE + 3
     springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
-    laws, roads = laws_of(vehicle, plain, springs, SPEED), next(road.blocks(30, copies, 5))
+    laws, roads = force_laws(vehicle, plain, springs, SPEED), next(road.blocks(30, copies, 5))
     x, sums = np.zeros((4, copies)), np.zeros((4, len(plain.outputs), copies))
     march(x, roads, road.step, 0, 4, laws, sums)
     for copy in (0, COPIES_SIDE_BY_SIDE - 1, COPIES_SIDE_BY_SIDE, copies - 1):
@@ -228,7 +238,7 @@ def test_standard_errors_of_a_run():
         displacement_factors=np.zeros(2),
         road_factors=np.ones(1),
     )
-    road = road_excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
+    road = road_excitation(road_of_level(1.0, corners=(0.3, 0.3)), wheels_on_track(wheels(vehicle), 1.0))
     P, a, T = (
         stationary_covariance(vehicle_with_road(replace(linear, outputs=(height,)), road, 10.0)).variance[0],
         3.0,

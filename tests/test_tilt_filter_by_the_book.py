@@ -7,7 +7,7 @@ from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter, _without_slope, estimate, inputs_with_moments
 from models.systems.hub_forces.tilt_march import Noise, march
-from models.vehicles.cut_vehicle import rigid
+from models.vehicles.cut_vehicle import rigid_vehicle
 from validation.spatial.cars import r19
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -55,7 +55,7 @@ def measurement():
     """A car, hub forces that turn it to and fro, and rates that are the integrals of their moments, a little off."""
     car, random = r19(), np.random.default_rng(3)
     forces = HubForces(random.normal(0.0, 200.0, (SAMPLES, 24)), DT, "body")
-    turning = np.linalg.solve(rigid(car).inertia, rigid(car).moments(forces.samples).T).T[:, :2]
+    turning = np.linalg.solve(rigid_vehicle(car).inertia, rigid_vehicle(car).moments(forces.samples).T).T[:, :2]
     rates = np.vstack([np.zeros(2), np.cumsum(turning[1:] + turning[:-1], axis=0) * DT / 2.0])
     tilts = np.vstack([np.zeros(2), np.cumsum(rates[1:] + rates[:-1], axis=0) * DT / 2.0])
     angles = np.hstack([tilts, rates]) + random.normal(0.0, 1e-3, (SAMPLES, 4))
@@ -67,7 +67,7 @@ def test_the_filter_of_a_measurement_has_the_moments_and_deviations_of_its_vehic
     stated = Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7)
     push = np.vstack([np.eye(2) * DT**2 / 2, np.eye(2) * DT])
     variances = np.repeat([2e-3, 3e-3], 2) ** 2
-    shaken = rigid(car).turning(stated.forces)[:2, :2] + 0.49 * np.eye(2)
+    shaken = rigid_vehicle(car).turning(stated.forces)[:2, :2] + 0.49 * np.eye(2)
     noise = Noise(DT, push @ shaken @ push.T, variances)
     first = angles.samples[0].copy(), np.diag(variances)
     states, deviations, squares = by_the_book(*first, turning, angles.samples, noise)
@@ -101,7 +101,7 @@ def test_what_pulls_to_the_estimate_is_a_spring_and_a_damper_of_its_bandwidth(me
     car, forces, _, angles = measurement
     tilt = estimate(car, forces, angles, Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
     given = inputs_with_moments(HubInputs(np.ones((5, 24))), car, tilt, DT, 0.35)
-    roll, pitch, _ = np.diag(rigid(car).inertia)
+    roll, pitch, _ = np.diag(rigid_vehicle(car).inertia)
     corner = 2.0 * np.pi * 0.35
     stiff = (roll * corner**2, 1.4 * roll * corner, pitch * corner**2, 1.4 * pitch * corner)
     assert given.pull == pytest.approx(stiff, rel=1e-12)

@@ -9,7 +9,7 @@ from numba import njit
 from models.brake.advance import FINE, FOLDED
 from models.brake.sprung_step import OVER, Units, status_at_end, to_units
 from models.machine.stack import start
-from models.multibody.forces import _turned_to
+from models.multibody.forces import _axle_of_towed_wheel
 from models.multibody.tree import PER_LINK, TURNED
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.grounds("closed form")
 
 @njit
 def turned_to(link, axle):
-    return _turned_to(start(link), axle)
+    return _axle_of_towed_wheel(start(link), axle)
 
 
 @njit

@@ -19,7 +19,7 @@ from models.systems.handling.run import build as build_model
 from models.systems.handling.run import drive_run, driven_by, run
 from models.systems.handling.scene import build
 from models.vehicles.spatial_linear import linearise
-from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
 from validation.common.checks import largest_relative_difference
 from validation.spatial.towing import give_towed_wheels_car_heading, static_load_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
@@ -41,7 +41,7 @@ def scene(**changes: Any) -> Any:
 
 def file_with(**changes: Any) -> dict[str, Any]:
     """Tables of the shipped caravan's file, with other values of its body."""
-    table = tomllib.loads((SHIPPED / "r19_caravan.toml").read_text())
+    table = tomllib.loads((SHIPPED_FOLDER / "r19_caravan.toml").read_text())
     body = next(body for body in table["bodies"] if body["name"] == "caravan")
     body.update(changes)
     for key in [key for key, value in changes.items() if value is None]:
@@ -87,7 +87,7 @@ def test_a_scene_names_its_trailer_and_runs_in_both_engines():
 
 
 def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
-    (tmp_path / "mine.toml").write_text((SHIPPED / "r19_caravan.toml").read_text())
+    (tmp_path / "mine.toml").write_text((SHIPPED_FOLDER / "r19_caravan.toml").read_text())
     towing = scene(vehicle={"file": str(tmp_path / "mine.toml")})
     assert "trailer" in named_effects(towing)
     with pytest.raises(InputError, match=r"vehicle\.file = .*: has bodies with a hitch: name a vehicle file"):

@@ -10,7 +10,7 @@ from scipy.signal import csd
 from models.core.errors import InputError
 from models.road.fitted import fit_road
 from models.road.iso8608 import DENSITY_OF_CLASS, level_of_class
-from models.road.isotropic import DensityPart, IsotropicRoad
+from models.road.isotropic import DensityTerm, IsotropicRoad
 from models.road.measured_tracks import MeasuredTracks, read_tracks, track_spectra
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import (
@@ -20,9 +20,9 @@ from models.road.two_track import (
     TwoTrackRoad,
     half_track,
     input_covariance,
-    on_track,
     road_excitation,
     road_of_level,
+    wheels_on_track,
 )
 from models.vehicles.linear_vehicle import WheelPosition
 from validation.cases.ride_road import WHEELS, heights_covariance, measure
@@ -86,7 +86,7 @@ def test_a_cutoff_makes_the_road_differentiable():
 def test_a_quarter_car_meets_a_track_and_not_the_mean():
     road, centre = road_of_level(0.8), (WheelPosition("one", 0.0, 0.0, 0),)
     assert half_track(centre) == 0.0
-    on_a_track = input_covariance(road, on_track(centre, 0.8))[0, 0]
+    on_a_track = input_covariance(road, wheels_on_track(centre, 0.8))[0, 0]
     assert on_a_track == pytest.approx(np.pi * 1.6e-5 / 2 * (1 / 0.3 + 1 / 1.5), rel=1e-14)  # the paper's track
     assert input_covariance(road, centre)[0, 0] == pytest.approx(np.pi * 1.6e-5 / 2 / 0.3, rel=1e-14)
 
@@ -103,7 +103,7 @@ def test_a_class_keeps_its_variance_when_its_density_changes_sides():
 @pytest.mark.grounds("closed form")
 def test_isotropic_coherency_by_hand():
     """x K1(x) at x = 1 and 2 (Abramowitz and Stegun, Table 9.8: K1 = 0.6019072302, 0.1398658818)."""
-    road = IsotropicRoad((DensityPart(1e-5),))
+    road = IsotropicRoad((DensityTerm(1e-5),))
     assert road.coherency(np.array([1.0, 2.0]), 1.0) == pytest.approx([0.6019072302, 2 * 0.1398658818], rel=1e-9)
     assert road.coherency(np.array([1e-6, 1.0]), 0.0).tolist() == [1.0, 1.0]
 
@@ -158,7 +158,7 @@ WRONG = {
     "cutoff": (lambda: ShapeFilter(0.3, 1e-5, 0.2), "above the corner"),
     "corner": (lambda: ShapeFilter(-0.3, 1e-5), "0 or more"),
     "track": (lambda: road_of_level(0.0), "half_track"),
-    "waviness": (lambda: DensityPart(1e-5, 0.1, 1.0), "above 1"),
+    "waviness": (lambda: DensityTerm(1e-5, 0.1, 1.0), "above 1"),
     "short": (lambda: track_spectra(MeasuredTracks(np.zeros(30), np.zeros(30), 0.1, 0.7, "x")), "two windows or more"),
     "flat": (lambda: fit_road(MeasuredTracks(np.zeros(3000), np.zeros(3000), 0.1, 0.7, "x")), "there is no road"),
     "class": (lambda: level_of_class("I"), "class of ISO 8608"),

@@ -9,12 +9,12 @@ from models.tyre.magic_formula import (
     PACEJKA,
     Burckhardt,
     MagicFormulaCurve,
-    by_similarity,
     graded_nodes,
     product_factors,
+    table_by_similarity,
     table_of_surface,
 )
-from models.tyre.tyre_source import named_tyre
+from models.tyre.tyre_source import table_of_named_tyre
 from models.tyre.tyre_table import (
     TableCell,
     TyreTable,
@@ -69,7 +69,7 @@ def test_exact_at_nodes_linear_between_constant_beyond():
 
 def test_the_union_of_nodes_loses_nothing():
     ice, nodes = NAMED_SURFACES["ice"], (np.array([1e4]), np.array([0, 0.03, 0.25]), np.array([0, 0.15, 1.0]))
-    one, other = small(), by_similarity(lambda k, _: ice[0](k), lambda k, _: ice[1](k), *nodes)
+    one, other = small(), table_by_similarity(lambda k, _: ice[0](k), lambda k, _: ice[1](k), *nodes)
     both = stacked_tables([one, other])
     rng = np.random.default_rng(5)
     for angle, load, slip in rng.uniform((0, 5e3, 0), (0.5, 4e4, 1), (60, 3)):
@@ -175,10 +175,10 @@ def test_friction_falls_with_the_load_as_asked():
 
 @pytest.mark.grounds("closed form")
 def test_front_and_rear_differ():
-    assert named_tyre("dry", rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
-    assert named_tyre("dry").mu_x.max() == pytest.approx(1.20, abs=1e-4) and named_tyre("ice").h.max() == pytest.approx(
-        0.162, abs=1e-4
-    )
+    assert table_of_named_tyre("dry", rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
+    assert table_of_named_tyre("dry").mu_x.max() == pytest.approx(1.20, abs=1e-4) and table_of_named_tyre(
+        "ice"
+    ).h.max() == pytest.approx(0.162, abs=1e-4)
     assert table_of_surface("dry").h.max() == pytest.approx(0.935, abs=1e-4)
     assert table_of_surface("dry/rear").h.max() == pytest.approx(0.961, abs=1e-4)
 

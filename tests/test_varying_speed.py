@@ -7,7 +7,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.ride.covariance import stationary_covariance
-from models.ride.road_in_path import at_speed
+from models.ride.road_in_path import system_at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import quasi_stationary, varying_speed
 from models.road.two_track import CORRELATION_CASES, half_track, road_excitation, road_of_level
@@ -33,7 +33,7 @@ def test_at_an_even_speed_every_instant_is_stationary(case):
     vehicle = linearise(load_vehicle("seven_freedoms"))
     road = road_excitation(road_of_level(half_track(vehicle.wheels)), vehicle.wheels, *case)
     found = varying_speed(vehicle, road, SpeedProfile((0.0, 0.2), (11.0, 11.0)))
-    exact = stationary_covariance(at_speed(vehicle, road, 11.0))
+    exact = stationary_covariance(system_at_speed(vehicle, road, 11.0))
     rolling = exact.deviation > 1e-6 * exact.deviation.max()  # equal tracks: nothing rolls
     assert found.deviation[:, rolling] == pytest.approx(
         np.tile(exact.deviation[rolling], (len(found.time), 1)), rel=1e-10
@@ -97,7 +97,7 @@ def test_white_noise_is_off_at_standstill():
 def test_weighted_outputs_run_along():
     vehicle, road = vehicle_and_road("half_car", 100.0)
     found = varying_speed(vehicle, road, SpeedProfile((0.0, 0.1), (15.0, 15.0)), weightings={"body centre": "Wk"})
-    exact = stationary_covariance(at_speed(vehicle, road, 15.0, {"body centre": "Wk"}))
+    exact = stationary_covariance(system_at_speed(vehicle, road, 15.0, {"body centre": "Wk"}))
     assert found.of("body centre Wk")[-1] == pytest.approx(exact.deviation[-1], rel=1e-10)
 
 

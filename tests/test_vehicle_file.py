@@ -9,7 +9,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.scene_file import parse
 from models.vehicles.spatial_linear import linearise
-from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle, shipped
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle, shipped_vehicles
 
 EXAMPLE = """
 title = "Half car with digressive dampers and a bump stop"
@@ -128,16 +128,16 @@ def test_children_may_come_before_their_parents():
     assert [body.name for body in build_vehicle(table, "f").bodies][:3] == ["rear", "engine", "body"]
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", shipped_vehicles())
 def test_shipped_vehicles_name_their_sources(name):
-    load_vehicle(name, towing=True)
-    table = parse(SHIPPED / f"{name}.toml")
+    load_vehicle(name, allows_towing=True)
+    table = parse(SHIPPED_FOLDER / f"{name}.toml")
     entries = [entry for key, value in table.items() if isinstance(value, list) and key != "outputs" for entry in value]
     assert all("published" in entry["source"] or "chosen" in entry["source"] for entry in entries)
 
 
 def test_shipped_vehicles():
-    assert shipped() == (
+    assert shipped_vehicles() == (
         "half_car",
         "quarter_car",
         "quarter_car_nonlinear",
@@ -148,7 +148,7 @@ def test_shipped_vehicles():
         "seven_freedoms",
         "three_axle_truck",
     )
-    sizes = [len(load_vehicle(name, towing=True).coordinates()) for name in shipped()]
+    sizes = [len(load_vehicle(name, allows_towing=True).coordinates()) for name in shipped_vehicles()]
     assert sizes == [4, 2, 2, 24, 19, 19, 14, 7, 13]
 
 

@@ -16,7 +16,7 @@ from models.sensors.inertial_unit import bias_path
 from models.systems.braking.of_scene import controller_of
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.sampling import within_range
-from models.vehicles.cut_vehicle import rigid
+from models.vehicles.cut_vehicle import rigid_vehicle
 from models.vehicles.free_vehicle import chassis_of, spinning
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.parameters import asymmetric_twin
@@ -80,15 +80,15 @@ def test_elements_know_their_length_along_their_axis_and_gauge_their_travel():
     for element in r19().elements:
         along = float(np.dot(element.axis, np.subtract(element.second_point, element.first_point)))
         assert element.design == pytest.approx(along, rel=1e-12, abs=1e-15)
-        gauge = element.gauge()
-        assert (gauge.stiffness, gauge.damping, gauge.held, gauge.friction) == (1.0, 0.0, 0.0, 0.0)
+        gauge = element.travel_gauge()
+        assert (gauge.stiffness, gauge.damping, gauge.preload, gauge.friction) == (1.0, 0.0, 0.0, 0.0)
         assert (
             gauge.axis.tolist() == element.axis.tolist() and gauge.first_point.tolist() == element.first_point.tolist()
         )
 
 
 def test_noise_of_one_force_turns_a_rigid_vehicle_about_its_arm():
-    whole = rigid(r19())
+    whole = rigid_vehicle(r19())
     deviation = np.zeros(24)
     deviation[8] = 3.0  # the second hub's force up
     turn = np.linalg.solve(whole.inertia, np.cross(whole.arms[1], [0.0, 0.0, 3.0]))

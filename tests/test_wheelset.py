@@ -17,7 +17,7 @@ from models.rail.equivalent_conicity import harmonic_linearised_conicity
 from models.rail.limit_cycle import attained_cycle, refined_orbit
 from models.rail.linear import (
     critical_speed,
-    gravity,
+    gravity_stiffness,
     kinematic_wavelength,
     klingel_wavelength,
     largest_growth,
@@ -72,7 +72,7 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
 @pytest.mark.grounds("closed form")
 def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     y = 1e-5
-    pose = (y, 0.0, -CHOSEN_WHEELSET.tilt * y, 0.0)
+    pose = (y, 0.0, -CHOSEN_WHEELSET.roll_per_displacement * y, 0.0)
     right, left = (cone_on_rail(side, Pose(*pose), CONE) for side in (RIGHT, LEFT))
     assert (right[0], left[0]) == pytest.approx((0.0, 0.0), abs=3e-11)  # second order: tilt y^2 = 7e-12
     assert (right[1] - left[1]) / (2 * y) == pytest.approx(CHOSEN_WHEELSET.equivalent_conicity, rel=1e-6)
@@ -118,7 +118,9 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     h = 2e-3
     measured = [-CHOSEN_WHEELSET.load * (fall(h * (k == 0), h * (k == 1)) * 2 - 2 * fall(0, 0)) / h**2 for k in (0, 1)]
     heavier = linear_matrices(FREE.changed(load=2 * FREE.load), 10.0).stiffness
-    assert np.diag(gravity(CHOSEN_WHEELSET)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
+    assert np.diag(gravity_stiffness(CHOSEN_WHEELSET)) == pytest.approx(
+        measured, rel=1e-4
+    )  # the fourth order in h is 1e-5
     assert heavier[0, 0] == pytest.approx(2 * measured[0], rel=1e-4)  # creep forces do not follow y in the first row
 
 
@@ -151,9 +153,9 @@ def test_energy_is_what_the_forces_do(law):
         held = 0.0
         for side in (1, -1):
             out = turn(roll, yaw) @ [0.0, side * w.half_spacing, 0.0]
-            u = np.array([0.0, y, z]) + out - [0.0, side * w.half_spacing, body.sunk]
+            u = np.array([0.0, y, z]) + out - [0.0, side * w.half_spacing, body.rest_height]
             held += 0.5 * (w.stiffness_x * u[0] ** 2 + w.stiffness_y * u[1] ** 2 + w.stiffness_z * u[2] ** 2)
-        return kinetic + held - (w.mass * 9.81 + 2 * body.carried) * z
+        return kinetic + held - (w.mass * 9.81 + 2 * body.carried_weight) * z
 
     def depths(s):
         return np.array([cone_on_rail(side, Pose(*s[:4].tolist()), CONE)[0] for side in (RIGHT, LEFT)])

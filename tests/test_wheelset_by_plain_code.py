@@ -5,7 +5,7 @@ import pytest
 
 from models.rail import equations as eq
 from models.rail.equations import Equations
-from models.rail.joint_forces import JOINTS, set_joint_forces, table, to_joints
+from models.rail.joint_forces import JOINTS, joints_from_states, set_joint_forces, table
 from models.rail.laid_profiles import Profiles
 from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.wheelset.plain_wheelset import PlainWheelset
@@ -20,7 +20,7 @@ def states(wheelset, speed, count, seed=11):
     """States (count, 10) about rolling without slip."""
     random = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 10)) * ENDS
     random[:, eq.Z] += 5e-5
-    random[:, eq.ROLL] -= wheelset.tilt * random[:, eq.Y]
+    random[:, eq.ROLL] -= wheelset.roll_per_displacement * random[:, eq.Y]
     random[:, eq.SPIN] -= speed / wheelset.radius
     return random
 
@@ -57,7 +57,7 @@ def test_joint_forces_of_the_engines_are_the_rails_by_virtual_work():
     compiled, plain = both(25.0, "fastsim")
     numbers = table(25.0, compiled.rails)
     for state in states(CHOSEN_WHEELSET, 25.0, 6):
-        block = np.concatenate((np.full(JOINTS, 7.0), to_joints(state), numbers))
+        block = np.concatenate((np.full(JOINTS, 7.0), joints_from_states(state), numbers))
         set_joint_forces(block.ctypes.data, 0.0, JOINTS)
         expected = plain.rail_forces_on_coordinates(state)
         assert block[:JOINTS] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
@@ -74,6 +74,6 @@ def test_profiles_carry_the_load_at_the_height_where_the_springs_bear_no_more():
     """In the middle of the track, without rates: the vertical parts of the normal forces are the load."""
     compiled = Equations(CHOSEN_WHEELSET.changed(profiles=Profiles()), 40.0, "linear")
     state = np.zeros(eq.STATE_COUNT)
-    state[eq.Z], state[eq.SPIN] = compiled.body.sunk, -40.0 / CHOSEN_WHEELSET.radius
+    state[eq.Z], state[eq.SPIN] = compiled.body.rest_height, -40.0 / CHOSEN_WHEELSET.radius
     contacts = compiled.at(state[None])[1][0]
     assert contacts["load"] @ np.cos(contacts["angle"]) == pytest.approx(CHOSEN_WHEELSET.load, rel=1e-9)

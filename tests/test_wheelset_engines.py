@@ -14,7 +14,7 @@ from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
 from models.rail.eigenvalues import largest_growth, wavelength
 from models.rail.equations import Equations
-from models.rail.joint_forces import from_joints, joint_forces, to_joints
+from models.rail.joint_forces import joint_forces, joints_from_states, states_from_joints
 from models.rail.limit_cycle import attained_cycle, refined_orbit, solved_orbit
 from models.rail.linear import critical_speed
 from models.rail.wheelset import CHOSEN_WHEELSET
@@ -85,7 +85,7 @@ def test_threads_agree_to_the_last_bit():
     built = MujocoWheelset(CHOSEN_WHEELSET, 60.0, cells=11)
     model = built.model.model
     model.opt.timestep = 5e-4
-    starts = np.array([to_joints(built.displaced_state(shift)) for shift in (1e-3, 3e-3, 5e-3)])
+    starts = np.array([joints_from_states(built.displaced_state(shift)) for shift in (1e-3, 3e-3, 5e-3)])
     with installed(kernel_law(joint_forces)):
         one, two = (Marcher(model, threads).run(starts, 50) for threads in (1, 2))
     assert one.tobytes() == two.tobytes()
@@ -94,7 +94,7 @@ def test_threads_agree_to_the_last_bit():
 @pytest.mark.grounds("closed form")
 def test_joints_and_states():
     states = LIVELY * np.random.default_rng(2).normal(size=(4, eq.STATE_COUNT))
-    assert from_joints(to_joints(states)) == pytest.approx(states, abs=1e-15)
+    assert states_from_joints(joints_from_states(states)) == pytest.approx(states, abs=1e-15)
 
 
 @both

@@ -21,7 +21,7 @@ from models.rail.limit_cycle import (
     refined_orbit,
     solved_orbit,
 )
-from models.rail.linear import NoCriticalSpeed, critical_or_why, critical_speed
+from models.rail.linear import NoCriticalSpeed, critical_speed, critical_speed_or_reason
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.wheelset import plan
 from models.systems.wheelset.of_scene import path_speeds, wheelset_of
@@ -111,7 +111,7 @@ def test_without_a_critical_speed_the_study_says_so(tmp_path):
     stiff = {"stiffness_x": 1e8, "stiffness_y": 1e8, "damping_x": 1e5, "damping_y": 1e5}
     one = scene(wheelset={"override": stiff}, run={"duration": 0.02, "step": 1e-4})
     assert path_speeds(one) == [80.0]
-    assert critical_or_why(wheelset_of(one), partial(largest_growth, Equations))[0] is None
+    assert critical_speed_or_reason(wheelset_of(one), partial(largest_growth, Equations))[0] is None
     assert "none: the wheelset is stable up to 200 m/s" in wheelset._stability_lines(wheelset_of(one), {})[1]
     found = limit_cycle.run(scene(wheelset={"override": stiff}, run={}), ("reference",), tmp_path, lambda *_: None)
     assert found["answer"] == {"branch": [], "cycles": {}}

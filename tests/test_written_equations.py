@@ -12,7 +12,7 @@ from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.engines.free_vehicle import Plain
 from models.multibody import forces as at
-from models.multibody.plain.road import driven, surface
+from models.multibody.plain.road import control_value, surface
 from models.multibody.plain.rolling import Ledger, TyreReport
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import build, run
@@ -76,8 +76,8 @@ def test_roads_and_controls_are_those_of_the_kernel():
     knots = ((0.1, 0.2), (0.5, -0.3), (0.5 + 1e-9, 0.4), (2.0, 1.0))
     table = np.array(knots).T.ravel()
     for t in (-1.0, 0.1, 0.3, 0.5, 1.2345, 2.0, 3.0):
-        assert driven(knots, t) == pytest.approx(at.control(table, 0, 0, len(knots), t), rel=1e-14, abs=1e-15)
-    assert driven(((0.7, 3.0),), 0.0) == (3.0, 0.0)
+        assert control_value(knots, t) == pytest.approx(at.control(table, 0, 0, len(knots), t), rel=1e-14, abs=1e-15)
+    assert control_value(((0.7, 3.0),), 0.0) == (3.0, 0.0)
 
 
 def test_reports_have_the_columns_of_the_kernel():

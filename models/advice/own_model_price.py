@@ -186,7 +186,10 @@ def named_coordinates(twin: TwinModel) -> dict[str, int]:
     """Indices of the coordinates that MuJoCo has as well, by the names of their joints; angles of free and ball joints
     are left out.
     """
-    names, angles = twin.names, {turning.first + i for turning in twin.coordinates.turnings for i in range(3)}
+    names, angles = (
+        twin.names,
+        {turning.first_coordinate + i for turning in twin.coordinates.turnings for i in range(3)},
+    )
     return {_joint_name(name): i for i, name in enumerate(names) if i not in angles}
 
 

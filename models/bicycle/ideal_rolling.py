@@ -26,7 +26,7 @@ from models.bicycle.four_bodies import (
 )
 from models.bicycle.whipple import NO_CONTROL, Control, Whipple
 from models.core.errors import RunFailed
-from models.multibody.plain.motion import FIRST, PLACE, RATE, REST, Bodies, PlainMotion
+from models.multibody.plain.motion import BIAS, FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 
 FREE_RATES, DEPENDENT_RATES = [LEAN, STEER, REAR], [X, Y, YAW, HEIGHT, PITCH, FRONT]
 UPWARD = np.array([0.0, 0.0, 1.0])
@@ -139,4 +139,4 @@ def _wheel_contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray,
     lowering = (turning * axle[2] + axle * turning[2] + downward * axle[2] * turning[2] / flat) / flat
     point, running = radius * axes.T @ downward, radius * (moving.T @ downward + axes.T @ lowering)
     point_terms = wheel @ np.append(point, 1.0)
-    return point_terms[PLACE, 2], point_terms[FIRST:].T, point_terms[REST] + moving @ running
+    return point_terms[PLACE, 2], point_terms[FIRST_DERIVATIVE:].T, point_terms[BIAS] + moving @ running

@@ -31,14 +31,14 @@ from models.multibody.forces import (
     PRESS,
     REPORTED,
     STEER_POWER,
-    creep,
-    enter,
-    leave,
-    room,
+    add_creep_forces,
+    finish_forces,
+    start_forces,
+    workspace_size,
 )
 from models.multibody.moving_vehicle import WheelContact, carried_velocity
 from models.multibody.tree import cross, dot, plus, put, three, times
-from models.tyre.bristles import FIRST_FLEXIBILITY, net, shape_factor, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, cornering_stiffness_factor, net, tyre_forces
 from models.vehicles.free_vehicle import joints
 from models.vehicles.spatial import SpatialVehicle
 
@@ -156,7 +156,7 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
         load = bicycle.loads()[i]
         if not load > 0.0:
             raise InputError("", name, load, "carries no weight (N): it must press on the road at rest")
-        bristles = t.stiffness * t.cornering * vertical / (shape_factor(t.cells) * wheel.radius * width)
+        bristles = t.stiffness * t.cornering * vertical / (cornering_stiffness_factor(t.cells) * wheel.radius * width)
         table[i, [forces.KNUCKLE, forces.ROTOR, forces.POINT, forces.STATIC]] = joint, spin, i, load
         table[i, [forces.RADIUS, forces.BRISTLES]] = wheel.radius, bristles
     table[:, forces.HEIGHT] = [body.position[2] for body in bicycle.vehicle.bodies if body.name.endswith("wheel")]
@@ -181,7 +181,7 @@ def _tyre_load(tyre, vehicle, wheel):
     arm = times(plus(times(axle, axle[2]), (0.0, 0.0, -1.0)), tyre[forces.RADIUS] / flat)
     along = times((axle[1], -axle[0], 0.0), 1.0 / flat)
     across = (-along[1], along[0], 0.0)
-    turning = plus(plus(three(link, tree.TURNING), (0.0, 0.0, vehicle.frame.yawing)), times(axle, spin))
+    turning = plus(plus(three(link, tree.TURNING), (0.0, 0.0, vehicle.frame.yaw_rate)), times(axle, spin))
     sliding = plus(plus(three(spot, tree.RATE), carried_velocity(vehicle.frame, centre)), cross(turning, arm))
     elastic = max(tyre[forces.STATIC] + tyre[forces.VERTICAL] * (tyre[forces.RADIUS] * flat - centre[2]), 0.0)
     load = max(elastic - tyre[forces.VISCOUS] * sliding[2], 0.0) if elastic > 0.0 else 0.0
@@ -212,7 +212,7 @@ def _add_steering_torque(table_of_numbers, vehicle):
     v = vehicle.rates
     missing = max(
         table_of_numbers[FEEDBACK_SPEED_LIMIT]
-        - table_of_numbers[SPEED_GAIN] * abs(vehicle.frame.ahead)
+        - table_of_numbers[SPEED_GAIN] * abs(vehicle.frame.forward_speed)
         - table_of_numbers[SPEED_BIAS],
         0.0,
     )
@@ -229,7 +229,7 @@ def all_bicycle_forces(table_of_numbers, q, v, forces_on_coordinates, report, le
     (9,), report (2, REPORTED), ledger (LEDGER,).
     """
     vehicle, table = (
-        enter(table_of_numbers, q, v, forces_on_coordinates, doubles(room(table_of_numbers)), ledger),
+        start_forces(table_of_numbers, q, v, forces_on_coordinates, doubles(workspace_size(table_of_numbers)), ledger),
         start(table_of_numbers),
     )
     patches, ways = array(doubles(10 * WHEEL_COUNT), (WHEEL_COUNT, 10)), doubles(forces.WAY * WHEEL_COUNT)
@@ -246,10 +246,10 @@ def all_bicycle_forces(table_of_numbers, q, v, forces_on_coordinates, report, le
     tyre_forces(patches, slips, strips, cells, table_of_numbers[forces.MIDDLE], creeping)
     for i in range(WHEEL_COUNT):
         wheel = WheelContact(patches[i], slips[i], row(ways, forces.WAY, i), report[i])
-        creep(row(tyres, forces.PER_TYRE, i), creeping[i], vehicle, wheel)
+        add_creep_forces(row(tyres, forces.PER_TYRE, i), creeping[i], vehicle, wheel)
         ledger[DISSIPATED] += report[i, forces.POWER]
     _add_steering_torque(table_of_numbers[int(table_of_numbers[forces.OF_KNOTS]) :], vehicle)
-    leave(table_of_numbers, vehicle)
+    finish_forces(table_of_numbers, vehicle)
 
 
 @lean

@@ -42,11 +42,11 @@ from models.multibody.forces import (
     TYRES,
     WAVES,
     WAY,
-    creep,
-    enter,
-    leave,
-    room,
-    touch,
+    add_creep_forces,
+    find_contact,
+    finish_forces,
+    start_forces,
+    workspace_size,
 )
 from models.multibody.moving_vehicle import WheelContact
 from models.multibody.tree import PER_LINK, dot, three, times, twist
@@ -106,19 +106,19 @@ def forces_and_contacts(table, q, v, force_sum, contacts):
         array(doubles(REPORTED), (REPORTED,)),
     )
     wheel_geometry, ledger, creeping = wheel.way, array(doubles(LEDGER), (LEDGER,)), array(doubles(3), (3,))
-    vehicle = enter(table, q, v, force_sum, doubles(room(table)), ledger)
+    vehicle = start_forces(table, q, v, force_sum, doubles(workspace_size(table)), ledger)
     waves, wheel_forces = table[int(table[OF_WAVES]) :], wheel_forces_of(table)
     creeping[2], tyres = 0.0, beyond(start(table), int(table[OF_TYRES]))
     for i in range(int(table[TYRES])):
         tyre_row = row(tyres, PER_TYRE, i)
-        touch(tyre_row, waves, int(table[WAVES]), wheel_forces.steer[i], 0.0, vehicle, wheel)
+        find_contact(tyre_row, waves, int(table[WAVES]), wheel_forces.steer[i], 0.0, vehicle, wheel)
         contacts.along[i] = dot(three(wheel_geometry, PASSING), three(wheel_geometry, ROLLING))
         contacts.across[i], contacts.load[i] = wheel.report[SLIP_Y], wheel.report[PRESS]
         creeping[0], creeping[1] = wheel_forces.force_x[i], wheel_forces.force_y[i]
-        creep(tyre_row, creeping, vehicle, wheel)
+        add_creep_forces(tyre_row, creeping, vehicle, wheel)
         carrying = row(vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
         twist(carrying, vehicle.tree.ground, times(three(wheel_geometry, AXLE), -wheel_forces.moment[i]))
-    leave(table, vehicle)
+    finish_forces(table, vehicle)
 
 
 @lean

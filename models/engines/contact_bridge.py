@@ -36,7 +36,7 @@ from models.engines.stability import ALLOWED_GROWTH, LONG_RUN, LinearMatrices, l
 from models.machine.compiled import njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond, doubles, start
-from models.rail.wheel_forces import REGULAR
+from models.rail.wheel_forces import REGULARISED_SPEED
 
 FREEDOM = record("x", "y", "z", "yaw")
 """Coordinates of a wheel, the rates of these, or the forces on them."""
@@ -91,10 +91,12 @@ class Wheels:
                 raise InputError("", name, getattr(self, name), "must be above 0")
         if not np.isfinite(self.speed):
             raise InputError("", "speed", self.speed, "must be a finite speed in m/s")
-        if self.distance is not None and self.speed < REGULAR:
+        if self.distance is not None and self.speed < REGULARISED_SPEED:
             skew = np.abs(self.distance.height - self.distance.height[:, ::-1]).max()
             if max(skew, abs(self.distance.x[0] + self.distance.x[-1])) > 1e-9:
-                raise InputError("", "distance", None, f"must be its own mirror image in x below {REGULAR} m/s")
+                raise InputError(
+                    "", "distance", None, f"must be its own mirror image in x below {REGULARISED_SPEED} m/s"
+                )
 
     @property
     def size(self) -> int:
@@ -155,8 +157,8 @@ def forces(numbers, t, q, v, f):
     given, answer = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0]
     given.shape_x, given.shape_y, given.mu = head.curved_x, head.curved_y, head.mu
     given.G, given.nu = head.G, head.nu
-    speed = max(abs(head.speed), REGULAR)
-    forwards = min(1.0, max(0.0, 0.5 + 0.5 * head.speed / REGULAR))
+    speed = max(abs(head.speed), REGULARISED_SPEED)
+    forwards = min(1.0, max(0.0, 0.5 + 0.5 * head.speed / REGULARISED_SPEED))
     for way in (1.0, -1.0):
         share = forwards if way > 0.0 else 1.0 - forwards
         if share == 0.0:

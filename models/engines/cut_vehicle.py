@@ -25,9 +25,9 @@ from models.multibody.cut_kernel import (
     accelerate,
     joint_forces,
     march,
-    parts,
     report,
     set_joint_forces,
+    table_views,
 )
 from models.multibody.cut_table import HubInputs, table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
@@ -126,7 +126,7 @@ class HubModel:
             division = divide(vehicle.tree, vehicle.elements, engine)
             numbers = table(replace(vehicle, elements=division.shared), hub_inputs, step)
         self.division = division
-        if hub_inputs.held or self.adaptive:
+        if hub_inputs.constant_in_step or self.adaptive:
             numbers = numbers.copy()  # forces are reported by the whole table, read at its rows
         self.model = self._in_engine(
             Driven(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
@@ -147,11 +147,11 @@ class HubModel:
     def marched(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
         """Trajectory from coordinates and rates (n,), without a check of the attitude; RunFailed where the engine
         stops."""
-        if not self.hub_inputs.held:
+        if not self.hub_inputs.constant_in_step:
             return self._march(q, v, self.steps)
         states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
         states[0] = np.concatenate((q, v))
-        for first, last in self.hub_inputs.spans():
+        for first, last in self.hub_inputs.constant_force_spans():
             self._hold_forces(first, last)
             try:
                 path = self._march(states[first, : self.size], states[first, self.size :], last - first)
@@ -178,12 +178,12 @@ class HubModel:
     def _hold_forces(self, first: int, last_step: int) -> None:
         """Set the hub forces of a span of steps over which they are constant; the model's time starts again at the
         span."""
-        hub_inputs = self.hub_inputs.during(first, last_step)
+        hub_inputs = self.hub_inputs.in_steps(first, last_step)
         if self.plain:
             self.plain.hub_inputs = hub_inputs
         else:
             rows = hub_inputs.rows
-            parts(self.model.numbers)[-1][: len(rows)] = rows
+            table_views(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
         """Counts of built items: degrees of freedom, native items, callbacks."""
@@ -282,7 +282,7 @@ def _check_inputs(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows:
         hub_inputs.guide.shape != (rows, 6) or not np.isfinite(hub_inputs.guide).all()
     ):
         raise Refused(engine, f"a guide must be {rows} rows (half steps) of 6 finite numbers")
-    if hub_inputs.held and not np.array_equal(hub_inputs.hubs[1::2], hub_inputs.hubs[:-1:2]):
+    if hub_inputs.constant_in_step and not np.array_equal(hub_inputs.hubs[1::2], hub_inputs.hubs[:-1:2]):
         raise Refused(engine, "held forces change within a step: it must divide the period of their samples")
 
 

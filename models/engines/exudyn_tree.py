@@ -13,7 +13,7 @@ import exudyn as exu
 import numpy as np
 
 from models.engines.exudyn_system import KINDS, items, lists
-from models.vehicles.free_vehicle import anchor, frames, joints
+from models.vehicles.free_vehicle import freedom_axes, joints, last_coordinate_and_joint
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector, steiner
 from models.vehicles.spatial_linear import Preloads
 
@@ -152,9 +152,13 @@ def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
     A rider without freedoms adds its mass to the last link of what it rides on.
     """
     part = replace(build.vehicle, bodies=tuple(bodies))
-    rows, places, ends = joints(part), part.coordinates(), {body.name: anchor(part, body.name) for body in bodies}
+    rows, places, ends = (
+        joints(part),
+        part.coordinates(),
+        {body.name: last_coordinate_and_joint(part, body.name) for body in bodies},
+    )
     links, zero = [Link() for _ in places], [0.0] * len(places)
-    axes, below = frames(part), rows[:, 1].astype(int)
+    axes, below = freedom_axes(part), rows[:, 1].astype(int)
     base = np.array([axes[i] if i >= 0 else np.eye(3) for i in below])
     for body in bodies:
         last, origin = ends[body.name]

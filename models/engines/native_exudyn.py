@@ -30,7 +30,7 @@ from models.engines.native_parts import (
     TurningSpring,
 )
 from models.vehicles.cut_vehicle import Element
-from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
 
 Axial = tuple[Element, AxialTravel]
 """An element with its travel along an axis."""
@@ -174,7 +174,7 @@ def _stiffness_and_damping(element: Element) -> dict[str, float]:
 
 def _preload_travel(element: Element) -> float:
     """Travel of a spring at which its force equals its preload."""
-    return element.held / element.stiffness if element.stiffness else 0.0
+    return element.preload / element.stiffness if element.stiffness else 0.0
 
 
 def _connector_law(group: Sequence[Axial]) -> dict[str, Any]:
@@ -201,7 +201,7 @@ class CoordinateConnectors:
             return self._add_matrix(element, travel)
         if not travel.coordinates:
             return
-        if element.held and not element.stiffness:
+        if element.preload and not element.stiffness:
             self._add_loads(element, travel)
         first, *others = [self._marker(i) for i in travel.coordinates]
         factor, *rest = travel.factors
@@ -238,7 +238,7 @@ class CoordinateConnectors:
     def _add_loads(self, element: Element, travel: CoordinateTravel) -> None:
         """Add the constant force of an element as loads, since a spring without stiffness has none."""
         for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
-            load = items.LoadCoordinate(markerNumber=self._marker(coordinate), load=-factor * element.held)
+            load = items.LoadCoordinate(markerNumber=self._marker(coordinate), load=-factor * element.preload)
             self.built.mbs.AddLoad(load)
 
     def _add_matrix(self, element: Element, travel: CoordinateTravel) -> None:
@@ -252,7 +252,7 @@ class CoordinateConnectors:
                 massMatrix=np.zeros((row.size, row.size)),
                 stiffnessMatrix=element.stiffness * np.outer(row, row),
                 dampingMatrix=element.damping * np.outer(row, row),
-                forceVector=-element.held * row,
+                forceVector=-element.preload * row,
             )
         )
 
@@ -279,7 +279,7 @@ class _Trees:
     def add(self, group: Sequence[Axial]) -> None:
         """Add one connector for a group of parts, from the foot's position on the ground to the tip."""
         (element, travel), *others = group
-        mbs, (link, origin) = self.built.mbs, anchor(self.built.vehicle, travel.body)
+        mbs, (link, origin) = self.built.mbs, last_coordinate_and_joint(self.built.vehicle, travel.body)
         foot = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.built.ground, localPosition=travel.foot.tolist()))
         tip = mbs.AddMarker(
             items.MarkerKinematicTreeRigid(

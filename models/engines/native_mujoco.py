@@ -222,7 +222,7 @@ def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:
         if isinstance(part.travel, CoordinateTravel):
             tendon = model.tendon(f"{i}{NAME_SEPARATOR}{element.name}").id
             model.tendon_stiffness[tendon], model.tendon_damping[tendon] = element.stiffness, element.damping
-            model.tendon_lengthspring[tendon] = -element.held / element.stiffness if element.stiffness else 0.0
+            model.tendon_lengthspring[tendon] = -element.preload / element.stiffness if element.stiffness else 0.0
         for k, force in enumerate(affine_forces(part)):
             actuator = model.actuator(f"{i}.{k}{NAME_SEPARATOR}{element.name}").id
             model.actuator_biasprm[actuator, :3] = force[:3]
@@ -246,8 +246,8 @@ def affine_forces(part: NativePart) -> list[AffineForce]:
     axial, e = isinstance(part.travel, AxialTravel), part.element
     design = part.travel.design if isinstance(part.travel, AxialTravel) else 0.0
     stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
-    held = e.held if axial or not e.stiffness else 0.0
-    line = np.array([held, stiffness, damping]) + sum(_first_pieces(e), np.zeros(3))
+    preload = e.preload if axial or not e.stiffness else 0.0
+    line = np.array([preload, stiffness, damping]) + sum(_first_pieces(e), np.zeros(3))
     forces = [AffineForce(*-line), *_corner_forces(e.travel_force, 1), *_corner_forces(e.rate_force, 2)]
     shifted = [force._replace(constant=force.constant - force.slope * design) for force in forces]
     return [force for force in shifted if any(force[:3])]

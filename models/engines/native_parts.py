@@ -216,12 +216,12 @@ def _divided_element(element: Element, engine: str) -> tuple[Element | None, Ele
     """An element with the law's terms that the engine computes, the element with the terms left to a callback, and the
     reasons. A preload goes with the terms that carry it."""
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
-    left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
+    left, why = replace(element, stiffness=0.0, damping=0.0, preload=0.0), list[str]()
     if curved and engine not in ENGINES_WITH_CURVES:
         why.append(NO_CURVE)
         element = replace(element, travel_force=None, rate_force=None)
         if not element.stiffness:
-            left, element = replace(left, held=element.held), replace(element, held=0.0)
+            left, element = replace(left, preload=element.preload), replace(element, preload=0.0)
     else:
         left = replace(left, travel_force=None, rate_force=None)
     if rough:
@@ -236,7 +236,7 @@ def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
     return tuple(
         NativePart(_joint_force(element), CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors))
         for element in vehicle.joint_elements
-        if element.stiffness or element.damping or element.held
+        if element.stiffness or element.damping or element.preload
     )
 
 
@@ -257,7 +257,7 @@ def _coordinate_numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple
 
 def _joint_force(element: JointElement) -> Element:
     """The force law of a joint element, as an element without points."""
-    still, gains = np.zeros(3), (element.stiffness, element.damping, element.held)
+    still, gains = np.zeros(3), (element.stiffness, element.damping, element.preload)
     return Element(element.name, "", "", still, still, still, *gains, frame="")
 
 

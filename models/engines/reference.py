@@ -18,7 +18,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import check_landings, guard
 from models.machine.compiled import named_closure, njit
-from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
+from models.vehicles.pitch_plane_equations import ADDED_TERMS, RIGHT_HAND_SIDES, parameter_numbers
 
 FLAT_ROAD_INPUT = np.zeros((1, 4))
 """Input of a vehicle on a flat road: one row of zeros."""
@@ -103,7 +103,7 @@ class Reference:
             if assembly.input is None or assembly.moment is None
             else Stacked((assembly.input, assembly.moment))
         )
-        self._p = numbers(assembly.parameters, assembly.vehicle)
+        self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
     def run(self) -> Trajectory:
         """Trajectory over the whole duration; raises RunFailed unless it is complete and finite."""
@@ -244,7 +244,7 @@ _SINGLE: dict[tuple, Any] = {}
 
 def _right_hand_side(mode: str, geometry: str, *added: str):
     """Right-hand side of the equations for one mode and geometry, with the added terms."""
-    return reduce(_summed_right_hand_side, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
+    return reduce(_summed_right_hand_side, (ADDED_TERMS[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
 
 
 def march_of(mode: str, geometry: str, *added: str):

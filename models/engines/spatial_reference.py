@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.vehicles.kinematics import UNIT, End
+from models.vehicles.kinematics import UNIT_AXES, SpringEnd
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, SpatialVehicle, SpringDamper, Vector
 from models.vehicles.spatial_linear import preloads
 
@@ -47,7 +47,7 @@ def cross_product_matrix(v: np.ndarray) -> np.ndarray:
 
 def _rotation_about(axis: int, angle: float) -> np.ndarray:
     """Rotation matrix (3, 3) about coordinate axis number ``axis`` by an angle (rad), after Rodrigues."""
-    cross = cross_product_matrix(UNIT[axis])
+    cross = cross_product_matrix(UNIT_AXES[axis])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
@@ -68,7 +68,7 @@ class SpatialReference:
             m = self.motions[body.name]
             inertia, omega = m.rotation @ np.array(body.inertia) @ m.rotation.T, m.turn @ v
             mass += body.mass * m.shift.T @ m.shift + m.turn.T @ inertia @ m.turn
-            force -= body.mass * m.shift.T @ (m.shift_rest + self.vehicle.gravity * UNIT[2])
+            force -= body.mass * m.shift.T @ (m.shift_rest + self.vehicle.gravity * UNIT_AXES[2])
             force -= m.turn.T @ (inertia @ m.turn_rest + cross_product_matrix(omega) @ inertia @ omega)
         force += self._forces(np.zeros(2 * len(self.vehicle.tyres)) if road is None else road)
         return np.linalg.solve(mass, force)
@@ -82,7 +82,7 @@ class SpatialReference:
             below = (
                 motions[body.parent]
                 if body.parent
-                else BodyMotion(np.zeros(3), UNIT, rows, rows, rows[:, 0], rows[:, 0])
+                else BodyMotion(np.zeros(3), UNIT_AXES, rows, rows, rows[:, 0], rows[:, 0])
             )
             origin = self.vehicle.body(body.parent).position if body.parent else (0.0, 0.0, 0.0)
             arm, turned_rows, omega = np.subtract(body.position, origin), rows.copy(), below.turn @ v
@@ -155,7 +155,9 @@ class SpatialReference:
         moment = self.held.parts[bar.name] + bar.stiffness * turned + bar.damping * row @ self.v
         return np.asarray(-moment * row)
 
-    def _travel(self, from_end: End, to_end: End, axis: Vector, frame: str | None) -> tuple[float, np.ndarray]:
+    def _travel(
+        self, from_end: SpringEnd, to_end: SpringEnd, axis: Vector, frame: str | None
+    ) -> tuple[float, np.ndarray]:
         """Distance (m) of two points along an axis less its value in the design position, axis . (point to_end - point
         from_end), and its derivatives (n,)."""
         (first, of_first), (second, of_second) = self._point(*from_end), self._point(*to_end)

@@ -50,7 +50,7 @@ def _remainder(row: np.ndarray, shared_element: Element | None) -> None:
         shared_element is None or shared_element.rate_force is None,
     )
     row[FORCE_COLUMNS[:4]] = (
-        (shared_element.stiffness, shared_element.damping, shared_element.held, shared_element.friction)
+        (shared_element.stiffness, shared_element.damping, shared_element.preload, shared_element.friction)
         if shared_element
         else 0.0
     )

@@ -15,7 +15,15 @@ from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import GroundSpring
 from models.rail.equations import DERAILED_LIMIT, ROLL, YAW, Equations, Y, Z
-from models.rail.joint_forces import JOINTS, from_joints, joint_forces, rates_of, set_joint_forces, table, to_joints
+from models.rail.joint_forces import (
+    JOINTS,
+    joint_forces,
+    joints_from_states,
+    set_joint_forces,
+    state_rates,
+    states_from_joints,
+    table,
+)
 from models.rail.wheelset import GRAVITY
 from models.vehicles.spatial import Body, SpatialVehicle
 
@@ -26,7 +34,7 @@ def driven_wheelset(equations: Equations) -> Driven:
     """The wheelset as engines build it: bodies in the order of the joints, the suspension at both ends, and the table
     of numbers for the forces of the rails."""
     body = equations.body
-    across, along = body.across, body.along
+    across, along = body.yaw_inertia, body.spin_inertia
     inertia = ((across, 0.0, 0.0), (0.0, along, 0.0), (0.0, 0.0, across))
     track = np.array([0.0, body.lean, 1.0])  # along the track's axes, by a weight's part square to the track
     bodies = (
@@ -36,9 +44,14 @@ def driven_wheelset(equations: Equations) -> Driven:
     )
     springs = tuple(
         GroundSpring(
-            "wheelset", (0.0, arm, 0.0), (0.0, arm, body.sunk), body.stiffness, body.damping, body.carried * track
+            "wheelset",
+            (0.0, arm, 0.0),
+            (0.0, arm, body.rest_height),
+            body.stiffness,
+            body.damping,
+            body.carried_weight * track,
         )
-        for arm in (body.arm, -body.arm)
+        for arm in (body.half_spacing, -body.half_spacing)
     )
     numbers = table(float(equations.speed), equations.rails)
     vehicle = SpatialVehicle("wheelset", bodies, (), (), ())
@@ -56,13 +69,13 @@ class EngineWheelset(Equations):
 
     def rates(self, state: Array) -> Array:
         """Time derivatives (10,) of a state (10,), computed by the engine."""
-        joints = to_joints(np.asarray(state, float))
-        return rates_of(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
+        joints = joints_from_states(np.asarray(state, float))
+        return state_rates(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
     def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States (m, 10) by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
-        joints = to_joints(state)
-        states = from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
+        joints = joints_from_states(state)
+        states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < DERAILED_LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)

@@ -1,1 +1,2 @@
-"""Bodies in a tree, their motion and the forces between them, compiled once for every engine."""
+"""Equations of motion of a vehicle as a tree of bodies, and the forces between the bodies, compiled once for every
+engine."""

@@ -1,4 +1,5 @@
-"""Forces of a vehicle cut at its wheels as forces of its joints, compiled: the one callback of both engines.
+"""Compiled joint forces of a vehicle without its wheels, loaded at its wheel hubs; both engines call them as their one
+callback.
 
 Springs, mounts and bars inside; at every hub the six measured components, or, in the virtual measurement, the tyre on
 its road; and what stabilises roll and pitch. All numbers lie in one table, see ``table``: a head, joints, bodies,
@@ -13,19 +14,19 @@ import numpy as np
 from models.machine.compiled import lean, njit
 from models.machine.stack import array, at, beyond, doubles, start
 from models.multibody.cut_mechanics import (
-    ALONG,
+    JOINT_AXIS,
     PARENT,
     PER_BODY,
     PER_JOINT,
     PER_MOTION,
-    TURNS,
+    ROTATES,
+    add_inertia,
     add_wrench,
-    column,
-    inertia,
+    joint_velocity,
     locate,
     move,
+    rotated,
     solve,
-    turned,
 )
 from models.multibody.parts import on_curve
 from models.multibody.tree import cross, dot, plus, put, three, times
@@ -39,8 +40,8 @@ from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
     HUBS,
     ROAD,
     FRAME,
-    GUIDE,
-    PER_TIME,
+    STABILISER,
+    ROWS_PER_SECOND,
     ROWS,
     COLUMNS,
     GRAVITY,
@@ -50,18 +51,20 @@ from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
     ROLL_DAMPING,
     PITCH_STIFFNESS,
     PITCH_DAMPING,
-    HOLDING,
-    ALL,
+    ENFORCING_RATE,
+    TABLE_SIZE,
     ANY_TIME,
     HEADER,
 ) = range(21)
-"""Head: counts; whether tyres on a road act; frame of the hub forces; what stabilises; rows of inputs per second, rows,
-columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s of the held motion; count of all;
-whether inputs are read at any time, or at half steps alone."""
+"""Indices in the head of the table. Counts of joints, bodies, elements and hubs; whether tyres on a road act; frame of
+the hub forces; kind of stabiliser; rows of inputs per second, rows, columns; gravity (m/s^2); the chassis' last joint;
+speed (m/s); stiffness (N m/rad) and damping (N m s/rad) that pull roll and pitch; rate (1/s) at which an enforced angle
+comes back to its file; count of all numbers; whether inputs are read at any time, or at half steps alone."""
 FRAMES = ("hub", "body", "inertial")
-NONE, PULLED, HELD = range(3)
-"""Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
-FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING = (
+NONE, PULLED, ENFORCED = range(3)
+"""Kinds of stabiliser of roll and pitch: none; a moment towards a given angle and its rate; a moment that enforces the
+given angular acceleration."""
+FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN_TRAVEL, PRELOAD, STIFFNESS, DAMPING = (
     0,
     1,
     4,
@@ -72,29 +75,31 @@ FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN, FORCE, STIFFNE
     13,
     14,
 )
-AXIS_JOINT, FRICTION, FRICTION_RATE, ON_TRAVEL, ON_RATE, PER_ELEMENT = range(15, 21)
-"""Numbers of an element: last joint and point of both ends, axis, travel at rest, preload, N/m, N s/m; the last joint
-of the body in which the axis is fixed, N, m/s, and where the table has its curves (0: nowhere)."""
+AXIS_JOINT, FRICTION, FRICTION_RATE, TRAVEL_CURVE, RATE_CURVE, PER_ELEMENT = range(15, 21)
+"""Further indices of the numbers of a spring, mount or bar: the last joint of the body in which its axis is fixed,
+friction force (N), friction speed (m/s), and where the table has its curves of force over travel and over rate (0:
+nowhere)."""
 LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, ONE_SIDED, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10, 11
-WRENCH, GUIDING = 6, 6
-"""Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
+WRENCH, GUIDE_COLUMNS = 6, 6
+"""Number of columns of the inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their
+accelerations."""
 
 
 class JointMotion(NamedTuple):
-    """Joints and how they move.
+    """Joint table of a cut vehicle, with its coordinates, rates and the motion of its bodies.
 
-    joints (n, PER_JOINT) : as in the table; q, v (n,) : coordinates and rates; m (n + 1, PER_MOTION) : what is behind
-    each joint, see ``cut_mechanics``.
+    joints (n, PER_JOINT) : as in the table; q, v (n,) : coordinates and rates; links (n + 1, PER_MOTION) :
+    motion of the body behind each joint, see ``cut_mechanics``.
     """
 
     joints: np.ndarray
     q: np.ndarray
     v: np.ndarray
-    m: np.ndarray
+    links: np.ndarray
 
 
 class ForceReport(NamedTuple):
-    """Forces that ``forces`` reports of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the
+    """Forces of a cut vehicle at one state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the
     declared frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
 
     elements: np.ndarray
@@ -103,89 +108,94 @@ class ForceReport(NamedTuple):
 
 
 @lean
-def _element(e, numbers, motion, chassis, row):
-    """Force of an element. ``row`` (n,) receives the derivative of its travel with respect to the joints behind the
-    chassis."""
-    joints, m = motion.joints, motion.m
-    axis, travel, rate = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS)), -e[DESIGN], 0.0
-    row[:] = 0.0
+def _element_force(element, numbers, motion, chassis, travel_gradient):
+    """Force of a spring, mount or bar, N or N m. Fills ``travel_gradient`` (n,) with the derivatives of its travel with
+    respect to the joint coordinates behind the chassis."""
+    joints, links = motion.joints, motion.links
+    axis, travel, rate = (
+        rotated(links[int(element[AXIS_JOINT]) + 1], three(element, AXIS)),
+        -element[DESIGN_TRAVEL],
+        0.0,
+    )
+    travel_gradient[:] = 0.0
     for side in range(2):
-        sign, j = 2.0 * side - 1.0, int(e[SECOND_BODY * side])
-        end = locate(m[j + 1], e, SECOND_BODY * side + 1)
+        sign, j = 2.0 * side - 1.0, int(element[SECOND_BODY * side])
+        end = locate(links[j + 1], element, SECOND_BODY * side + 1)
         for k in range(3):
             travel += sign * axis[k] * end[k]
         while j > chassis:
-            along = dot(axis, column(joints[j, TURNS], m[j + 1], end))
-            row[j] += sign * along
+            along = dot(axis, joint_velocity(joints[j, ROTATES], links[j + 1], end))
+            travel_gradient[j] += sign * along
             rate += sign * along * motion.v[j]
             j = int(joints[j, PARENT])
-    if e[AXIS_JOINT] > chassis:
-        rate += _turn_axis(e, motion, chassis, axis, row)
-    force = e[FORCE] + e[STIFFNESS] * travel + e[DAMPING] * rate
-    if e[FRICTION] != 0.0:
-        force += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
-    if e[ON_TRAVEL] != 0.0:
-        force += on_curve(beyond(start(numbers), int(e[ON_TRAVEL])), travel)
-    if e[ON_RATE] != 0.0:
-        force += on_curve(beyond(start(numbers), int(e[ON_RATE])), rate)
+    if element[AXIS_JOINT] > chassis:
+        rate += _add_axis_rotation(element, motion, chassis, axis, travel_gradient)
+    force = element[PRELOAD] + element[STIFFNESS] * travel + element[DAMPING] * rate
+    if element[FRICTION] != 0.0:
+        force += element[FRICTION] * math.tanh(rate / element[FRICTION_RATE])
+    if element[TRAVEL_CURVE] != 0.0:
+        force += on_curve(beyond(start(numbers), int(element[TRAVEL_CURVE])), travel)
+    if element[RATE_CURVE] != 0.0:
+        force += on_curve(beyond(start(numbers), int(element[RATE_CURVE])), rate)
     return force
 
 
 @lean
-def _read_inputs(head, inputs, t, row):
-    """Fill ``row`` with the inputs at a time (s): those of the nearest half step; for methods with variable steps, of a
-    parabola through the three rows of a step."""
-    last, place = len(inputs) - 1, t * head[PER_TIME]
+def _read_inputs(head, inputs, t, input_row):
+    """Fill ``input_row`` with the inputs at a time (s): those of the nearest half step or, for methods with variable
+    steps, of a parabola through the three rows of a step."""
+    last, place = len(inputs) - 1, t * head[ROWS_PER_SECOND]
     if head[ANY_TIME] == 0.0:
         nearest = min(max(int(np.rint(place)), 0), last)
-        for k in range(len(row)):
-            row[k] = inputs[nearest, k]
+        for k in range(len(input_row)):
+            input_row[k] = inputs[nearest, k]
         return
     first = 2 * min(max(int(place / 2.0), 0), (last - 2) // 2)
     part = min(max(place - first, 0.0), 2.0)
     begin, middle, end = 0.5 * (part - 1.0) * (part - 2.0), part * (2.0 - part), 0.5 * part * (part - 1.0)
-    for k in range(len(row)):
-        row[k] = begin * inputs[first, k] + middle * inputs[first + 1, k] + end * inputs[first + 2, k]
+    for k in range(len(input_row)):
+        input_row[k] = begin * inputs[first, k] + middle * inputs[first + 1, k] + end * inputs[first + 2, k]
 
 
 @lean
-def ends_apart(e, m):
-    """Vector from the first to the second point of an element."""
+def span_vector(element, links):
+    """Vector (m, in space) from the first to the second attachment point of a spring, mount or bar."""
     return plus(
-        locate(m[int(e[SECOND_BODY]) + 1], e, SECOND_POINT),
-        times(locate(m[int(e[FIRST_BODY]) + 1], e, FIRST_POINT), -1.0),
+        locate(links[int(element[SECOND_BODY]) + 1], element, SECOND_POINT),
+        times(locate(links[int(element[FIRST_BODY]) + 1], element, FIRST_POINT), -1.0),
     )
 
 
 @lean
-def _turn_axis(e, motion, chassis, axis, row):
-    """Add to ``row`` the change of an element's travel by the rotation of its axis relative to the chassis; returns the
-    rate of this change."""
-    joints, m = motion.joints, motion.m
-    moved, rate, j = cross(axis, ends_apart(e, m)), 0.0, int(e[AXIS_JOINT])
+def _add_axis_rotation(element, motion, chassis, axis, travel_gradient):
+    """Add to ``travel_gradient`` the derivatives of an element's travel that come from the rotation of its axis
+    relative to the chassis. Returns this part of the rate of travel."""
+    joints, links = motion.joints, motion.links
+    moved, rate, j = cross(axis, span_vector(element, links)), 0.0, int(element[AXIS_JOINT])
     while j > chassis:
-        along = joints[j, TURNS] * dot(moved, three(m[j + 1], ALONG))
-        row[j] += along
+        along = joints[j, ROTATES] * dot(moved, three(links[j + 1], JOINT_AXIS))
+        travel_gradient[j] += along
         rate += along * motion.v[j]
         j = int(joints[j, PARENT])
     return rate
 
 
 @lean
-def _tyre(hub, motion, place, road, speed):
-    """Force and moment (in space) on the hub, at ``place``, from a tyre on a road with height (m) and rate (m/s).
+def _tyre_wrench(hub, motion, position, road, speed):
+    """Force (N) and moment (N m), in space, on a wheel hub at ``position`` from its tyre on a road with height (m) and
+    vertical velocity (m/s).
 
     The side force of a tyre that only pushes goes with its load: in the air it has none.
     """
     height, rate = road
-    joints, m, v = motion.joints, motion.m, motion.v
-    down, j, risen, sideways = turned(m[ROLL + 1], (0.0, 0.0, -hub[HEIGHT])), int(hub[LAST]), 0.0, 0.0
-    point = plus(place, down)
+    joints, links, v = motion.joints, motion.links, motion.v
+    down, j, risen, sideways = rotated(links[ROLL + 1], (0.0, 0.0, -hub[HEIGHT])), int(hub[LAST]), 0.0, 0.0
+    point = plus(position, down)
     while j >= 0:
-        risen += column(joints[j, TURNS], m[j + 1], place)[2] * v[j]
-        sideways += column(joints[j, TURNS], m[j + 1], point)[1] * v[j]
+        risen += joint_velocity(joints[j, ROTATES], links[j + 1], position)[2] * v[j]
+        sideways += joint_velocity(joints[j, ROTATES], links[j + 1], point)[1] * v[j]
         j = int(joints[j, PARENT])
-    elastic, grip = hub[LOAD] + hub[TYRE] * (height - place[2] + hub[HEIGHT]), 1.0
+    elastic, grip = hub[LOAD] + hub[TYRE] * (height - position[2] + hub[HEIGHT]), 1.0
     load = elastic + hub[TYRE_DAMPING] * (rate - risen)
     if hub[ONE_SIDED] != 0.0:
         load = max(min(load, 2.0 * elastic), 0.0)
@@ -195,32 +205,32 @@ def _tyre(hub, motion, place, road, speed):
 
 
 @lean
-def frame(head, hub):
-    """Index of the row of ``m`` whose axes are used for a hub's wrench."""
+def wrench_axes_row(head, hub):
+    """Index of the row of ``links`` in whose axes the force and moment of a hub are given."""
     return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
 
 
 @lean
-def _enforce(head, wanted, bodies, motion, out, moments):
-    """Write the moments (roll, pitch), N m, that produce the wanted angular accelerations in both."""
-    n, w, q, v = len(motion.joints), head[HOLDING], motion.q, motion.v
+def _enforce_roll_and_pitch(head, guide, bodies, motion, out, moments):
+    """Write the moments (roll, pitch), N m, that make the roll and pitch accelerations follow the given motion."""
+    n, w, q, v = len(motion.joints), head[ENFORCING_RATE], motion.q, motion.v
     mass, sides = array(doubles(n * n), (n, n)), array(doubles(3 * n), (3, n))
     sides[:] = 0.0
     for j in range(n):
         sides[0, j] = out[j]
     sides[1, ROLL] = sides[2, PITCH] = 1.0
-    inertia(motion.joints, bodies, motion.m, head[GRAVITY], mass, sides[0])
+    add_inertia(motion.joints, bodies, motion.links, head[GRAVITY], mass, sides[0])
     solve(mass, sides)
-    roll = wanted[4] + 2.0 * w * (wanted[2] - v[ROLL]) + w * w * (wanted[0] - q[ROLL]) - sides[0, ROLL]
-    pitch = wanted[5] + 2.0 * w * (wanted[3] - v[PITCH]) + w * w * (wanted[1] - q[PITCH]) - sides[0, PITCH]
+    roll = guide[4] + 2.0 * w * (guide[2] - v[ROLL]) + w * w * (guide[0] - q[ROLL]) - sides[0, ROLL]
+    pitch = guide[5] + 2.0 * w * (guide[3] - v[PITCH]) + w * w * (guide[1] - q[PITCH]) - sides[0, PITCH]
     a, b, c, d = sides[1, ROLL], sides[2, ROLL], sides[1, PITCH], sides[2, PITCH]
     moments[0] = (d * roll - b * pitch) / (a * d - b * c)
     moments[1] = (a * pitch - c * roll) / (a * d - b * c)
 
 
 @njit(cache=True, error_model="numpy")
-def parts(numbers):
-    """Views of the parts of the table: head, joints, bodies, elements, hubs, inputs."""
+def table_views(numbers):
+    """Views of the sections of the table of numbers: head, joints, bodies, elements, hubs, inputs."""
     head = numbers[:HEADER]
     n, b, e, h = int(head[JOINTS]), int(head[BODIES]), int(head[ELEMENTS]), int(head[HUBS])
     joints_end = HEADER + PER_JOINT * n
@@ -238,73 +248,82 @@ def parts(numbers):
 
 
 @njit(cache=True, error_model="numpy")
-def forces(numbers, t, q, v, m, out, told):
-    """Add the forces of all elements and hubs to the joint forces ``out`` (n,) at a time (s), coordinates and rates
-    (n,).
+def forces(numbers, t, q, v, links, out, force_report):
+    """Add the forces of all elements, hubs and stabilisers to the joint forces ``out`` (n,) at a time (s), coordinates
+    and rates (n,).
 
-    Also fills ``m`` and the ``ForceReport``.
+    Also fills ``links`` and the ``ForceReport``.
     """
-    head, joints, bodies, elements, hubs, inputs = parts(numbers)
+    head, joints, bodies, elements, hubs, inputs = table_views(numbers)
     columns = int(head[COLUMNS])
     row = array(doubles(columns), (columns,))
     _read_inputs(head, inputs, t, row)
-    chassis, count, motion, moments = int(head[CHASSIS]), len(hubs), JointMotion(joints, q, v, m), told.moments
+    chassis, count, motion, moments = (
+        int(head[CHASSIS]),
+        len(hubs),
+        JointMotion(joints, q, v, links),
+        force_report.moments,
+    )
     travel = array(doubles(len(joints)), (len(joints),))
-    move(joints, q, v, m)
+    move(joints, q, v, links)
     for i in range(len(elements)):
-        told.elements[i] = _element(elements[i], numbers, motion, chassis, travel)
+        force_report.elements[i] = _element_force(elements[i], numbers, motion, chassis, travel)
         for j in range(chassis + 1, len(joints)):
-            out[j] -= told.elements[i] * travel[j]
+            out[j] -= force_report.elements[i] * travel[j]
     for i in range(count):
-        hub, known, axes = hubs[i], told.wrenches[i], m[frame(head, hubs[i])]
-        place = locate(m[int(hub[LAST]) + 1], hub, ARM)
+        hub, known, axes = hubs[i], force_report.wrenches[i], links[wrench_axes_row(head, hubs[i])]
+        place = locate(links[int(hub[LAST]) + 1], hub, ARM)
         if head[ROAD] != 0.0:
-            force, moment = _tyre(hub, motion, place, (row[i], row[count + i]), head[SPEED])
+            force, moment = _tyre_wrench(hub, motion, place, (row[i], row[count + i]), head[SPEED])
             put(known, 0, into(axes, force, 0))
             put(known, 3, into(axes, moment, 0))
         else:
             for k in range(WRENCH):
                 known[k] = row[WRENCH * i + k]
-            force, moment = turned(axes, three(known, 0)), turned(axes, three(known, 3))
-        add_wrench(joints, m, int(hub[LAST]), place, force, moment, out)
+            force, moment = rotated(axes, three(known, 0)), rotated(axes, three(known, 3))
+        add_wrench(joints, links, int(hub[LAST]), place, force, moment, out)
     moments[0] = moments[1] = 0.0
-    wanted = row[len(row) - GUIDING :]
-    if head[GUIDE] == PULLED:
+    wanted = row[len(row) - GUIDE_COLUMNS :]
+    if head[STABILISER] == PULLED:
         moments[0] = head[ROLL_STIFFNESS] * (wanted[0] - q[ROLL]) + head[ROLL_DAMPING] * (wanted[2] - v[ROLL])
         moments[1] = head[PITCH_STIFFNESS] * (wanted[1] - q[PITCH]) + head[PITCH_DAMPING] * (wanted[3] - v[PITCH])
-    elif head[GUIDE] == HELD:
-        _enforce(head, wanted, bodies, motion, out, moments)
+    elif head[STABILISER] == ENFORCED:
+        _enforce_roll_and_pitch(head, wanted, bodies, motion, out, moments)
     out[ROLL] += moments[0]
     out[PITCH] += moments[1]
 
 
 @njit(cache=True, error_model="numpy")
-def report(numbers, times, states, inside, wrenches, moments):
-    """Fill the quantities of ``ForceReport`` for states (m, 2 n) at times (m,), one row per state."""
+def report(numbers, times, states, element_forces, wrenches, moments):
+    """Fill the arrays of a ``ForceReport`` for states (m, 2 n) at times (m,), one row per state."""
     n = states.shape[1] // 2
-    m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
+    links, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
     for i in range(len(times)):
         out[:] = 0.0  # what enforces an angle is found from all joint forces of this state
-        told = ForceReport(inside[i], wrenches[i], moments[i])
-        forces(numbers, times[i], states[i, :n], states[i, n:], m, out, told)
+        force_report = ForceReport(element_forces[i], wrenches[i], moments[i])
+        forces(numbers, times[i], states[i, :n], states[i, n:], links, out, force_report)
 
 
 @njit(cache=True, error_model="numpy")
 def accelerate(numbers, t, q, v, out):
-    """Write the accelerations (n,) of the written-out equations at a time (s), coordinates and rates (n,)."""
-    head, joints, bodies, elements, hubs, _ = parts(numbers)
+    """Write the accelerations (n,) from the hand-written equations of motion at a time (s), coordinates and rates
+    (n,)."""
+    head, joints, bodies, elements, hubs, _ = table_views(numbers)
     n, e, h = len(joints), len(elements), len(hubs)
-    m, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
-    told = ForceReport(array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,)))
+    links, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
+    force_report = ForceReport(
+        array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,))
+    )
     out[:] = 0.0
-    forces(numbers, t, q, v, m, out, told)
-    inertia(joints, bodies, m, head[GRAVITY], mass, out)
+    forces(numbers, t, q, v, links, out, force_report)
+    add_inertia(joints, bodies, links, head[GRAVITY], mass, out)
     solve(mass, array(start(out), (1, n)))
 
 
 @njit(cache=True, error_model="numpy")
 def march(numbers, states, step):
-    """Fill the states (m, 2 n) from the first row on, by the classical Runge-Kutta method with steps (s)."""
+    """Integrate the equations of motion from the first row of the states (m, 2 n), by the classical Runge-Kutta method
+    with a fixed step (s)."""
     size = states.shape[1]
     n = size // 2
     rate, total, here = array(doubles(size), (size,)), array(doubles(size), (size,)), array(doubles(size), (size,))
@@ -324,18 +343,23 @@ def march(numbers, states, step):
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(numbers, t, q, v, f):
-    """Add the joints' forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
+    """Add the forces on all joints of a cut vehicle to ``f``. For callbacks: all arguments but the time (s) are
+    pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
-    m = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION))
-    told = ForceReport(array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,)))
-    forces(array(numbers, (int(head[ALL]),)), t, array(q, (n,)), array(v, (n,)), m, array(f, (n,)), told)
+    links = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION))
+    force_report = ForceReport(
+        array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,))
+    )
+    forces(
+        array(numbers, (int(head[TABLE_SIZE]),)), t, array(q, (n,)), array(v, (n,)), links, array(f, (n,)), force_report
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
-    then the table."""
+    """Set ``f`` to the forces of ``joint_forces``. All data lie in one block of doubles at a memory address: f, q and v
+    (n,), then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

@@ -1,4 +1,5 @@
-"""The table that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over time."""
+"""Table of numbers that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over
+time."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -8,21 +9,22 @@ import numpy as np
 from models.multibody import cut_kernel as kernel
 from models.multibody.parts import curve_numbers
 from models.vehicles.cut_vehicle import ROLL, CutVehicle, Element
-from models.vehicles.free_vehicle import anchor
 from models.vehicles.free_vehicle import joints as free_joints
+from models.vehicles.free_vehicle import last_coordinate_and_joint
 from models.vehicles.spatial import Vector
 
 
 @dataclass(frozen=True)
 class HubInputs:
-    """Inputs at the hubs of a cut vehicle and of its stabiliser, at half steps: rows i at the time i step / 2.
+    """Measured loads at the wheel hubs of a cut vehicle, and its prescribed roll and pitch, at half steps: row i is at
+    the time of i / 2 steps.
 
     hubs : (m, 6 h), force (N) and moment (N m) of each hub in ``frame``, "hub", "body" or "inertial"; or, on a road,
         (m, 2 h), heights (m) under the hubs, then their rates (m/s), for a vehicle that travels at ``speed`` (m/s)
-    guide : (m, 6), roll, pitch, rates and accelerations to hold, rad; None leaves the vehicle free
-    pull : stiffness and damping (N m/rad, N m s/rad) of roll, then pitch, towards them; None enforces them
-    holding : 1/s, how fast an enforced angle comes back to its file, critically damped
-    held : whether the hubs' forces at the start of a step are those of the whole step
+    guide : (m, 6), prescribed roll, pitch, their rates and accelerations (rad, per s); None leaves the vehicle free
+    pull : stiffness and damping (N m/rad, N m s/rad) of roll, then pitch, towards these angles; None enforces them
+    enforcing_rate : 1/s, how fast an enforced angle comes back to its prescribed course, critically damped
+    constant_in_step : whether the hubs' forces at the start of a step are those of the whole step
     """
 
     hubs: np.ndarray
@@ -30,8 +32,8 @@ class HubInputs:
     speed: float = 0.0
     guide: np.ndarray | None = None
     pull: tuple[float, float, float, float] | None = None
-    holding: float = 20.0
-    held: bool = False
+    enforcing_rate: float = 20.0
+    constant_in_step: bool = False
 
     @property
     def road(self) -> bool:
@@ -43,47 +45,50 @@ class HubInputs:
         """Inputs in the form that the kernel reads: (m, 6 h or 2 h), with 6 more columns if there is a guide."""
         return self.hubs if self.guide is None else np.hstack([self.hubs, self.guide])
 
-    def spans(self) -> list[tuple[int, int]]:
-        """First and last step of each time span in which the hubs' forces are constant, in order."""
+    def constant_force_spans(self) -> list[tuple[int, int]]:
+        """First and last step of each time span in which the hub forces are constant, in order of time."""
         begins = self.hubs[:-1:2]
         changes = np.flatnonzero((begins[1:] != begins[:-1]).any(axis=1)) + 1
         ends = [0, *changes.tolist(), len(begins)]
         return list(itertools.pairwise(ends))
 
-    def during(self, first: int, last_step: int) -> "HubInputs":
-        """The hub inputs of one span of steps; its time starts at 0."""
-        hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last_step - first) + 1, axis=0)
-        return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last_step + 1])
+    def in_steps(self, first_step: int, last_step: int) -> "HubInputs":
+        """Hub inputs of the steps from ``first`` to ``last_step`` alone; their time starts at 0."""
+        hubs = np.repeat(self.hubs[2 * first_step : 2 * first_step + 1], 2 * (last_step - first_step) + 1, axis=0)
+        return replace(
+            self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first_step : 2 * last_step + 1]
+        )
 
 
 @dataclass(frozen=True)
 class Joints:
-    """Table of the joints of a cut vehicle, and for every body the index of its ``last`` joint and the position (m) of
+    """Joint table of a cut vehicle. For every body by name: the index of its last joint, and the position (m) of
     that joint."""
 
     rows: np.ndarray
-    last: dict[str, int]
-    origin: dict[str, Vector]
+    last_joint: dict[str, int]
+    joint_position: dict[str, Vector]
 
 
 def joints(vehicle: CutVehicle) -> Joints:
-    """Joints in the order of the coordinates; all joints of a body have the same position, that of the first."""
+    """Joint table of a cut vehicle, in the order of its coordinates. All joints of a body have the same position, that
+    of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
-    anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
+    anchors = {body.name: last_coordinate_and_joint(vehicle.tree, body.name) for body in vehicle.tree.bodies}
     rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
     origin = {name: place for name, (_, place) in anchors.items()}
     return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
 
 
 def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray:
-    """Table of all numbers for a run with a step (s)."""
+    """Table of all numbers that the compiled forces of a cut vehicle read, for a run with a step (s)."""
     joined = joints(vehicle)
     bodies = []
     for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):
-        arm = np.subtract(body.position, joined.origin[body.name])
-        bodies.append([joined.last[body.name], body.mass, *arm, *np.ravel(body.inertia)])
-    elements = [_element(element, joined) for element in vehicle.elements]
-    hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
+        arm = np.subtract(body.position, joined.joint_position[body.name])
+        bodies.append([joined.last_joint[body.name], body.mass, *arm, *np.ravel(body.inertia)])
+    elements = [_element_numbers(element, joined) for element in vehicle.elements]
+    hubs = [_hub_numbers(vehicle, joined, i) for i in range(len(vehicle.hubs))]
     inputs = hub_inputs.rows
     head = np.zeros(kernel.HEADER)
     counts = [len(rows) for rows in (joined.rows, bodies, elements, hubs)]
@@ -93,43 +98,65 @@ def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray
         kernel.FRAMES.index(hub_inputs.frame),
         hub_inputs.speed,
     )
-    head[[kernel.PER_TIME, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
-    head[[kernel.GRAVITY, kernel.CHASSIS, kernel.HOLDING]] = vehicle.tree.gravity, ROLL, hub_inputs.holding
+    head[[kernel.ROWS_PER_SECOND, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
+    head[[kernel.GRAVITY, kernel.CHASSIS, kernel.ENFORCING_RATE]] = (
+        vehicle.tree.gravity,
+        ROLL,
+        hub_inputs.enforcing_rate,
+    )
     if hub_inputs.guide is not None:
-        head[kernel.GUIDE] = kernel.PULLED if hub_inputs.pull else kernel.HELD
+        head[kernel.STABILISER] = kernel.PULLED if hub_inputs.pull else kernel.ENFORCED
     head[kernel.ROLL_STIFFNESS : kernel.PITCH_DAMPING + 1] = hub_inputs.pull or 0.0
     rows = np.array(elements, float).reshape(-1, kernel.PER_ELEMENT)
     parts = (head, joined.rows, np.array(bodies, float), rows, np.array(hubs), inputs)
     curves = _put_curves(vehicle, rows, sum(part.size for part in parts))
     whole = np.concatenate([*(np.ravel(part) for part in parts), curves])
-    whole[kernel.ALL] = len(whole)
+    whole[kernel.TABLE_SIZE] = len(whole)
     return whole
 
 
 def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all curves. The position of each, counted from ``first``, is also written into its element's row."""
+    """Numbers of all force curves. The position of each curve, counted from ``first``, is also written into its
+    element's row."""
     placed = list[float]()
     for row, element in zip(rows, vehicle.elements, strict=True):
-        for column, curve in ((kernel.ON_TRAVEL, element.travel_force), (kernel.ON_RATE, element.rate_force)):
+        for column, curve in ((kernel.TRAVEL_CURVE, element.travel_force), (kernel.RATE_CURVE, element.rate_force)):
             if curve is not None:
                 row[column] = first + len(placed)
                 placed += curve_numbers(curve).tolist()
     return np.array(placed)
 
 
-def _element(e: Element, joined: Joints) -> list[float]:
+def _element_numbers(element: Element, joined: Joints) -> list[float]:
     first, two = (
-        np.subtract(e.first_point, joined.origin[e.first_body]),
-        np.subtract(e.second_point, joined.origin[e.second_body]),
+        np.subtract(element.first_point, joined.joint_position[element.first_body]),
+        np.subtract(element.second_point, joined.joint_position[element.second_body]),
     )
-    law = (e.held, e.stiffness, e.damping, joined.last[e.frame], e.friction, e.friction_rate, 0.0, 0.0)
-    return [joined.last[e.first_body], *first, joined.last[e.second_body], *two, *e.axis, e.design, *law]
+    law = (
+        element.preload,
+        element.stiffness,
+        element.damping,
+        joined.last_joint[element.frame],
+        element.friction,
+        element.friction_rate,
+        0.0,
+        0.0,
+    )
+    return [
+        joined.last_joint[element.first_body],
+        *first,
+        joined.last_joint[element.second_body],
+        *two,
+        *element.axis,
+        element.design,
+        *law,
+    ]
 
 
-def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
-    """Numbers of a hub, including its former tyre."""
+def _hub_numbers(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
+    """Numbers of a wheel hub, including those of the tyre that was on it."""
     tyre = vehicle.uncut.tyres[i]
     side = next((force for force in vehicle.uncut.side_forces if force.name == tyre.name), None)
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)
-    arm = np.subtract(tyre.point, joined.origin[tyre.body])
-    return [joined.last[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]
+    arm = np.subtract(tyre.point, joined.joint_position[tyre.body])
+    return [joined.last_joint[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]

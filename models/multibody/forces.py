@@ -1,4 +1,4 @@
-"""Compiled forces on every coordinate of a free vehicle: springs, bars, tyres, drag and the torques on its wheels.
+"""Compiled generalised forces of a free vehicle: springs, bars, tyres, drag and the torques on its wheels.
 
 Weights and inertia are the engine's. A vehicle's numbers are one table of doubles, as ``numbers`` packs them: head,
 coordinates, points, spring-dampers and bars, tyres, controls, waves of the road, net of the patch, curves. What is
@@ -18,8 +18,15 @@ import math
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond, doubles, row, start
-from models.multibody.moving_vehicle import MovingVehicle, Tree, WheelContact, carried_velocity, carrier_frame, in_space
-from models.multibody.parts import press
+from models.multibody.moving_vehicle import (
+    MovingVehicle,
+    Tree,
+    WheelContact,
+    carried_velocity,
+    carrier_frame,
+    ground_position,
+)
+from models.multibody.parts import add_part_forces
 from models.multibody.tree import (
     GROUND,
     PER_LINK,
@@ -72,13 +79,13 @@ from models.tyre.bristles import FIRST_FLEXIBILITY, tyre_forces
     OF_STRIPS,
     HEADER,
 ) = range(23)
-"""Head: count of all numbers; how many coordinates, points, parts, tyres, knots of a control (three), waves; the
-chassis' last coordinate; drag (N s^2/m^2) and its place from there; cells, strips and middle of the net; where each
-begins."""
+"""Indices in the head of the table: count of all numbers; counts of coordinates, points, springs and bars, tyres, knots
+of a control (three controls), road waves; the chassis' last coordinate; drag (N s^2/m^2) and its point of action from
+there; cells, strips and middle of the tyre patch's grid; where each section begins."""
 STEER, BRAKE, DRIVE, FIRST_PUSH = range(4)
 PUSHED_BY, PUSHED_AT, PUSH_AXIS, PER_PUSH = 0, 1, 4, 7
-"""Of a push from outside: the coordinate that moves its body last, its place from there (m), its axis in the frame of
-the carrier. These rows, and then their count, stand before the controls, the last of which are their forces (N)."""
+"""Indices of the numbers of an external push: the last coordinate of the pushed body, the point of action from there
+(m), the direction in the axes of the carrier."""
 (
     KNUCKLE,
     ROTOR,
@@ -100,43 +107,44 @@ the carrier. These rows, and then their count, stand before the controls, the la
     TOWED,
     PER_TYRE,
 ) = range(19)
-"""Numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at rest (m); F0
-(N), k_z, c_z; R, b (m), k (N/m^3), mu; shares of steering, brake and drive; inclination (rad); spin (rad/s) at which
-the brake's torque is whole; last coordinate of what carries it, the chassis or a towed body, and whether it is towed:
-then the wheel keeps to the heading of that body's x axis, else to the carrier's."""
+"""Indices of the numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at
+rest (m); F0 (N), k_z, c_z; R, b (m), k (N/m^3), mu; shares of steering, brake and drive; inclination (rad); spin
+(rad/s) at which the brake's torque is fully developed; last coordinate of the chassis or towed body that carries the
+wheel, and whether that is a towed body: then the wheel keeps to the heading of that body's x axis, else to the
+carrier's."""
 (PRESS, FX, FY, MZ, SLIP_X, SLIP_Y, TREAD, TURN, POWER, STEER_MOMENT, ANGLE, SPIN_TORQUE, REPORTED) = range(13)
-"""Columns of a tyre's report: load (N), creep forces and moment on it in its own axes, slip velocities along and
-across (m/s), speed of the tread (m/s), turning (1/s), their power (W), moment about the steering axis (N m), steer
-angle (rad), torque on the wheel by brake and drive (N m)."""
+"""Columns of a tyre's report: load (N), creep forces and moment on it in its own axes, slip velocities along and across
+(m/s), speed of the tread (m/s), rate of turning (1/s), power of the creep forces (W), moment about the steering axis (N
+m), steer angle (rad), torque on the wheel by brake and drive (N m)."""
 POTENTIAL, DISSIPATED, TORQUE_POWER, STEER_POWER, LEDGER = range(5)
-"""Columns of the ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers, drag and
-pushes; of brakes and drive on wheels; of the steering on the wheels."""
+"""Columns of the energy ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers, drag
+and pushes; of brakes and drive on wheels; of the steering on the wheels."""
 CENTRE, DOWN, ROLLING, ACROSS, NORMAL, AXLE, LOADING, PASSING, WAY = *range(0, 24, 3), 24
-"""Of a wheel's way: its centre, the arm from there to the contact, axes along, across and normal to the road, axle,
-force of its load, velocity of its centre (3 each)."""
+"""Indices of the geometry of a wheel's contact: its centre, the arm from there to the contact, axes along, across and
+normal to the road, axle, force of its load, velocity of its centre (3 each)."""
 
 
 @lean
-def control(numbers, first, which, count, t):
-    """Value and rate of a control at a time (s). Its rate is 0 at every knot; between knots it follows the smoothest
-    polynomial of degree 5."""
-    knots = numbers[first + 2 * which * count :]
+def control(numbers, table_index, control_index, knot_count, t):
+    """Value and rate (per s) of a steering, brake, drive or push control at a time (s). Its rate is 0 at every knot;
+    between knots it follows the smoothest polynomial of degree 5."""
+    knots = numbers[table_index + 2 * control_index * knot_count :]
     if t <= knots[0]:
-        return knots[count], 0.0
-    for i in range(1, count):
+        return knots[knot_count], 0.0
+    for i in range(1, knot_count):
         if t < knots[i]:
-            span, rise = knots[i] - knots[i - 1], knots[count + i] - knots[count + i - 1]
+            span, rise = knots[i] - knots[i - 1], knots[knot_count + i] - knots[knot_count + i - 1]
             u = (t - knots[i - 1]) / span
             grown = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
-            return knots[count + i - 1] + rise * grown, rise * 30.0 * (u * (1.0 - u)) ** 2 / span
-    return knots[2 * count - 1], 0.0
+            return knots[knot_count + i - 1] + rise * grown, rise * 30.0 * (u * (1.0 - u)) ** 2 / span
+    return knots[2 * knot_count - 1], 0.0
 
 
 @lean
-def height(waves, count, x, y):
-    """Height (m) of the road at a place (m) and its slopes along x and y: a sum of plane waves."""
+def height(waves, wave_count, x, y):
+    """Height (m) of the road at x, y (m), and its slopes along x and y: a sum of plane waves."""
     z = along = across = 0.0
-    for i in range(0, 4 * count, 4):
+    for i in range(0, 4 * wave_count, 4):
         phase = waves[i] * x + waves[i + 1] * y
         cosine, sine = math.cos(phase), math.sin(phase)
         z += waves[i + 2] * cosine + waves[i + 3] * sine
@@ -147,49 +155,52 @@ def height(waves, count, x, y):
 
 
 @lean
-def _axle(steer, inclined):
-    """Unit vector along the axle, to the left, of a wheel that is steered and inclined."""
+def _axle(steer, inclination):
+    """Unit vector along the axle, to the left, of a wheel at steer angle ``steer`` and inclination ``inclination``
+    (rad)."""
     cosine, sine, level, lean_of = 1.0, 0.0, 1.0, 0.0
     if steer != 0.0:
         cosine, sine = math.cos(steer), math.sin(steer)
-    if inclined != 0.0:
-        level, lean_of = math.cos(inclined), math.sin(inclined)
+    if inclination != 0.0:
+        level, lean_of = math.cos(inclination), math.sin(inclination)
     return -sine * level, cosine * level, lean_of
 
 
 @lean
-def _turned_to(link, axle):
-    """Rotate an axle in the road's plane, from the carrier's heading to the heading of a link's x axis."""
+def _axle_of_towed_wheel(link, axle):
+    """Axle of a towed body's wheel, rotated in the road's plane from the carrier's heading to the heading of the x axis
+    of ``link``."""
     x, y, _ = three(link, TURNED)
     level = math.sqrt(x * x + y * y)
     return (x * axle[0] - y * axle[1]) / level, (y * axle[0] + x * axle[1]) / level, axle[2]
 
 
 @lean
-def _road_under(waves, count, frame, place):
-    """Height (m) of the road, and the vector (-dz/dx, -dz/dy, 1), at a position (m) given in the carrier's axes."""
-    x, y = in_space(frame, place)
-    zeta, dx, dy = height(waves, count, x, y)
+def _road_under(waves, wave_count, frame, position):
+    """Height (m) of the road, and its upward normal (-dz/dx, -dz/dy, 1), under a position (m) given in the carrier's
+    axes."""
+    x, y = ground_position(frame, position)
+    zeta, dx, dy = height(waves, wave_count, x, y)
     return zeta, (-(frame.cosine * dx + frame.sine * dy), frame.sine * dx - frame.cosine * dy, 1.0)
 
 
 @lean
-def _load(tyre, deflection, rising, ledger):
-    """Load (N) of a tyre whose deflection (m) counts from rest, and which rises (m/s); its energy is added to the
-    ledger."""
+def _load(tyre, deflection, rising_speed, ledger):
+    """Vertical load (N) of a tyre at a deflection (m) from rest whose centre rises from the road at ``rising_speed``
+    (m/s). Adds its energy and power to the ledger."""
     elastic = max(tyre[STATIC] + tyre[VERTICAL] * deflection, 0.0)
-    load = max(elastic - tyre[VISCOUS] * rising, 0.0) if elastic > 0.0 else 0.0
+    load = max(elastic - tyre[VISCOUS] * rising_speed, 0.0) if elastic > 0.0 else 0.0
     ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[VERTICAL]
-    ledger[DISSIPATED] += (load - elastic) * rising
+    ledger[DISSIPATED] += (load - elastic) * rising_speed
     return load
 
 
 @lean
-def touch(tyre, waves, count, steer, steering, vehicle, wheel):
-    """Contact of a tyre with a road of ``count`` waves: fills load, position and sliding velocity of the
+def find_contact(tyre, waves, wave_count, steer, steer_rate, vehicle, wheel):
+    """Contact of a tyre with a road of ``wave_count`` waves: fills load, position and sliding velocity in the
     ``WheelContact``.
 
-    steer, steering : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
+    steer, steer_rate : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
     """
     frame, tree, patch, slip = vehicle.frame, vehicle.tree, wheel.patch, wheel.slip
     way, report = wheel.way, wheel.report
@@ -197,9 +208,9 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
     p, turning, axle = three(spot, WHERE), three(knuckle, TURNING), _axle(steer, tyre[INCLINED])
     carrying = row(tree.links, PER_LINK, int(tyre[CARRYING]))
     if tyre[TOWED] != 0.0:
-        axle = _turned_to(carrying, axle)
+        axle = _axle_of_towed_wheel(carrying, axle)
     passing = plus(three(spot, RATE), carried_velocity(frame, p))
-    zeta, upwards = _road_under(waves, count, frame, p)
+    zeta, upwards = _road_under(waves, wave_count, frame, p)
     load = _load(tyre, zeta - (p[2] - tyre[HEIGHT]), dot(passing, upwards), vehicle.ledger)
     long = math.sqrt(dot(upwards, upwards))
     normal = times(upwards, 1.0 / long)
@@ -210,7 +221,7 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
     down = times(plus(times(axle, dot(axle, normal)), times(normal, -1.0)), radius / flat)
     across, rotor = cross(normal, along), int(tyre[ROTOR])
     spin = vehicle.rates[rotor] if rotor >= 0 else dot(three(carrying, TURNING), axle) - dot(turning, axle)
-    whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame.yawing + steering))
+    whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame.yaw_rate + steer_rate))
     sliding = plus(passing, cross(whole, down))
     slip[0], slip[1], slip[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
     slip[3] = -spin * dot(cross(axle, down), along)
@@ -231,8 +242,9 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
 
 
 @lean
-def creep(tyre, creeping, vehicle, wheel):
-    """Add a tyre's load, creep forces and moment (3,) to its wheel; the moment about the axle accelerates the spin."""
+def add_creep_forces(tyre, creeping, vehicle, wheel):
+    """Add a tyre's load, creep forces and creep moment (3,) to its wheel; the moment about the axle accelerates the
+    spin."""
     way, report, ground = wheel.way, wheel.report, vehicle.tree.ground
     knuckle, rotor, axle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
     force = plus(times(three(way, ROLLING), creeping[0]), times(three(way, ACROSS), creeping[1]))
@@ -244,14 +256,15 @@ def creep(tyre, creeping, vehicle, wheel):
     if rotor >= 0:
         vehicle.forces[rotor] += torque
     else:
-        _hold(torque, axle, knuckle, row(vehicle.tree.links, PER_LINK, int(tyre[CARRYING])))
+        _transfer_torque(torque, axle, knuckle, row(vehicle.tree.links, PER_LINK, int(tyre[CARRYING])))
     report[FX], report[FY], report[MZ], report[STEER_MOMENT] = creeping[0], creeping[1], creeping[2], moment[2]
     report[POWER] = creeping[0] * report[SLIP_X] + creeping[1] * report[SLIP_Y] + creeping[2] * report[TURN]
 
 
 @lean
-def turn_wheel(tyre, braking, driving, vehicle, wheel):
-    """Torque (N m) of brake and drive on one wheel; the opposite torque acts on the body that carries the wheel."""
+def add_wheel_torque(tyre, braking, driving, vehicle, wheel):
+    """Add the torque (N m) of brake and drive to a wheel's spin, and the opposite torque to the body that carries the
+    wheel."""
     rotor, axle, report = int(tyre[ROTOR]), three(wheel.way, AXLE), wheel.report
     report[SPIN_TORQUE] = 0.0
     if rotor < 0 or (braking == 0.0 and driving == 0.0):
@@ -264,48 +277,47 @@ def turn_wheel(tyre, braking, driving, vehicle, wheel):
         report[SPIN_TORQUE] -= tyre[BRAKED] * braking * math.tanh(spin / tyre[BRAKE_RATE])
     vehicle.forces[rotor] += report[SPIN_TORQUE]
     vehicle.ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
-    _hold(-report[SPIN_TORQUE], axle, knuckle, carrying)
+    _transfer_torque(-report[SPIN_TORQUE], axle, knuckle, carrying)
 
 
 @lean
-def _hold(torque, axle, link, carrying):
-    """Transfer a torque about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
+def _transfer_torque(torque, axle, link, carrier_link):
+    """Transfer a torque (N m) about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
     add(link, TWISTED, times(axle, -torque))
-    add(carrying, TWISTED, times(axle, torque))
+    add(carrier_link, TWISTED, times(axle, torque))
 
 
 @lean
-def room(head):
-    """Number of doubles that the workspace for a vehicle's tree needs."""
+def workspace_size(head):
+    """Number of doubles that the workspace for a vehicle's motion and forces needs."""
     return PER_LINK * int(head[JOINTS]) + PER_SPOT * int(head[POINTS]) + GROUND
 
 
 @lean
-def enter(numbers, q, v, f, room, ledger):
-    """Add the forces of all springs, dampers and bars to ``f`` or to the tree. Returns the ``MovingVehicle``, whose
-    tree lies in ``room``.
+def start_forces(numbers, q, v, f, workspace, ledger):
+    """Add the forces of all springs, dampers and bars. Returns the ``MovingVehicle``, whose tree lies in ``workspace``.
 
-    numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; room : pointer to as many doubles as needed.
+    numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; workspace : pointer to as many doubles as needed.
     """
     n, points, table = int(numbers[JOINTS]), int(numbers[POINTS]), start(numbers)
-    spots = beyond(room, PER_LINK * n)
+    spots = beyond(workspace, PER_LINK * n)
     ground = array(beyond(spots, PER_SPOT * points), (GROUND,))
     ground[0] = ground[1] = ground[2] = 0.0
-    outwards(beyond(table, HEADER), n, q, v, room)
-    locate(beyond(table, int(numbers[OF_POINTS])), points, room, spots)
+    outwards(beyond(table, HEADER), n, q, v, workspace)
+    locate(beyond(table, int(numbers[OF_POINTS])), points, workspace, spots)
     for i in range(LEDGER):
         ledger[i] = 0.0
-    ledger[POTENTIAL], ledger[DISSIPATED] = press(
-        table, int(numbers[OF_PARTS]), int(numbers[PARTS]), room, spots, q, v, f
+    ledger[POTENTIAL], ledger[DISSIPATED] = add_part_forces(
+        table, int(numbers[OF_PARTS]), int(numbers[PARTS]), workspace, spots, q, v, f
     )
-    chassis = row(room, PER_LINK, int(numbers[CHASSIS]))
-    return MovingVehicle(v, f, ledger, carrier_frame(q, v), Tree(room, spots, ground), chassis)
+    chassis = row(workspace, PER_LINK, int(numbers[CHASSIS]))
+    return MovingVehicle(v, f, ledger, carrier_frame(q, v), Tree(workspace, spots, ground), chassis)
 
 
 @lean
-def leave(numbers, vehicle):
-    """Add drag, and all forces gathered in the tree, to the vehicle's generalised forces; the power of drag goes into
-    the ledger."""
+def finish_forces(numbers, vehicle):
+    """Add drag, and all forces gathered on bodies and points, to the vehicle's generalised forces. The power of drag
+    goes into the ledger."""
     table, frame, f = start(numbers), vehicle.frame, vehicle.forces
     if numbers[DRAG] != 0.0:
         _drag(numbers, vehicle)
@@ -325,11 +337,11 @@ def leave(numbers, vehicle):
 
 @lean
 def _drag(numbers, vehicle):
-    """Add aerodynamic drag at the chassis' centre, opposite to its motion along the vehicle."""
+    """Add aerodynamic drag (N) at the chassis' centre, against its forward motion."""
     chassis, frame = vehicle.chassis, vehicle.frame
     place = plus(three(chassis, PLACE), out(chassis, numbers, DRAG_X))
     speed = plus(three(chassis, SPEED), cross(three(chassis, TURNING), place))
-    ahead = speed[0] + frame.ahead - frame.yawing * place[1]
+    ahead = speed[0] + frame.forward_speed - frame.yaw_rate * place[1]
     force = -numbers[DRAG] * abs(ahead) * ahead
     vehicle.ledger[DISSIPATED] += force * ahead
     push(chassis, vehicle.tree.ground, (force, 0.0, 0.0), place)
@@ -337,7 +349,8 @@ def _drag(numbers, vehicle):
 
 @lean
 def _push_from_outside(numbers, t, vehicle):
-    """Add the pushes, whose directions turn with the vehicle's heading."""
+    """Add the forces of all external pushes, whose directions turn with the vehicle's heading, and their power to the
+    ledger."""
     controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
     count = int(numbers[controls - 1])
     for i in range(count):
@@ -354,12 +367,13 @@ def _push_from_outside(numbers, t, vehicle):
 
 @lean
 def all_forces(numbers, t, q, v, f, report, ledger):
-    """Add the generalised forces (N, N m) to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
+    """Add a vehicle's generalised forces (N, N m) to ``f``, and fill the tyres' report (tyres, REPORTED) and the ledger
+    (LEDGER,).
 
     t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
     """
     w, controls, knots, table = int(numbers[TYRES]), int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
-    vehicle = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
+    vehicle = start_forces(numbers, q, v, f, doubles(workspace_size(numbers)), ledger)
     steer, steering = control(numbers, controls, STEER, knots, t)
     braking, driving = control(numbers, controls, BRAKE, knots, t)[0], control(numbers, controls, DRIVE, knots, t)[0]
     patches, ways = array(doubles(10 * w), (w, 10)), doubles(WAY * w)
@@ -367,22 +381,23 @@ def all_forces(numbers, t, q, v, f, report, ledger):
     tyres, waves = beyond(table, int(numbers[OF_TYRES])), numbers[int(numbers[OF_WAVES]) :]
     for i in range(w):
         tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), report[i])
-        touch(tyre, waves, int(numbers[WAVES]), tyre[STEERED] * steer, tyre[STEERED] * steering, vehicle, wheel)
+        find_contact(tyre, waves, int(numbers[WAVES]), tyre[STEERED] * steer, tyre[STEERED] * steering, vehicle, wheel)
     cells = array(beyond(table, int(numbers[OF_CELLS])), (5, int(numbers[CELLS])))
     strips = array(beyond(table, int(numbers[OF_STRIPS])), (4, int(numbers[STRIPS])))
     tyre_forces(patches, slips, strips, cells, numbers[MIDDLE], creeping)
     for i in range(w):
         tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), report[i])
-        creep(tyre, creeping[i], vehicle, wheel)
-        turn_wheel(tyre, braking, driving, vehicle, wheel)
+        add_creep_forces(tyre, creeping[i], vehicle, wheel)
+        add_wheel_torque(tyre, braking, driving, vehicle, wheel)
         ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
     _push_from_outside(numbers, t, vehicle)
-    leave(numbers, vehicle)
+    finish_forces(numbers, vehicle)
 
 
 @lean
 def forces(numbers, t, q, v, f):
-    """Add the vehicle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
+    """Add the generalised forces of a vehicle on its tyres to ``f``. For callbacks: all arguments but the time (s) are
+    pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
@@ -391,17 +406,18 @@ def forces(numbers, t, q, v, f):
 
 @lean
 def set_forces(block, t, n):
-    """Set ``f`` to the forces of ``forces``. All data are in one block of doubles at an address: f, q and v (n,), then
-    the table."""
+    """Set ``f`` to the forces of ``forces``. All data lie in one block of doubles at a memory address: f, q and v (n,),
+    then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 @lean
-def reports(numbers, times, q, v, forces, ledgers):
-    """Fill reports (m, tyres, REPORTED) and ledgers (m, LEDGER) of states (m, n) at ``times`` (m,)."""
+def reports(numbers, times, q, v, tyre_reports, ledgers):
+    """Fill the tyres' reports (m, tyres, REPORTED) and energy ledgers (m, LEDGER) of states (m, n) at ``times``
+    (m,)."""
     f = array(doubles(q.shape[1]), (q.shape[1],))
     f[:] = 0.0
     for i in range(len(times)):
-        all_forces(numbers, times[i], q[i], v[i], f, forces[i], ledgers[i])
+        all_forces(numbers, times[i], q[i], v[i], f, tyre_reports[i], ledgers[i])

@@ -1,4 +1,5 @@
-"""A free vehicle at one instant, as its compiled forces read it: its carrier, its tree, and what forces are added to.
+"""State of a free vehicle at one instant, as its compiled forces read it: the yawing carrier frame, the tree of bodies,
+and the arrays to which forces are added.
 
 The carrier, the first three coordinates, has the frame in which the tree's vectors are given.
 """
@@ -12,20 +13,21 @@ from models.machine.compiled import lean
 
 
 class CarrierFrame(NamedTuple):
-    """The carrier in space: cosine and sine of its heading, its place (m), the velocity of its origin along its own
-    axes, ahead and aside (m/s), and its yaw rate (rad/s)."""
+    """Motion of the carrier frame: cosine and sine of its heading, its position (m), the velocity of its origin along
+    its own axes x and y (m/s), and its yaw rate (rad/s)."""
 
     cosine: float
     sine: float
     x: float
     y: float
-    ahead: float
-    aside: float
-    yawing: float
+    forward_speed: float
+    lateral_speed: float
+    yaw_rate: float
 
 
 class Tree(NamedTuple):
-    """Pointers to the links and the spots (see ``models.multibody.tree``), and the forces (GROUND,) on the carrier."""
+    """Pointers to the rows of bodies (links) and of force points (spots), see ``models.multibody.tree``, and the forces
+    (GROUND,) on the carrier."""
 
     links: Any
     spots: Any
@@ -33,7 +35,7 @@ class Tree(NamedTuple):
 
 
 class MovingVehicle(NamedTuple):
-    """State and arrays that each force of a vehicle reads and adds to.
+    """State of a free vehicle, and the arrays to which its compiled forces are added.
 
     rates, forces (n,) : of the coordinates; ledger (LEDGER,) : see ``forces``; chassis (PER_LINK,) : its link.
     """
@@ -47,7 +49,7 @@ class MovingVehicle(NamedTuple):
 
 
 class WheelContact(NamedTuple):
-    """A wheel on the road, columns as in ``forces`` and ``models.contact.fastsim_many``.
+    """Contact of a wheel with the road, columns as in ``forces`` and ``models.contact.fastsim_many``.
 
     patch (10,) : what the tyre's contact is, as creep forces read it; slip (4,) : velocities of slip along and across
     (m/s), turning (rad/s), speed of the tread (m/s); way (WAY,) : where it is and its axes; report (REPORTED,).
@@ -61,21 +63,21 @@ class WheelContact(NamedTuple):
 
 @lean
 def carrier_frame(q, v):
-    """The ``CarrierFrame`` at positions and rates (n,)."""
+    """The ``CarrierFrame`` at the vehicle's coordinates and rates (n,)."""
     cosine, sine = math.cos(q[2]), math.sin(q[2])
     return CarrierFrame(cosine, sine, q[0], q[1], cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2])
 
 
 @lean
-def carried_velocity(frame, place):
-    """Velocity (m/s), by the carrier's motion, of a point at a position (m), both in the carrier's axes."""
-    return frame.ahead - frame.yawing * place[1], frame.aside + frame.yawing * place[0], 0.0
+def carried_velocity(frame, position):
+    """Velocity (m/s) that the carrier's motion gives to a point at a position (m), both in the carrier's axes."""
+    return frame.forward_speed - frame.yaw_rate * position[1], frame.lateral_speed + frame.yaw_rate * position[0], 0.0
 
 
 @lean
-def in_space(frame, place):
-    """Position x, y on the ground of a point at a position (m) in the carrier's axes."""
+def ground_position(frame, position):
+    """Position x, y (m) on the ground of a point at a position (m) in the carrier's axes."""
     return (
-        frame.x + frame.cosine * place[0] - frame.sine * place[1],
-        frame.y + frame.sine * place[0] + frame.cosine * place[1],
+        frame.x + frame.cosine * position[0] - frame.sine * position[1],
+        frame.y + frame.sine * position[0] + frame.cosine * position[1],
     )

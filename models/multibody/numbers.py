@@ -1,4 +1,4 @@
-"""A free vehicle, its tyres, its controls and the road as the one table of doubles that ``kernel`` reads."""
+"""A free vehicle, its tyres, its controls and its road as the one table of doubles that the compiled forces read."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -10,19 +10,20 @@ from models.core.errors import InputError
 from models.multibody import forces as at
 from models.multibody import tree
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
-from models.tyre.bristles import net, shape_factor
-from models.vehicles.free_vehicle import CARRIER, anchor, chassis_of, free_vehicle, joints, rotor
+from models.tyre.bristles import cornering_stiffness_factor, net
+from models.vehicles.free_vehicle import CARRIER, chassis_of, free_vehicle, joints, last_coordinate_and_joint, rotor
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
-from models.vehicles.spatial_linear import Preloads, preloaded, preloads
+from models.vehicles.spatial_linear import Preloads, preloads, with_preloads
 
 Control = tuple[tuple[float, float], ...]
-"""Knots (s, value); a control rests at each and goes from one to the next by the smoothest step of degree 5."""
+"""Knots (time in s, value) of a control over time; it rests at each knot and goes from one to the next by the smoothest
+step of degree 5."""
 GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
 class Tyres:
-    """Parameters of tyres and wheels beside the vehicle file's stiffness, damping and cornering stiffness.
+    """Tyre and wheel parameters that the vehicle file does not give.
 
     friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
     axis (rad), the right side's mirrored; cells : of the patch's net per strip; spin_inertia : of a wheel about its
@@ -41,7 +42,7 @@ class Tyres:
 
 @dataclass(frozen=True)
 class Controls:
-    """steer : angle of the front wheels (rad); brake, drive : torque on all wheels together (N m), both 0 or more.
+    """Steering, brake and drive of a vehicle over time, and how they are shared between its axles.
 
     front_brake : share of the front axle in braking; front_drive : in driving. All axles behind it share the rest
     evenly, those of towed bodies in braking alone, and so do the wheels of an axle.
@@ -56,8 +57,8 @@ class Controls:
 
 @dataclass(frozen=True)
 class Push:
-    """An external force, such as wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up. The
-    axes turn with the vehicle's heading only. It acts at ``point`` (m) of a body, in the design position."""
+    """External force on a body, such as wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up.
+    The axes turn with the vehicle's heading only. It acts at ``point`` (m) of a body, in the design position."""
 
     body: str
     point: Vector
@@ -67,7 +68,7 @@ class Push:
 
 @dataclass(frozen=True, eq=False)
 class Handling:
-    """A vehicle on the road: what every implementation marches.
+    """A vehicle on its tyres, with its controls, road and external pushes: what every engine integrates.
 
     given : the vehicle of the ride; waves (m, 4) : the road as ``road`` makes it; slope : of the whole road, uphill
     along x (rad); pushes : forces from outside; forces : whose the springs and bars of towed bodies are, the engine's
@@ -93,26 +94,26 @@ class Handling:
             raise InputError(self.given.name, "fixed", name, "no such tyre", names)
         free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), tyres.spin_inertia, tyres.fixed)
         held = preloads(free)
-        object.__setattr__(self, "vehicle", preloaded(free, held))
+        object.__setattr__(self, "vehicle", with_preloads(free, held))
         object.__setattr__(self, "held", held)
         object.__setattr__(self, "numbers", table(self))
 
     @property
     def gravity(self) -> np.ndarray:
-        """Vector of gravity (3,) in m/s^2, in the axes of the road."""
+        """Acceleration of gravity (3,) in m/s^2, in the axes of the sloping road."""
         return GRAVITY * np.array([-np.sin(self.slope), 0.0, -np.cos(self.slope)])
 
     def tyre_numbers(self, i: int) -> np.ndarray:
-        """View of the numbers (PER_TYRE,) of a tyre in the table; changes to it take effect at once."""
+        """View of the numbers (PER_TYRE,) of tyre i in the table; changes to it take effect at once."""
         first = int(self.numbers[at.OF_TYRES]) + at.PER_TYRE * i
         return self.numbers[first : first + at.PER_TYRE]
 
     def changed(self, **changes: object) -> "Handling":
-        """A copy with other values in some fields."""
+        """Returns a copy of this vehicle on its tyres with other values in some fields."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def straight(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and rates (n,) of straight rolling at a speed (m/s), with all other coordinates at rest."""
+        """Coordinates and rates (n,) of straight rolling at a speed (m/s), with all other coordinates at rest."""
         places = self.vehicle.coordinates()
         v = np.zeros(len(places))
         v[0] = speed
@@ -123,7 +124,7 @@ class Handling:
 
 
 def table(handling: Handling) -> np.ndarray:
-    """All numbers for the compiled forces, in the order described in ``forces``."""
+    """Table of all numbers that the compiled forces of a free vehicle read, in the order described in ``forces``."""
     free, chassis, of, points = (
         handling.vehicle,
         chassis_of(handling.given),
@@ -150,7 +151,7 @@ def table(handling: Handling) -> np.ndarray:
     ]
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
-    joint, place = _place(free, chassis.name, chassis.position)
+    joint, place = _point_position(free, chassis.name, chassis.position)
     drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
     counts = [
         begins[-1] + curves.size,
@@ -167,44 +168,45 @@ def table(handling: Handling) -> np.ndarray:
 
 
 class _Points:
-    """Points at which forces act, without duplicates; their rows are in the form that ``tree`` reads."""
+    """List of points at which forces act, without duplicates; their rows are in the form that ``tree`` reads."""
 
     def __init__(self, vehicle: SpatialVehicle) -> None:
         self.vehicle, self.rows = vehicle, list[tuple[float, ...]]()
 
     def number(self, body: str, point: Vector) -> int:
-        """Index of a point on a body, given by its position in the design position."""
-        joint, place = _place(self.vehicle, body, point)
+        """Index of a point on a body, given by its position (m) in the design position; a new point is added to the
+        list."""
+        joint, place = _point_position(self.vehicle, body, point)
         row = (float(joint), *place.tolist())
         if row not in self.rows:
             self.rows.append(row)
         return self.rows.index(row)
 
 
-def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
+def _joints(vehicle: SpatialVehicle, loaded_coordinates: set[float]) -> np.ndarray:
     """Table rows of all coordinates, each with the number of coordinates of its body. The rotation of a body that
-    carries nothing is marked as loose.
+    carries nothing is marked ``LOOSE``.
 
-    held : coordinates that are the last to move a point where something acts.
+    loaded_coordinates : coordinates that are the last to move a point where something acts.
     """
     rows, counts = joints(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
-    bears = {*rows[:, tree.BELOW], *held}
+    bears = {*rows[:, tree.BELOW], *loaded_coordinates}
     loose = [counts[j] == 1 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
     rows[loose, tree.KIND] = tree.LOOSE
     return np.column_stack([rows, counts]).ravel()
 
 
-def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
-    """Index of the last coordinate that moves a point, and the point's position relative to that joint."""
-    joint, origin = anchor(vehicle, body)
+def _point_position(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
+    """Index of the last coordinate that moves a point, and the point's position (m) relative to that joint."""
+    joint, origin = last_coordinate_and_joint(vehicle, body)
     return joint, np.subtract(point, origin)
 
 
-_Part = tuple[list[float], tuple[Curve | None, ...]]
-"""A row of ``parts`` and its curves."""
+_PartRow = tuple[list[float], tuple[Curve | None, ...]]
+"""Numbers of a spring or bar, as ``parts`` reads them, and its curves of force over travel and over rate."""
 
 
-def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
+def _springs(handling: Handling, points: _Points) -> Iterator[_PartRow]:
     for s in handling.vehicle.springs:
         if s.second_body is None:
             raise InputError(
@@ -217,7 +219,7 @@ def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
         yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0, frame], (s.travel_force, s.rate_force)
 
 
-def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
+def _bars(handling: Handling, points: _Points) -> Iterator[_PartRow]:
     for bar in handling.vehicle.bars:
         ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
         rest, frame = (
@@ -229,19 +231,19 @@ def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
         yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0, frame], (None, None)
 
 
-def _frame(vehicle: SpatialVehicle, place: str, frame: str | None) -> float:
+def _frame(vehicle: SpatialVehicle, key_path: str, frame: str | None) -> float:
     """Last coordinate of the body in which the axis of a spring or bar is fixed; 0 for the carrier."""
     if frame == CARRIER:
         return 0.0
     if frame not in vehicle.towed:
         allowed = "must be left out, or be a towed body: in handling axes are fixed in the carrier, which only yaws"
-        raise InputError(vehicle.name, f"{place}.frame", frame, allowed, vehicle.towed)
-    return float(anchor(vehicle, frame)[0])
+        raise InputError(vehicle.name, f"{key_path}.frame", frame, allowed, vehicle.towed)
+    return float(last_coordinate_and_joint(vehicle, frame)[0])
 
 
-def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all curves. The position of each, counted from ``first``, is also written into the row of the part
-    that has it."""
+def _put_curves(parts: list[_PartRow], rows: np.ndarray, first: int) -> np.ndarray:
+    """Numbers of all force curves. The position of each curve, counted from ``first``, is also written into the row of
+    its spring."""
     laid_curves = np.empty(0)
     for row, (_, curves) in zip(rows.reshape(-1, PER_PART), parts, strict=True):
         for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
@@ -252,18 +254,18 @@ def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
 
 
 def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
-    """Numbers of one tyre. Its bristle stiffness is chosen such that, at static load, it has the ride vehicle's
-    cornering stiffness."""
+    """Numbers of tyre i. Its bristle stiffness is chosen such that, at static load, it has the ride vehicle's cornering
+    stiffness."""
     free, of = handling.vehicle, handling.tyres
     tyre, places = free.tyres[i], free.coordinates()
-    joint, _ = _place(free, tyre.body, tyre.point)
+    joint, _ = _point_position(free, tyre.body, tyre.point)
     load = handling.held.tyres[tyre.name]
     if not load > 0.0:
         raise InputError(free.name, f"tyres[{tyre.name}]", load, "carries no weight: it must press on the road at rest")
     sunk = load / tyre.stiffness
     radius = tyre.point[2] + sunk
     cornering = next(force.stiffness for force in handling.given.side_forces if force.name == tyre.name)
-    bristles = cornering / (shape_factor(of.cells) * radius * sunk * of.half_width)
+    bristles = cornering / (cornering_stiffness_factor(of.cells) * radius * sunk * of.half_width)
     spins = (rotor(tyre.name), "ry")
     axle = [t for t in free.tyres if t.axle == tyre.axle]
     share, front, c = 1.0 / len(axle), tyre.axle == 0, handling.controls
@@ -272,7 +274,7 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
     drive = 0.0 if towed else share * (c.front_drive if front else (1.0 - c.front_drive) / driven)
     leans = 0.0 if towed else np.sign(tyre.point[1]) * of.inclination
-    carrying, _ = anchor(free, towed or chassis_of(handling.given).name)
+    carrying, _ = last_coordinate_and_joint(free, towed or chassis_of(handling.given).name)
     return [
         joint,
         places.index(spins) if spins in places else -1,
@@ -296,7 +298,7 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
 
 
 def _pushes(handling: Handling) -> np.ndarray:
-    """A row of numbers for each push, and the number of pushes."""
+    """A row of numbers for each external push, and then the number of pushes."""
     names = tuple(body.name for body in handling.vehicle.bodies)
     for push in handling.pushes:
         if push.body not in names:
@@ -304,13 +306,13 @@ def _pushes(handling: Handling) -> np.ndarray:
     rows = [
         [joint, *place, *push.axis]
         for push in handling.pushes
-        for joint, place in [_place(handling.vehicle, push.body, push.point)]
+        for joint, place in [_point_position(handling.vehicle, push.body, push.point)]
     ]
     return np.array([*np.ravel(rows), len(rows)])
 
 
 def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
-    """Knots (3 + pushes, 2, k) of steer, brake, drive and pushes: times and values, padded with the last knot."""
+    """Knots (3 + pushes, 2, k) of steer, brake, drive and pushes: times and values, padded behind the last knot."""
     all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))
     filled = [

@@ -45,22 +45,21 @@ from models.vehicles.spatial import Curve
     FRAME,
     PER_PART,
 ) = (*range(11), 13, 14, 15, 16)
-"""Numbers of a part, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds to it (-1: none), and by
-how much; its points; its axis; where the table has its curves (0: nowhere), count, offset, slope, corners and bends;
-the last coordinate of the body in which its axis is fixed (0: the carrier)."""
+"""Indices of the numbers of a spring or bar, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds
+to its travel (-1: none), and by how much; its points; its axis; where the table has its curves (0: nowhere), count,
+offset, slope, corners and bends; the last coordinate of the body in which its axis is fixed (0: the carrier)."""
 
 
 @lean
-def press(numbers, first, count, links, spots, q, v, f):
-    """Add the forces of all springs, bars and other parts to the spots, or to ``f`` for their own coordinates; returns
-    their energy (J) and power (W).
+def add_part_forces(numbers, offset, part_count, links, spots, q, v, f):
+    """Add the forces of all springs, dampers and bars to the points they act on, or to ``f`` for a coordinate that adds
+    to a travel. Returns their energy (J) and power (W).
 
-    numbers : pointer to the table; first, count : of the parts there. What keeps a part's axis takes up the couple of
-    its two forces: a towed body by its link.
-    """
+    numbers : pointer to the table; offset, part_count : of the parts there. What keeps a part's axis takes up the
+    couple of its two forces: a towed body by its link."""
     energy = power = 0.0
-    for i in range(count):
-        e = row(beyond(numbers, first), PER_PART, i)
+    for i in range(part_count):
+        e = row(beyond(numbers, offset), PER_PART, i)
         from_spot, to_spot, axis = (
             row(spots, PER_SPOT, int(e[FIRST_POINT])),
             row(spots, PER_SPOT, int(e[SECOND_POINT])),
@@ -97,8 +96,8 @@ def press(numbers, first, count, links, spots, q, v, f):
 
 @lean
 def on_curve(numbers, argument):
-    """Force of a piecewise linear curve. A pointer leads to its numbers: count, offset, slope, then corners and changes
-    of slope."""
+    """Force of a piecewise linear curve at an argument. ``numbers`` points to the curve: count, offset, slope, then
+    corners and changes of slope."""
     head = row(numbers, 3, 0)
     hinges, force = row(numbers, int(head[0]), 0), head[1] + head[2] * argument
     for i in range(3, len(hinges), 2):
@@ -107,7 +106,7 @@ def on_curve(numbers, argument):
 
 
 def curve_numbers(curve: Curve) -> np.ndarray:
-    """Numbers of a curve, in the order in which ``on_curve`` reads them."""
+    """Numbers of a piecewise linear force curve, in the order in which ``on_curve`` reads them."""
     offset, slope, corners, bends = curve.hinges()
     pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
     return np.array([3 + len(pairs), offset, slope, *pairs])

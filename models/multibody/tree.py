@@ -1,4 +1,4 @@
-"""The tree of a free vehicle's bodies, walked outwards for places and velocities and inwards for forces, compiled.
+"""Tree of a free vehicle's bodies, walked outwards for positions and velocities and inwards for forces, compiled.
 
 All is in the axes of the carrier (see ``models.vehicles.free_vehicle``), the first three coordinates. A link is a row
 of numbers for each coordinate, whole for the last one of a body only: others have no more than their axis. A spot is
@@ -12,19 +12,20 @@ from models.machine.compiled import lean
 from models.machine.stack import row
 
 KIND, BELOW, ARM, COUNT, PER_JOINT = 0, 1, 2, 5, 6
-"""Of a coordinate in the table, as ``joints`` has it, and how many its body has; ``LOOSE``: a kind that turns, alone
-on a body that carries no point."""
+"""Indices of the numbers of a coordinate in the table, as ``joints`` has it, and the number of coordinates of its body;
+``LOOSE``: the kind of a rotation that is alone on a body that carries no point."""
 LOOSE = 6.0
 JOINT, LOCAL, PER_POINT = 0, 1, 4
-"""Of a point in the table: the coordinate that moves it last, its place from there (m)."""
+"""Indices of the numbers of a point in the table: the last coordinate that moves it, its position from there (m)."""
 TURNED, PLACE, AXIS, SPEED, TURNING, PUSHED, TWISTED, PER_LINK = 0, 9, 12, 15, 18, 21, 24, 27
-"""Of a link: rotation, by axes; joint; its axis; velocity of the body behind it where that would pass the carrier's
-origin, beside the carrier, and its turning; force that was gathered there, and its moment about the carrier's origin.
-"""
+"""Indices of the numbers of a link (a body in motion): rotation, by axes; joint position; joint axis; velocity of the
+body's material point at the carrier's origin, relative to the carrier, and angular velocity; force gathered on the
+body, and its moment about the carrier's origin."""
 WHERE, RATE, PUSH, PER_SPOT = 0, 3, 6, 9
-"""Of a spot: its place, its velocity beside the carrier, the force there."""
+"""Indices of the numbers of a spot, a point where forces act: its position, its velocity relative to the carrier, the
+force there."""
 AHEAD, ASIDE, TURN, GROUND = 0, 1, 2, 3
-"""Forces and moment on the carrier."""
+"""Indices of the forces along x and y and of the moment about z on the carrier."""
 
 
 @lean
@@ -73,8 +74,8 @@ def add(numbers, first, a):
 
 @lean
 def outwards(joints, n, q, v, links):
-    """Fill the links (motion of the bodies) from the table rows ``joints`` at a pointer, body by body; forces are set
-    to zero."""
+    """Fill the links (motion of the bodies), body by body, from the table rows of ``joints``; their forces are set to
+    zero."""
     carrier = row(links, PER_LINK, 2)
     for k in range(PER_LINK):
         carrier[k] = 0.0
@@ -84,13 +85,13 @@ def outwards(joints, n, q, v, links):
         of = row(joints, PER_JOINT, j)
         count = int(of[COUNT])
         if of[KIND] != LOOSE:
-            _follow(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
+            _fill_link(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
         j += count
 
 
 @lean
-def _follow(joints, first, end, below, q, v, links):
-    """Fill a body's link from the link below it, and the axes of its coordinates, translations first."""
+def _fill_link(joints, first, end, below, q, v, links):
+    """Fill a body's link from its parent's link, and the axes of its coordinates, translations first."""
     x, y, z = three(below, TURNED), three(below, TURNED + 3), three(below, TURNED + 6)
     place, speed = plus(three(below, PLACE), out(below, row(joints, PER_JOINT, first), ARM)), three(below, SPEED)
     turning = three(below, TURNING)
@@ -103,7 +104,7 @@ def _follow(joints, first, end, below, q, v, links):
             place, speed = plus(place, times(axis, q[j])), plus(speed, times(axis, v[j]))
         else:
             turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
-            x, y, z = _turned(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
+            x, y, z = _rotated_axes(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
     link = row(links, PER_LINK, end - 1)
     put(link, TURNED, x)
     put(link, TURNED + 3, y)
@@ -116,8 +117,8 @@ def _follow(joints, first, end, below, q, v, links):
 
 
 @lean
-def _turned(along, x, y, z, cosine, sine):
-    """Three axes, rotated about one of them."""
+def _rotated_axes(along, x, y, z, cosine, sine):
+    """Three axes x, y, z after a rotation about the axis with index ``along``."""
     if along == 0.0:
         return x, plus(times(y, cosine), times(z, sine)), plus(times(z, cosine), times(y, -sine))
     if along == 1.0:
@@ -127,7 +128,7 @@ def _turned(along, x, y, z, cosine, sine):
 
 @lean
 def out(link, local, first):
-    """Vector in the carrier's axes of three components along a link's axes."""
+    """Vector in the carrier's axes, from three components along a link's axes."""
     return plus(
         plus(times(three(link, TURNED), local[first]), times(three(link, TURNED + 3), local[first + 1])),
         times(three(link, TURNED + 6), local[first + 2]),
@@ -136,7 +137,8 @@ def out(link, local, first):
 
 @lean
 def locate(points, count, links, spots):
-    """Fill all spots (positions of points) from the table rows ``points`` at a pointer; forces are set to zero."""
+    """Fill the positions and velocities of all force points from the table rows of ``points``; their forces are set to
+    zero."""
     for i in range(count):
         of, spot = row(points, PER_POINT, i), row(spots, PER_SPOT, i)
         link = row(links, PER_LINK, int(of[JOINT]))
@@ -148,7 +150,7 @@ def locate(points, count, links, spots):
 
 @lean
 def push(link, ground, force, place):
-    """Add an external force at a position to the body of a link."""
+    """Add an external force (N) at a position (m) to the body of a link, and to the carrier."""
     twist(link, ground, cross(place, force))
     add(link, PUSHED, force)
     ground[AHEAD] += force[0]
@@ -157,15 +159,15 @@ def push(link, ground, force, place):
 
 @lean
 def twist(link, ground, moment):
-    """Add an external moment to the body of a link."""
+    """Add an external moment (N m) to the body of a link, and to the carrier."""
     add(link, TWISTED, moment)
     ground[TURN] += moment[2]
 
 
 @lean
 def inwards(joints, n, points, count, tree, f):
-    """Transfer forces at spots and on links from the leaves to the carrier; each coordinate adds its generalised force
-    to ``f``.
+    """Transfer forces at points and on bodies from the leaves of the tree to the carrier; adds the generalised force of
+    each coordinate to ``f``.
 
     What acts between the vehicle's parts does not push the carrier: it feels what comes from outside, in its axes.
     """

@@ -1,4 +1,4 @@
-"""A user's own model, read from MJCF or URDF, built in every engine and held to the file as MuJoCo parsed it.
+"""Models of a user, read from MJCF or URDF, built in every engine and compared with the file as MuJoCo parsed it.
 
 A file becomes the description of ``models.vehicles.spatial``: a body without mass for every joint, along whose axis it
 moves, and a body with the mass behind the last of them. From there on it is any free vehicle: the builders in

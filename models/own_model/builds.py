@@ -1,4 +1,5 @@
-"""One model in every build: mass matrix and forces at a state, in the coordinates of the description."""
+"""Equations of motion of a user's model in every build: mass matrix and forces at a state, in the coordinates of
+twinrig's description."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -9,7 +10,7 @@ import numpy as np
 
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import FULL_FRICTION_SPEED
-from models.multibody.plain.joint_elements import Acting, PlainTree
+from models.multibody.plain.joint_elements import AppliedForces, PlainTree
 from models.own_model.constraints import Rows, by_differences, constrained_forces, plain_constraints
 from models.own_model.coordinates import MujocoState
 from models.own_model.reading import TwinModel, constant_controls
@@ -17,11 +18,12 @@ from models.own_model.reading import TwinModel, constant_controls
 PLAIN_BUILD = "plain"
 ALL_BUILDS = (*ENGINES, PLAIN_BUILD)
 SOFT_BUILD = "mujoco"
-"""The build whose constraints are soft, as the file's own; those of the others are rigid."""
+"""The build whose constraints are soft, as they are in the user's file; the constraints of the other builds are
+rigid."""
 
 
-class Moved(NamedTuple):
-    """Mass matrix (n, n), forces (n,) and accelerations (n,) at one state."""
+class Motion(NamedTuple):
+    """Mass matrix (n, n), forces (n,) and accelerations (n,) of a model at one state."""
 
     mass: np.ndarray
     force: np.ndarray
@@ -29,32 +31,32 @@ class Moved(NamedTuple):
 
 
 State = tuple[np.ndarray, np.ndarray]
-"""Coordinates and rates (n,)."""
+"""Coordinates and rates (n,) of a model."""
 WHOLE_FRICTION_SHARE = 1.0 - 1e-12
-"""Share of a dry friction's force from which it is whole."""
-Equations = Callable[[np.ndarray, np.ndarray], Moved]
-"""Of coordinates and rates (n,)."""
+"""Share of its full force from which a dry friction counts as sliding."""
+Equations = Callable[[np.ndarray, np.ndarray], Motion]
+"""Function that returns the motion (``Moved``) at coordinates and rates (n,)."""
 
 
 def equations_of_build(twin: TwinModel, build: str) -> Equations:
     """Equations of motion of the description as "exudyn", "mujoco" or "plain" builds it; constraints are soft in
-    MuJoCo, else rigid."""
+    MuJoCo, and rigid in the others."""
     built: Any = plain_tree(twin) if build == PLAIN_BUILD else free_model(build, twin.driven)
     rigid = twin.driven.tied and build != SOFT_BUILD
-    asked = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
+    terms = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         mass, force = built.mass_and_force(0.0, q, v)
-        if asked is not None:
-            force = constrained_forces(mass, force, *asked(q, v))
-        return Moved(mass, force, np.linalg.solve(mass, force))
+        if terms is not None:
+            force = constrained_forces(mass, force, *terms(q, v))
+        return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
 
 def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
-    """Largest violation, m or rad, of a build's own constraints at the states. Comparing accelerations would not show
-    it: bodies in wrong relative positions can have the same accelerations."""
+    """Largest violation (m or rad) of a build's constraints at the states. Comparing accelerations would not show it:
+    bodies in wrong relative positions can have the same accelerations."""
     if not twin.driven.tied:
         return 0.0
     if build == PLAIN_BUILD:
@@ -65,78 +67,78 @@ def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
 
 
 def _constraint_rows(
-    twin: TwinModel, rows_at: Rows | None
+    twin: TwinModel, jacobian_at: JacobianAt | None
 ) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """Function that gives the constraint rows J (c, n) and J' q' (c,) at a state, from plain equations, or by
+    """Function that returns the constraint Jacobian J (c, n) and J' q' (c,) at a state, from plain equations or by
     differences of an engine's J."""
-    if rows_at is None:
-        return plain_constraints(twin).asked
+    if jacobian_at is None:
+        return plain_constraints(twin).terms
     if twin.driven.connections:
-        return partial(by_differences, rows_at)
+        return partial(jacobian_by_differences, jacobian_at)
 
     def constant(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        (rows,) = rows_at([q])
+        (rows,) = jacobian_at([q])
         return rows, np.zeros(len(rows))
 
     return constant
 
 
 def plain_tree(twin: TwinModel) -> PlainTree:
-    """The model's equations of motion in plain numpy."""
+    """Equations of motion of a user's model in plain numpy."""
     loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
     lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
     frictions = [(friction.coordinate, friction.force, FULL_FRICTION_SPEED) for friction in twin.driven.frictions]
     turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
     pushes = [(load.body, load.point, load.force, load.moment) for load in twin.driven.body_loads]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, Acting(loads, lines, frictions, turns, pushes))
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, AppliedForces(loads, lines, frictions, turns, pushes))
 
 
 def expected_equations(twin: TwinModel, build: str) -> Equations:
-    """The motion with which a build must agree: the file's own model, with rigid constraints and Coulomb's dry friction
-    unless the build is MuJoCo's."""
+    """Equations of motion with which a build must agree: MuJoCo's model of the file, with rigid constraints and Coulomb
+    friction unless the build is MuJoCo's."""
     if build == SOFT_BUILD or not is_soft_in_mujoco(twin):
-        return as_parsed(twin)
+        return equations_of_file(twin)
     return rigid_equations(twin) if twin.driven.tied else sliding_equations(twin)
 
 
 def is_soft_in_mujoco(twin: TwinModel) -> bool:
-    """Whether a model has constraints or dry friction, which give way in MuJoCo and nowhere else."""
+    """Whether a model has constraints or dry friction, which yield in MuJoCo but in no other build."""
     return twin.driven.tied or bool(twin.driven.frictions)
 
 
-def as_parsed(twin: TwinModel) -> Equations:
-    """The file's own model as MuJoCo parsed it."""
+def equations_of_file(twin: TwinModel) -> Equations:
+    """Equations of motion of the file's model as MuJoCo parsed it."""
     data = mujoco.MjData(twin.model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         state = forward_state(twin, data, q, v)
         mass, force = _mass_and_forces_of_file(twin, data, state, data.qfrc_constraint)
-        return Moved(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.rest))
+        return Motion(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.bias))
 
     return move
 
 
 def rigid_equations(twin: TwinModel) -> Equations:
-    """The file's own model as MuJoCo parsed it, its equality constraints made rigid."""
+    """Equations of motion of the file's model as MuJoCo parsed it, with its equality constraints made rigid."""
     data = mujoco.MjData(twin.model)
-    asked = _constraint_rows(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
+    terms = _constraint_rows(twin, lambda places: [_constraint_jacobian_of_file(twin, data, q) for q in places])
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
-        rows, rest = asked(q, v)
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+        rows, rest = terms(q, v)
         mass, force = _sliding_forces_of_file(twin, data, q, v)
         force = constrained_forces(mass, force, rows, rest)
-        return Moved(mass, force, np.linalg.solve(mass, force))
+        return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
 
 def sliding_equations(twin: TwinModel) -> Equations:
-    """The file's own model as MuJoCo parsed it, its dry friction that of Coulomb's law."""
+    """Equations of motion of the file's model as MuJoCo parsed it, with dry friction by Coulomb's law."""
     data = mujoco.MjData(twin.model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         mass, force = _sliding_forces_of_file(twin, data, q, v)
-        return Moved(mass, force, np.linalg.solve(mass, force))
+        return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
@@ -144,8 +146,8 @@ def sliding_equations(twin: TwinModel) -> Equations:
 def _sliding_forces_of_file(
     twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix (n, n) and forces (n,) of the file's own model without its equality constraints, its dry friction
-    whole against the rates."""
+    """Mass matrix (n, n) and forces (n,) of MuJoCo's model without its equality constraints, with full dry friction
+    against the rates."""
     state, sliding = forward_state(twin, data, q, v), np.empty(twin.size)
     rubs, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, np.zeros(data.nefc)
     rows[rubs] = -np.sign(v[data.efc_id[rubs]]) * data.efc_frictionloss[rubs]
@@ -153,8 +155,9 @@ def _sliding_forces_of_file(
     return _mass_and_forces_of_file(twin, data, state, sliding)
 
 
-def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
-    """Jacobian (c, n) of the file's equality constraints with respect to the coordinates of the description."""
+def _constraint_jacobian_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
+    """Jacobian (c, n) of the file's equality constraints in MuJoCo, with respect to the coordinates of the
+    description."""
     state = forward_state(twin, data, q, np.zeros(twin.size))
     ties, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty((twin.size, data.nefc))
     for row, unit in zip(rows, np.eye(twin.size), strict=True):
@@ -164,7 +167,7 @@ def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.nda
 
 
 def forward_state(twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray) -> MujocoState:
-    """MuJoCo's state at coordinates and rates (n,), and data of the file's own model there."""
+    """MuJoCo's state at coordinates and rates (n,); fills ``data`` with the quantities of MuJoCo's model there."""
     state = twin.coordinates.to_mujoco(q, v)
     data.ctrl[:] = constant_controls(twin.model)
     data.qpos[:], data.qvel[:], data.time = state.qpos, state.qvel, 0.0
@@ -175,14 +178,14 @@ def forward_state(twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.nda
 def _mass_and_forces_of_file(
     twin: TwinModel, data: mujoco.MjData, state: MujocoState, constraint: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix (n, n) and forces (n,) of the file's own model in the coordinates of the description."""
+    """Mass matrix (n, n) and forces (n,) of MuJoCo's model in the coordinates of the description."""
     own_mass, j = np.empty((twin.size, twin.size)), state.jacobian
     mujoco.mj_fullM(twin.model, data, own_mass)
-    return j.T @ own_mass @ j, j.T @ (data.qfrc_smooth + constraint - own_mass @ state.rest)
+    return j.T @ own_mass @ j, j.T @ (data.qfrc_smooth + constraint - own_mass @ state.bias)
 
 
 def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
-    """Those of the states at which every joint with dry friction slides, so that its full friction acts in every build.
+    """The given states at which every joint with dry friction slides, so that its full friction acts in every build.
 
     MuJoCo's is a soft constraint, whose force is less where a joint sticks.
     """
@@ -197,10 +200,10 @@ def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
         against = data.efc_force[of] * v[data.efc_id[of]] < 0.0
         return bool((whole & against).all())
 
-    return [(q, v) for q, v in rubbing_states(twin, states) if slides(q, v)]
+    return [(q, v) for q, v in moving_friction_states(twin, states) if slides(q, v)]
 
 
-def rubbing_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
-    """Those of the states at which every joint with dry friction moves fast enough for Coulomb's law."""
+def moving_friction_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
+    """The given states at which every joint with dry friction moves fast enough for Coulomb's law."""
     rubbing = [friction.coordinate for friction in twin.driven.frictions]
     return [(q, v) for q, v in states if (np.abs(v[rubbing]) >= FULL_FRICTION_SPEED).all()]

@@ -1,4 +1,4 @@
-"""An MJCF file as the vehicle of a scene: the description that vehicle files in TOML make, by another reading.
+"""Vehicle of a scene from an MJCF file: the same description as a vehicle file in TOML gives.
 
 The chassis is the body with a free joint, or with three slides and three hinges. What rides on it keeps its hinges,
 slides, springs, dampers and fixed tendons. Tyres, road, steering, brakes and drive are twinrig's: joints that spin or
@@ -15,10 +15,10 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.car_bodies import CarBodies, car_bodies
-from models.own_model.car_joints import Roles, forget, roles_of
+from models.own_model.car_joints import Roles, remove_elements_on, roles_of
 from models.own_model.content import CONTENT_KINDS, contents_of_model, limits_switched_off
 from models.own_model.file import check_sane, compiled_model
-from models.own_model.names import label, moving_bodies, place_of
+from models.own_model.names import coordinate_of, label, moving_bodies
 from models.own_model.reading import body_loads, joint_elements, line_springs
 from models.own_model.wheel_sites import WheelSite, wheel_sites
 from models.own_model.xml_guard import Document, checked_document
@@ -36,17 +36,17 @@ from models.vehicles.spatial import (
     Vector,
 )
 from models.vehicles.spatial_linear import preloads
-from models.vehicles.vehicle_checks import check
+from models.vehicles.vehicle_checks import check_vehicle
 
 CONTACT_CONTENT = "contact"
-"""The content that a car may have beside twinrig's tyres: it is left out."""
+"""The kind of content that a car's file may have beside twinrig's tyres: contacts, which are left out."""
 GRAVITY = 9.81
 PRELOAD_DIFFERENCE = 0.01
-"""Relative difference from which a preload is told that the file has otherwise."""
+"""Relative difference of a preload from the file's from which a note reports it."""
 
 
 def vehicle_of_file(path: Path) -> SpatialVehicle:
-    """The vehicle of an MJCF file, unloaded; InputError for features that vehicles of a scene cannot have."""
+    """The unloaded vehicle of an MJCF file. Raises InputError for features that vehicles of a scene cannot have."""
     document = checked_document(path)
     if document.kind != "MJCF":
         raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
@@ -57,7 +57,7 @@ def vehicle_of_file(path: Path) -> SpatialVehicle:
 
 @dataclass
 class _Reader:
-    """Reader of one file: collects the parts of the vehicle."""
+    """Reader of one MJCF file, which collects the parts of the vehicle and notes about it."""
 
     model: mujoco.MjModel
     document: Document
@@ -65,7 +65,7 @@ class _Reader:
     design: mujoco.MjData = field(init=False)
 
     def vehicle(self) -> SpatialVehicle:
-        """All parts, checked as a whole."""
+        """The complete vehicle of the file, after checks."""
         model, file = self.model, self.document.path.name
         design = self.design = mujoco.MjData(model)
         design.qpos[:] = model.qpos0
@@ -78,7 +78,7 @@ class _Reader:
         elements = tuple(self._elements(parts))
         tyres = tuple(_tyre(wheel, parts) for wheel in wheels)
         axles = tuple(float(next(w.point[0] for w in wheels if w.axle == i)) for i in range(wheels[-1].axle + 1))
-        outputs = (*_spatial_outputs(parts, elements, tyres), *self._points(design, parts, wheels))
+        outputs = (*_spatial_outputs(parts, elements, tyres), *self._point_outputs(design, parts, wheels))
         vehicle = SpatialVehicle(
             name=file,
             bodies=parts.bodies,
@@ -90,15 +90,15 @@ class _Reader:
             joint_elements=elements,
             ranges=tuple(self._ranges(parts)),
         )
-        check(vehicle, file)
-        return self._at_rest(vehicle)
+        check_vehicle(vehicle, file)
+        return self._without_preloads(vehicle)
 
-    def _refuse(self, place: str, value: object, said: str) -> NoReturn:
-        raise InputError(self.document.path.name, place, value, said)
+    def _refuse(self, part: str, value: object, reason: str) -> NoReturn:
+        raise InputError(self.document.path.name, part, value, reason)
 
     def _leave_out(self, roles: Roles) -> None:
         """Remove parts of the file that twinrig models in another way; refuse other parts without an equivalent."""
-        acted = forget(self.model, roles)
+        acted = remove_elements_on(self.model, roles)
         joints = [label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
         for row in contents_of_model(self.model, self.document):
             if row.kind != CONTACT_CONTENT:
@@ -117,7 +117,7 @@ class _Reader:
             self.notes.append(f"stops are not built, and handling says where a run passes them: {', '.join(limited)}")
 
     def _check_gravity(self) -> None:
-        """Refuse gravity that does not act downwards; add a note if it differs from that of scenes."""
+        """Refuse gravity that does not act downwards; add a note if it differs from the gravity of scenes."""
         gravity, name = np.array(self.model.opt.gravity), "option gravity"
         if np.any(gravity[:2]) or gravity[2] > 0.0:
             self._refuse(name, gravity.tolist(), "must be along -z: z is up from the road of a vehicle")
@@ -128,8 +128,8 @@ class _Reader:
                 self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
 
     def _elements(self, parts: CarBodies) -> Iterator[JointElement]:
-        """Springs, dampers and rotors along the suspension's coordinates, with the signs of their axes."""
-        joints = {place_of(self.model, j)[0]: j for j in range(self.model.njnt)}
+        """Springs, dampers and rotor inertias along the coordinates of the suspension, with the signs of their axes."""
+        joints = {coordinate_of(self.model, j)[0]: j for j in range(self.model.njnt)}
         for element in joint_elements(self.model):
             numbers = [joints[body] for body, _ in element.coordinates]
             for j in numbers:
@@ -148,29 +148,31 @@ class _Reader:
                 low, high = sorted(sign * (model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]))
                 yield at, float(low), float(high)
 
-    def _points(self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]) -> Iterator[PointOutput]:
-        """Outputs of vertical acceleration at every named site that is not a wheel."""
+    def _point_outputs(
+        self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]
+    ) -> Iterator[PointOutput]:
+        """Outputs of vertical acceleration at every named site that does not mark a wheel."""
         taken = {wheel.site for wheel in wheels}
         for s in range(self.model.nsite):
             name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
-            if name and s not in taken and body in parts.of:
+            if name and s not in taken and body in parts.body_names:
                 yield PointOutput(
-                    name, "acceleration", parts.of[body], _vector_of(design.site_xpos[s]), (0.0, 0.0, 1.0)
+                    name, "acceleration", parts.body_names[body], _vector_of(design.site_xpos[s]), (0.0, 0.0, 1.0)
                 )
 
-    def _at_rest(self, vehicle: SpatialVehicle) -> SpatialVehicle:
-        """The vehicle without preloads, since its springs will get those that hold it at rest. A note lists where the
-        file's preloads differ."""
+    def _without_preloads(self, vehicle: SpatialVehicle) -> SpatialVehicle:
+        """The vehicle without preloads, since its springs will get the preloads that balance its weight. A note lists
+        where the file's preloads differ."""
         held = preloads(replace(vehicle, gravity=GRAVITY)).parts
         changed = [
-            f"{e.name} {held[e.name]:.4g} for {e.held:.4g}"
+            f"{e.name} {held[e.name]:.4g} for {e.preload:.4g}"
             for e in vehicle.joint_elements
-            if abs(e.held - held[e.name]) > PRELOAD_DIFFERENCE * abs(held[e.name])
+            if abs(e.preload - held[e.name]) > PRELOAD_DIFFERENCE * abs(held[e.name])
         ]
         if changed:
             said = "preloads (N, N m) hold the design position at rest and stand for the file's"
             self.notes.append(f"{said}: {', '.join(changed)}")
-        bare = tuple(replace(element, held=0.0) for element in vehicle.joint_elements)
+        bare = tuple(replace(element, preload=0.0) for element in vehicle.joint_elements)
         return replace(vehicle, joint_elements=bare, notes=tuple(self.notes))
 
 
@@ -180,8 +182,10 @@ def _reserved_names(wheels: tuple[WheelSite, ...]) -> set[str]:
 
 
 def _tyre(wheel: WheelSite, parts: CarBodies) -> Tyre:
-    at, spin = _vector_of(wheel.point), parts.spin.get(wheel.name)
-    return Tyre(wheel.name, parts.of[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin)
+    at, spin = _vector_of(wheel.point), parts.spin_inertia.get(wheel.name)
+    return Tyre(
+        wheel.name, parts.body_names[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin
+    )
 
 
 def _side_force(wheel: WheelSite, parts: CarBodies) -> SideForce:

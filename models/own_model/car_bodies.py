@@ -1,4 +1,4 @@
-"""Bodies of an MJCF car in the description of a vehicle: what does not move against another body is one with it.
+"""Bodies of an MJCF car in the description of a vehicle; bodies that do not move relative to each other are merged.
 
 A body with slides alone, or with hinges through its centre of mass, has them itself; hinges elsewhere are a body
 without mass at their place, and so are joints in another order than that of the freedoms.
@@ -19,9 +19,9 @@ from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner
 
 REVOLUTION_TOLERANCE = 1e-9
-"""Share of a wheel's inertia by which it may differ from that of a body of revolution about its axle."""
+"""Share of a wheel's inertia by which it may differ from the inertia of a body of revolution about its axle."""
 CENTRE_TOLERANCE = 1e-12
-"""m: a hinge so near to a centre of mass is in it."""
+"""Distance (m) up to which a hinge counts as being in a body's centre of mass."""
 
 
 class Mass(NamedTuple):
@@ -35,27 +35,26 @@ class Mass(NamedTuple):
 
 @dataclass(frozen=True)
 class CarBodies:
-    """Bodies of the car. bodies : parents before children; chassis : its name; of : for each body of the file, the name
-    of the body that contains it; coordinates : of the suspension's joints, with the sign of their axes; spin : inertia
-    about the axle (kg m^2) of every spinning wheel, by the name of its tyre."""
+    """Bodies of a car in the description of a vehicle, and where the file's bodies and joints are in it."""
 
     bodies: tuple[Body, ...]
     chassis: str
-    of: dict[int, str]
+    body_names: dict[int, str]
     coordinates: dict[int, tuple[tuple[str, Freedom], float]]
-    spin: dict[str, float]
+    spin_inertia: dict[str, float]
 
 
 @dataclass
-class _Segment:
-    """Consecutive freedoms of a body that one joint can have; anchor : common point of the hinges among them."""
+class _JointSegment:
+    """Consecutive freedoms of a body that one joint of the description can have; anchor : common point of the hinges
+    among them."""
 
     freedoms: list[Freedom] = field(default_factory=list)
     joints: list[tuple[int, Freedom, float]] = field(default_factory=list)
     anchor: np.ndarray | None = None
 
-    def takes(self, freedom: Freedom, anchor: np.ndarray) -> bool:
-        """Whether the body's next joint can belong to this segment."""
+    def accepts(self, freedom: Freedom, anchor: np.ndarray) -> bool:
+        """Whether the body's next joint in the file can belong to this segment."""
         order = FREEDOMS.index
         if self.freedoms and order(freedom) <= order(self.freedoms[-1]):
             return False
@@ -70,36 +69,48 @@ class _Segment:
 
 
 def car_bodies(
-    model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
+    model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved_names: Collection[str]
 ) -> CarBodies:
-    """Bodies of the car; InputError for joints with oblique axes, and for wheels with imbalance.
+    """Bodies of a car from an MJCF model. Raises InputError for joints with oblique axes, and for wheels with
+    imbalance.
 
-    design : data of the model in the design position, with kinematics computed; reserved : names for other bodies.
-    """
-    return _Builder(model, design, roles, document, reserved).built()
+    design : data of the model in the design position, with kinematics computed; reserved_names : names for other
+    bodies."""
+    return _Builder(model, design, roles, document, reserved_names).build()
 
 
 class _Builder:
-    """Combines bodies of one file into those of the description."""
+    """Merges the bodies of one MJCF file into the bodies of the description."""
 
     def __init__(
-        self, model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
+        self,
+        model: mujoco.MjModel,
+        design: mujoco.MjData,
+        roles: Roles,
+        document: Document,
+        reserved_names: Collection[str],
     ) -> None:
-        self.model, self.design, self.roles, self.document, self.reserved = model, design, roles, document, reserved
+        self.model, self.design, self.roles, self.document, self.reserved = (
+            model,
+            design,
+            roles,
+            document,
+            reserved_names,
+        )
         self.leaders = dict[int, int]()
         for b in moving_bodies(model):
             above = self.leaders.get(int(model.body_parentid[b]))
-            joined = b in roles.chassis[1:] or (above is not None and not self._kept(b))
+            joined = b in roles.chassis[1:] or (above is not None and not self._suspension_joints(b))
             self.leaders[b] = above if joined and above is not None else b
-        self.spin = dict[str, float]()
+        self.spin_inertia = dict[str, float]()
         self.masses: dict[int, list[Mass]] = {leader: [] for leader in self.leaders.values()}
-        spinning = self._spinning()
+        spinning = self._spinning_bodies()
         for b, leader in self.leaders.items():
             if b not in spinning:
                 self.masses[leader].append(self._mass(b))
 
-    def built(self) -> CarBodies:
-        """All bodies."""
+    def build(self) -> CarBodies:
+        """All bodies of the car."""
         bodies, coordinates, names = list[Body](), dict[int, tuple[tuple[str, Freedom], float]](), dict[int, str]()
         for leader, masses in self.masses.items():
             names[leader] = self._name(leader)
@@ -109,12 +120,12 @@ class _Builder:
                 continue
             assert above is not None
             segments = self._segments(leader)
-            bodies += _links_of_body(names[leader], names[above], segments, whole, coordinates)
+            bodies += _bodies_of_joints(names[leader], names[above], segments, whole, coordinates)
         named = {b: names[leader] for b, leader in self.leaders.items()}
-        return CarBodies(tuple(bodies), names[self.roles.chassis[0]], named, coordinates, self.spin)
+        return CarBodies(tuple(bodies), names[self.roles.chassis[0]], named, coordinates, self.spin_inertia)
 
-    def _kept(self, body: int) -> list[int]:
-        """Joints of a body that belong to the suspension."""
+    def _suspension_joints(self, body: int) -> list[int]:
+        """Joints of a body that belong to the suspension, by number."""
         left_out = {*self.roles.spin, *self.roles.steer}
         return [j for j in joints_of(self.model, body) if j not in left_out] if body not in self.roles.chassis else []
 
@@ -129,9 +140,9 @@ class _Builder:
         inertia = axes * self.model.body_inertia[body] @ axes.T
         return Mass(float(self.model.body_mass[body]), self.design.xipos[body].copy(), inertia)
 
-    def _spinning(self) -> set[int]:
-        """Bodies that spin with the wheels. Their inertia about the axle is removed from the masses, because it counts
-        as the wheel's spin inertia."""
+    def _spinning_bodies(self) -> set[int]:
+        """Bodies that spin with the wheels, by number. Their inertia about the axle is removed from the masses, because
+        it counts as the wheel's spin inertia."""
         spinning = set[int]()
         for joint, wheel in self.roles.spin.items():
             body = int(self.model.jnt_bodyid[joint])
@@ -142,24 +153,24 @@ class _Builder:
                 raise InputError(self.document.path.name, joint_text(self.model, self.document, behind[0]), None, said)
             whole = combined_mass([self._mass(b) for b in turned])
             self._check_round(whole, wheel, joint)
-            self.spin[wheel.name] = float(whole.inertia[1, 1])
+            self.spin_inertia[wheel.name] = float(whole.inertia[1, 1])
             inertia = whole.inertia.copy()
             inertia[1] = inertia[:, 1] = 0.0
             self.masses[self.leaders[body]].append(whole._replace(inertia=inertia))
             spinning.update(turned)
         return spinning
 
-    def _rides_on_suspension(self, body: int, on: int) -> bool:
-        while body and body != on:
+    def _rides_on_suspension(self, body: int, carrier: int) -> bool:
+        while body and body != carrier:
             body = int(self.model.body_parentid[body])
-        return body == on
+        return body == carrier
 
-    def _check_round(self, whole: Mass, wheel: WheelSite, joint: int) -> None:
+    def _check_round(self, mass: Mass, wheel: WheelSite, joint: int) -> None:
         """Refuse a wheel with imbalance, which would shake as it spins."""
-        inertia, beside = whole.inertia, np.abs((whole.centre - wheel.point)[[0, 2]]).max()
+        inertia, beside = mass.inertia, np.abs((mass.centre - wheel.point)[[0, 2]]).max()
         uneven = np.abs([inertia[0, 0] - inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]).max()
         if (
-            whole.mass and (beside > SAME_AXLE_DISTANCE or uneven > REVOLUTION_TOLERANCE * np.trace(inertia))
+            mass.mass and (beside > SAME_AXLE_DISTANCE or uneven > REVOLUTION_TOLERANCE * np.trace(inertia))
         ) or not inertia[1, 1] > 0.0:
             said = (
                 f"spins {wheel.name!r}, whose mass must be one of revolution about the axle: its centre is "
@@ -167,22 +178,22 @@ class _Builder:
             )
             raise InputError(self.document.path.name, joint_text(self.model, self.document, joint), None, said)
 
-    def _segments(self, leader: int) -> list[_Segment]:
-        segments = [_Segment()]
-        for joint in self._kept(leader):
+    def _segments(self, leader: int) -> list[_JointSegment]:
+        segments = [_JointSegment()]
+        for joint in self._suspension_joints(leader):
             known, anchor = freedom_of(self.model, self.design, joint), self.design.xanchor[joint].copy()
             if known is None:
                 axis = np.round(self.design.xaxis[joint], 9).tolist()
                 said = "is no hinge or slide along x, y or z of the vehicle: the suspension of a car has no others"
                 raise InputError(self.document.path.name, joint_text(self.model, self.document, joint), axis, said)
-            if not segments[-1].takes(known[0], anchor):
-                segments.append(_Segment())
+            if not segments[-1].accepts(known[0], anchor):
+                segments.append(_JointSegment())
             segments[-1].add(joint, *known, anchor)
         return segments
 
 
 def combined_mass(masses: list[Mass]) -> Mass:
-    """One rigid body that has the mass, centre and inertia of all the given ones."""
+    """Mass, centre and inertia of a rigid body that consists of all the given ones."""
     if len(masses) == 1:
         return masses[0]
     total = sum(each.mass for each in masses)
@@ -192,31 +203,31 @@ def combined_mass(masses: list[Mass]) -> Mass:
     return Mass(total, centre, inertia)
 
 
-def _links_of_body(
+def _bodies_of_joints(
     name: str,
     above: str,
-    segments: list[_Segment],
-    whole: Mass,
+    segments: list[_JointSegment],
+    mass: Mass,
     coordinates: dict[int, tuple[tuple[str, Freedom], float]],
 ) -> Iterator[Body]:
-    """Bodies of the description for one body of the file and its joints; fills ``coordinates`` with the joints' new
-    names."""
+    """Bodies of the description for one body of the file and its joints; fills ``coordinates`` with the names that the
+    joints have in the description."""
     for number, segment in enumerate(segments):
         last, at = number == len(segments) - 1, segment.anchor
-        itself = last and (at is None or np.abs(at - whole.centre).max() <= CENTRE_TOLERANCE)
+        itself = last and (at is None or np.abs(at - mass.centre).max() <= CENTRE_TOLERANCE)
         link = name if itself else f"{name} joint {number + 1}"
         coordinates |= {joint: ((link, freedom), sign) for joint, freedom, sign in segment.joints}
         if itself:
-            yield _body_from_segment(name, whole, tuple(segment.freedoms), above)
+            yield _body_from_segment(name, mass, tuple(segment.freedoms), above)
             return
-        yield Body(link, 0.0, _vector_of(whole.centre if at is None else at), tuple(segment.freedoms), parent=above)
+        yield Body(link, 0.0, _vector_of(mass.centre if at is None else at), tuple(segment.freedoms), parent=above)
         above = link
-    yield _body_from_segment(name, whole, (), above)
+    yield _body_from_segment(name, mass, (), above)
 
 
-def _body_from_segment(name: str, whole: Mass, freedoms: tuple[Freedom, ...], parent: str | None) -> Body:
-    x, y, z = map(_vector_of, whole.inertia)
-    return Body(name, whole.mass, _vector_of(whole.centre), freedoms, (x, y, z), parent)
+def _body_from_segment(name: str, mass: Mass, freedoms: tuple[Freedom, ...], parent: str | None) -> Body:
+    x, y, z = map(_vector_of, mass.inertia)
+    return Body(name, mass.mass, _vector_of(mass.centre), freedoms, (x, y, z), parent)
 
 
 def _vector_of(numbers: np.ndarray) -> Vector:

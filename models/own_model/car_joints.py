@@ -1,4 +1,4 @@
-"""What the joints of an MJCF car are: the chassis' own, one that spins or steers a wheel, or one of the suspension.
+"""Roles of the joints of an MJCF car: to free the chassis, to spin or steer a wheel, or to be part of the suspension.
 
 Whatever acts on a joint that twinrig moves itself, by the driver's steering, by brakes and drive, is left out with it.
 """
@@ -13,20 +13,20 @@ from models.own_model.content import BIAS, DSBL, GAIN, JOINT_TARGETS, TRN
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.names import label, moving_bodies
 from models.own_model.reading import is_fixed, tendon_travel
-from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite, place
+from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite, site_text
 from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Freedom
 
 PARALLEL_TOLERANCE = 1e-9
-"""Of a unit axis: what it may have beside the axis of the vehicle that it is parallel to."""
+"""Largest component of a unit axis perpendicular to the vehicle axis to which it is parallel."""
 NEGLIGIBLE_MASS = 1e-6
-"""kg: lighter bodies only carry joints."""
+"""Mass (kg) below which a body counts as a mere carrier of joints."""
 
 
 @dataclass(frozen=True)
 class Roles:
-    """Roles of the joints: chassis : numbers of its bodies; spin, steer : for each joint that spins or steers a wheel,
-    the site of that wheel."""
+    """Roles of the joints of a car. chassis : numbers of its bodies; spin, steer : for each joint that spins or steers
+    a wheel, the site of that wheel."""
 
     chassis: tuple[int, ...]
     spin: dict[int, WheelSite]
@@ -41,7 +41,7 @@ def joints_of(model: mujoco.MjModel, body: int) -> range:
 
 def freedom_of(model: mujoco.MjModel, design: mujoco.MjData, joint: int) -> tuple[Freedom, float] | None:
     """A hinge or slide as a freedom in the vehicle's axes, and the sign of its axis; None where its axis is not
-    parallel to one of these."""
+    parallel to one of the vehicle's."""
     axis, kind = design.xaxis[joint], int(model.jnt_type[joint])
     along = int(np.abs(axis).argmax())
     if kind in (FREE_JOINT, BALL_JOINT) or np.abs(np.delete(axis, along)).max() > PARALLEL_TOLERANCE:
@@ -50,8 +50,8 @@ def freedom_of(model: mujoco.MjModel, design: mujoco.MjData, joint: int) -> tupl
 
 
 def roles_of(model: mujoco.MjModel, design: mujoco.MjData, wheels: tuple[WheelSite, ...], document: Document) -> Roles:
-    """The role of every joint; InputError where no chassis is free, or a wheel turns in a way that twinrig does not
-    have."""
+    """Roles of all joints of a car. Raises InputError where no chassis is free, or a wheel turns in a way that twinrig
+    does not have."""
     chassis = _chassis_bodies(model, design, document)
     spin, steer = dict[int, WheelSite](), dict[int, WheelSite]()
     for wheel in wheels:
@@ -71,7 +71,8 @@ def joint_text(model: mujoco.MjModel, document: Document, joint: int) -> str:
 
 
 def _chassis_bodies(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[int, ...]:
-    """Bodies from the ground to the one that completes all six freedoms; those before it are almost massless."""
+    """Numbers of the bodies from the ground to the one that completes all six freedoms of the chassis; those before it
+    are almost massless."""
     numbers, name = moving_bodies(model), document.path.name
     roots = [b for b in numbers if int(model.body_parentid[b]) not in numbers]
     if len(roots) > 1:
@@ -93,7 +94,7 @@ def _chassis_bodies(model: mujoco.MjModel, design: mujoco.MjData, document: Docu
     if sorted(freedoms) != sorted(FREEDOMS):
         said = "the chassis must be free: give it a <freejoint/>, or three slides and three hinges along x, y and z"
         raise InputError(name, label(model, "body", body), None, said)
-    _check_bare(model, [j for b in bodies for j in joints_of(model, b)], document, "the chassis")
+    _check_without_forces(model, [j for b in bodies for j in joints_of(model, b)], document, "the chassis")
     return tuple(bodies)
 
 
@@ -107,8 +108,8 @@ def _joints_to_ground(model: mujoco.MjModel, body: int, chassis: tuple[int, ...]
 
 
 def _spin_hinge(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, document: Document) -> int | None:
-    """The hinge about y through a wheel's centre, on the wheel's body or on one that this body carries; None if there
-    is none."""
+    """Number of the hinge about y through a wheel's centre, on the wheel's body or on a body that it carries; None if
+    there is none."""
     bodies = [wheel.body, *(b for b in range(1, model.nbody) if int(model.body_parentid[b]) == wheel.body)]
     spins = []
     for joint in (j for b in bodies for j in joints_of(model, b)):
@@ -117,12 +118,14 @@ def _spin_hinge(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, 
             spins.append(joint)
     if len(spins) > 1:
         names = [model.joint(j).name for j in spins]
-        raise InputError(document.path.name, place(model, document, wheel.site), names, "two joints spin this wheel")
-    _check_bare(model, spins, document, "a wheel's spin")
+        raise InputError(
+            document.path.name, site_text(model, document, wheel.site), names, "two joints spin this wheel"
+        )
+    _check_without_forces(model, spins, document, "a wheel's spin")
     return spins[0] if spins else None
 
 
-def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of: str) -> None:
+def _check_without_forces(model: mujoco.MjModel, joints: list[int], document: Document, owner: str) -> None:
     """Refuse springs, dampers, rotors and dry friction on joints that twinrig models in another way."""
     for joint in joints:
         first = int(model.jnt_dofadr[joint])
@@ -136,13 +139,13 @@ def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of
         for law, value in laws.items():
             if value:
                 where = f"{joint_text(model, document, joint)} {law}"
-                raise InputError(document.path.name, where, float(value), f"must be 0: {of} has none in a vehicle")
+                raise InputError(document.path.name, where, float(value), f"must be 0: {owner} has none in a vehicle")
 
 
 def _check_steering(
     model: mujoco.MjModel, design: mujoco.MjData, joint: int, wheel: WheelSite, document: Document
 ) -> None:
-    """Refuse another steering than that of the front wheels about the vertical through their centres."""
+    """Refuse steering other than that of the front wheels about the vertical through their centres."""
     beside = round(float(np.linalg.norm((design.xanchor[joint] - wheel.point)[:2])), 9)
     where = joint_text(model, document, joint)
     if wheel.axle:
@@ -152,8 +155,8 @@ def _check_steering(
         raise InputError(document.path.name, where, beside, said)
 
 
-def forget(model: mujoco.MjModel, roles: Roles) -> list[str]:
-    """Remove all elements that act on the joints for spin or steering from the model; returns their names."""
+def remove_elements_on(model: mujoco.MjModel, roles: Roles) -> list[str]:
+    """Remove from the model all elements that act on the joints for spin or steering; returns their names."""
     moved, names = {*roles.spin, *roles.steer}, list[str]()
     for joint in roles.steer:
         first = int(model.jnt_dofadr[joint])

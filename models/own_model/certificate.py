@@ -1,4 +1,4 @@
-"""Whether builds move alike: mass matrix, forces and accelerations at random states.
+"""Agreement of all builds of a user's model with MuJoCo's: mass matrix, forces and accelerations at random states.
 
 Every coordinate is judged for itself, in the coordinates of the description: the difference of its acceleration by its
 acceleration at that state (the largest of three where a body turns or shifts along three axes at once), that of an
@@ -19,56 +19,60 @@ from models.own_model.builds import (
     PLAIN_BUILD,
     SOFT_BUILD,
     Equations,
-    Moved,
+    Motion,
     State,
     equations_of_build,
     expected_equations,
     is_soft_in_mujoco,
     largest_gap,
-    rubbing_states,
+    moving_friction_states,
     sliding_states,
 )
-from models.own_model.coordinates import several_at_once
+from models.own_model.coordinates import joint_coordinate_slices
 from models.own_model.reading import TwinModel
 from models.own_model.rounding import sensitivities
 from models.own_model.states import STATE_COUNT, random_states
 
 EQUAL_ACCELERATION_SHARE = 1e-10
-"""Relative difference up to which accelerations are the same."""
+"""Relative difference up to which accelerations count as equal."""
 ROUNDING_SHARE = 1000.0 * float(np.finfo(float).eps)
-"""Share by which numbers may seem to be changed: up to 300 roundings were seen, with 30 joints in a row."""
+"""Relative change of all numbers that rounding may amount to: up to 300 roundings were seen, with 30 joints in a
+row."""
 WORST_CONDITION = 1e8
-"""Condition of a mass matrix beyond which nothing more is put down to rounding."""
+"""Condition number of a mass matrix beyond which the rounding allowed does not grow further."""
 CONSTRAINT_GAP = 1e-10
-"""m, rad: gap up to which a state satisfies the constraints of a build."""
+"""Violation (m, rad) up to which a state satisfies the constraints of a build."""
 SINGULAR_MASS_REASON = (
     "the mass matrix is singular: something without inertia can move, or constraints repeat one another"
 )
 HARDLY_MOVING_SHARE = 1e-6
-"""Share of the largest acceleration, weighted with the root of inertia, below which a coordinate hardly moves."""
-MOVES = 0.1
-"""Share of the largest coordinate of a motion without inertia from which a coordinate is named."""
+"""Share of the largest acceleration, weighted with the root of inertia, below which a coordinate counts as hardly
+moving."""
+NAMED_COORDINATE_SHARE = 0.1
+"""Share of the largest coordinate of a motion without inertia from which a coordinate is named in the message."""
 SMALLEST_FLOAT = float(np.finfo(float).tiny)
 RATE_FACTORS = (1.0, 3.0, 10.0)
-"""Factors of random rates, of which the first is taken at which all dry friction slides."""
-Told = Callable[[float], object]
-"""Told the share that is done."""
+"""Factors of random rates; the first at which all dry friction slides is taken."""
+Progress = Callable[[float], object]
+"""Function that is called with the share of the work that is done."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The file's own model as reference for the builds: names of coordinates (n,), for each the slice of coordinates
-    that are judged together with it (n,), its motion at some states, and the sensitivity of this motion to rounding."""
+    """Motion of the file's model in MuJoCo as the reference for the builds: names of coordinates (n,), for each the
+    slice of coordinates that are judged together with it (n,), its motion at some states, and the sensitivity of this
+    motion to rounding."""
 
     names: tuple[str, ...]
     judged_together: tuple[slice, ...]
-    moved: list[Moved]
-    sensitivities: list[Moved]
+    motions: list[Motion]
+    sensitivities: list[Motion]
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of one build with the file's own model: largest relative differences of mass, force and acceleration.
+    """Agreement of one build with the file's model in MuJoCo: largest relative differences of mass, force and
+    acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
     rad/s^2; bound : share of the largest acceleration of a coordinate that moves which may be rounding, 1e-10 or more;
@@ -87,36 +91,38 @@ class Agreement:
 
     @property
     def same_motion(self) -> bool:
-        """Whether accelerations and the mass matrix agree. The matrix counts too, because a force may later act where
-        none acts now."""
+        """Whether accelerations and the mass matrix agree. The mass matrix counts too, because a force may later act
+        where none acts now."""
         return max(self.acceleration, self.mass) <= EQUAL_ACCELERATION_SHARE
 
     @property
     def alike(self) -> bool:
-        """Whether the motion is the same, and the build's own constraints are met."""
+        """Whether the motion is the same, and the build's own constraints are satisfied."""
         return self.same_motion and self.gap <= CONSTRAINT_GAP
 
 
-def certificate(twin: TwinModel, count: int = STATE_COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
-    """Agreement of every build of the description with the file's own model.
+def certificate(
+    twin: TwinModel, count: int = STATE_COUNT, report_progress: Progress = lambda share: None
+) -> tuple[Agreement, ...]:
+    """Agreement of every build of the description with the file's model in MuJoCo.
 
     RunFailed where a joint with dry friction cannot move.
     """
-    states, rows = states_of(twin, count), list[Agreement]()
+    states, rows = comparison_states(twin, count), list[Agreement]()
     soft = reference_of_file(twin, states, SOFT_BUILD)
     rigid = reference_of_file(twin, states, PLAIN_BUILD) if is_soft_in_mujoco(twin) else soft
     for i, build in enumerate(ALL_BUILDS):
         row = agreement_of_build(
-            build, soft if build == SOFT_BUILD else rigid, moved_at(equations_of_build(twin, build), states)
+            build, soft if build == SOFT_BUILD else rigid, motion_at(equations_of_build(twin, build), states)
         )
         rows.append(replace(row, gap=largest_gap(twin, build, states)))
-        told((i + 1) / len(ALL_BUILDS))
+        report_progress((i + 1) / len(ALL_BUILDS))
     return tuple(rows)
 
 
-def states_of(twin: TwinModel, count: int) -> list[State]:
-    """Random states. Where dry friction sticks in MuJoCo, the rates are increased; a state is left out if it sticks all
-    the same, unless all do: then those are taken at which every joint with dry friction moves.
+def comparison_states(twin: TwinModel, count: int) -> list[State]:
+    """Random states at which dry friction slides. Where it sticks in MuJoCo, the rates are increased; a state is left
+    out if it sticks all the same, unless all do: then those are taken at which every joint with dry friction moves.
 
     RunFailed where none does.
     """
@@ -124,7 +130,7 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
     for q, v in drawn:
         tried = (sliding_states(twin, [(q, factor * v)]) for factor in RATE_FACTORS)
         states += next((each for each in tried if each), [])
-    states = states or rubbing_states(twin, drawn)
+    states = states or moving_friction_states(twin, drawn)
     if not states:
         said = "a joint with dry friction cannot move, so its friction has no direction: try `--without friction_loss`"
         raise RunFailed("twin", said)
@@ -132,38 +138,42 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
 
 
 def softness_difference(twin: TwinModel, count: int) -> float:
-    """Largest relative difference of the file's accelerations with MuJoCo's soft constraints from those with rigid
+    """Largest relative difference between the file's accelerations with MuJoCo's soft constraints and those with rigid
     constraints, at states that satisfy the constraints."""
-    states = states_of(twin, count)
+    states = comparison_states(twin, count)
     return agreement_of_build(
-        "", reference_of_file(twin, states, PLAIN_BUILD), moved_at(expected_equations(twin, SOFT_BUILD), states)
+        "", reference_of_file(twin, states, PLAIN_BUILD), motion_at(expected_equations(twin, SOFT_BUILD), states)
     ).acceleration
 
 
 def reference_of_file(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
-    """``Reference`` for a build from the file's own model at some states; RunFailed as in ``moved_at``."""
+    """``Reference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``moved_at``
+    does."""
     law = partial(expected_equations, build=build)
-    moved = moved_at(law(twin), states)
+    moved = motion_at(law(twin), states)
     _check_inertia(twin, moved[0].mass)
-    return Reference(twin.names, several_at_once(twin.model), moved, sensitivities(twin, law, states, moved))
+    return Reference(twin.names, joint_coordinate_slices(twin.model), moved, sensitivities(twin, law, states, moved))
 
 
 def _check_inertia(twin: TwinModel, mass: np.ndarray) -> None:
-    """RunFailed that names the joints which together move without inertia, where the mass matrix (n, n) is singular."""
+    """Raise RunFailed, naming the joints that together move without inertia, where the mass matrix (n, n) is
+    singular."""
     scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), SMALLEST_FLOAT))
     values, shapes = np.linalg.eigh(mass * np.outer(scale, scale))
     if values[0] <= len(mass) * float(np.finfo(float).eps):
         share = np.abs(shapes[:, 0])
-        names = [name for name, part in zip(twin.names, share, strict=True) if part > MOVES * share.max()]
+        names = [
+            name for name, part in zip(twin.names, share, strict=True) if part > NAMED_COORDINATE_SHARE * share.max()
+        ]
         raise RunFailed(twin.name, f"the mass matrix is singular: {' and '.join(names)} can move without inertia")
 
 
-def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
-    """Mass matrix, forces and accelerations at all states; RunFailed where a mass matrix is singular or an acceleration
-    is not finite."""
+def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Motion]:
+    """Mass matrix, forces and accelerations at all states. Raises RunFailed where a mass matrix is singular or an
+    acceleration is not finite."""
     try:
         with without_warnings():  # which say less than what is raised here
-            moved = [move(q, v) for q, v in states]
+            moved = [equations(q, v) for q, v in states]
     except np.linalg.LinAlgError:
         raise RunFailed("twin", SINGULAR_MASS_REASON) from None
     if not all(np.isfinite(each.acceleration).all() for each in moved):
@@ -171,18 +181,20 @@ def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -
     return moved
 
 
-def agreement_of_build(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:
-    """Largest differences between a build and the reference over all states."""
-    rows = [_scales_at_state(expected, i) for i in range(len(seen))]
-    magnitudes, rounding = (Moved(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
-    apart = Moved(*(np.abs(np.array(there) - np.array(here)) for there, here in _paired_values(seen, expected.moved)))
+def agreement_of_build(build: str, expected: Reference, motions: Sequence[Motion]) -> Agreement:
+    """Largest differences between the motions of a build and the reference over all states."""
+    rows = [_scales_at_state(expected, i) for i in range(len(motions))]
+    magnitudes, rounding = (Motion(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
+    apart = Motion(
+        *(np.abs(np.array(there) - np.array(here)) for there, here in _paired_values(motions, expected.motions))
+    )
     mass, force, shares = (
         np.where(d > 0.0, d / np.maximum(np.maximum(a, r / EQUAL_ACCELERATION_SHARE), SMALLEST_FLOAT), 0.0)
         for d, a, r in zip(apart, magnitudes, rounding, strict=True)
     )
     at, i = np.unravel_index(np.argmax(np.nan_to_num(shares, nan=np.inf)), shares.shape)
     bound = _may_be_rounding(magnitudes, rounding.acceleration)
-    sizes = (float(apart.acceleration[at, i]), float(np.abs(expected.moved[at].acceleration[i])))
+    sizes = (float(apart.acceleration[at, i]), float(np.abs(expected.motions[at].acceleration[i])))
     return Agreement(
         build,
         _largest_difference(mass),
@@ -194,36 +206,37 @@ def agreement_of_build(build: str, expected: Reference, seen: Sequence[Moved]) -
     )
 
 
-def _may_be_rounding(magnitudes: Moved, rounding: np.ndarray) -> float:
-    """Largest ratio of the rounding (s, n) to the largest acceleration of a coordinate, from 1e-10 to 1, which is all
-    of it; coordinates that hardly move are left out."""
+def _may_be_rounding(magnitudes: Motion, rounding: np.ndarray) -> float:
+    """Largest ratio, over the coordinates, of the allowed rounding (s, n) to the largest acceleration, limited to 1e-10
+    to 1; coordinates that hardly move are left out."""
     largest, allowed = magnitudes.acceleration.max(axis=0), rounding.max(axis=0)
     weighted = largest * np.sqrt(np.diagonal(magnitudes.mass, axis1=1, axis2=2).max(axis=0))
     moves = weighted > HARDLY_MOVING_SHARE * weighted.max()
     return min(1.0, max(EQUAL_ACCELERATION_SHARE, float((allowed[moves] / largest[moves]).max(initial=0.0))))
 
 
-def _paired_values(seen: Sequence[Moved], expected: Sequence[Moved]) -> Iterator[tuple[tuple, tuple]]:
-    """Pairs of seen and expected values over all states: mass matrices, forces, accelerations."""
-    return zip(zip(*seen, strict=True), zip(*expected, strict=True), strict=True)
+def _paired_values(motions: Sequence[Motion], expected: Sequence[Motion]) -> Iterator[tuple[tuple, tuple]]:
+    """Pairs of a build's and the expected values over all states: first mass matrices, then forces, then
+    accelerations."""
+    return zip(zip(*motions, strict=True), zip(*expected, strict=True), strict=True)
 
 
 def _largest_difference(shares: np.ndarray) -> float:
     return float(shares.max()) if np.isfinite(shares).all() else np.inf
 
 
-def _scales_at_state(expected: Reference, state: int) -> tuple[Moved, Moved]:
+def _scales_at_state(expected: Reference, state: int) -> tuple[Motion, Motion]:
     """Reference magnitudes of masses, forces and accelerations at one state, and the rounding error allowed in each.
 
     The allowed error does not grow further where a mass matrix is nearly singular.
     """
-    moved, sensitive = expected.moved[state], expected.sensitivities[state]
+    moved, sensitive = expected.motions[state], expected.sensitivities[state]
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
     force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
     acceleration = np.array([acceleration[together].max() for together in expected.judged_together])
-    magnitudes = Moved(np.outer(inertia, inertia), force, acceleration)
+    magnitudes = Motion(np.outer(inertia, inertia), force, acceleration)
     allowed = ROUNDING_SHARE * min(1.0, WORST_CONDITION / _scaled_condition(moved.mass))
-    return magnitudes, Moved(*(allowed * each for each in sensitive))
+    return magnitudes, Motion(*(allowed * each for each in sensitive))
 
 
 def _scaled_condition(mass: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Rigid constraints of a description: what they ask of accelerations, and which states satisfy them."""
+"""Rigid constraints of a user's model: the constraint forces, and states that satisfy the constraints."""
 
 from collections.abc import Callable, Sequence
 
@@ -6,47 +6,50 @@ import numpy as np
 
 from models.multibody.plain.constraints import PlainConstraints
 from models.multibody.plain.motion import Bodies
-from models.own_model.equalities import tie_rows
+from models.own_model.equalities import coupling_rows
 from models.own_model.reading import TwinModel
 
 REDUNDANT_SHARE = 1e-9
-"""Share of the largest singular value of the constraints' rows up to which they repeat others."""
+"""Share of the largest singular value of the constraint Jacobian below which a combination of its rows counts as
+redundant."""
 DIFFERENCE_STRIDE = 0.02
-"""rad, m: how far all coordinates move together from one row of differences to the next."""
+"""Distance (rad, m), summed over all coordinates, between neighbouring states of finite differences."""
 DIFFERENCE_WEIGHTS = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
-"""Differences of order 6 over one, two and three strides to either side."""
+"""Weights of central differences of order 6, over one, two and three strides to either side."""
 SATISFIED_GAP, MOST_CORRECTIONS, LONGEST_CORRECTION = 1e-12, 60, 0.5
-"""m, rad: gap of constraints that are satisfied; steps of Newton's method to get there; m, rad: the longest of them."""
+"""Violation (m, rad) below which constraints are satisfied; largest count of Newton steps to get there; the longest of
+these steps (m, rad)."""
 
-Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
-"""J (c, n) of constraints at each of some coordinates (n,)."""
+JacobianAt = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
+"""Function that returns the constraint Jacobian J (c, n) at each of some coordinates (n,)."""
 Ranges = tuple[np.ndarray | float, np.ndarray | float]
-"""Lowest and highest coordinates (n,), or of all."""
+"""Lowest and highest coordinates, (n,) or the same for all."""
 
 
 def plain_constraints(twin: TwinModel) -> PlainConstraints:
-    """The constraints of a model in plain numpy."""
+    """The constraints of a user's model in plain numpy."""
     driven = twin.driven
     joints = [(connection.ends, connection.axes) for connection in driven.connections]
-    return PlainConstraints(Bodies(driven.vehicle), *tie_rows(driven.couplings, twin.size), joints)
+    return PlainConstraints(Bodies(driven.vehicle), *coupling_rows(driven.couplings, twin.size), joints)
 
 
-def constrained_forces(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Forces (n,) including constraint forces, for rigid constraints rows q'' + rest = 0 with rows (c, n) and rest
-    (c,); rows may be linearly dependent."""
-    turned, sizes, rows = np.linalg.svd(rows, full_matrices=False)
+def constrained_forces(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """Forces (n,) including the constraint forces of rigid constraints J q'' + bias = 0, with Jacobian J (c, n) and
+    bias (c,); rows may be linearly dependent."""
+    turned, sizes, jacobian = np.linalg.svd(jacobian, full_matrices=False)
     kept = sizes > REDUNDANT_SHARE * sizes[0]
-    rows, rest = rows[kept], (rest @ turned)[kept] / sizes[kept]
-    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, rows.T)
-    answer: np.ndarray = force - rows.T @ np.linalg.solve(rows @ compliance, rows @ free + rest)
+    jacobian, bias = jacobian[kept], (bias @ turned)[kept] / sizes[kept]
+    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, jacobian.T)
+    answer: np.ndarray = force - jacobian.T @ np.linalg.solve(jacobian @ compliance, jacobian @ free + bias)
     return answer
 
 
-def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates (n,)."""
+def jacobian_by_differences(jacobian_at: JacobianAt, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Constraint Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates
+    (n,)."""
     stride = DIFFERENCE_STRIDE / max(float(np.abs(v).sum()), 1e-9)
     steps = [k * stride * v for k in range(1, len(DIFFERENCE_WEIGHTS) + 1)]
-    rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])
+    rows, *others = jacobian_at([q, *(place for s in steps for place in (q + s, q - s))])
     changes = [
         weight * (there - back)
         for weight, there, back in zip(DIFFERENCE_WEIGHTS, others[::2], others[1::2], strict=True)
@@ -63,18 +66,18 @@ def satisfying_state(
     for _ in range(MOST_CORRECTIONS):
         gap = constraints.gap(q)
         if np.abs(gap.size).max() <= SATISFIED_GAP:
-            return q, v - np.linalg.pinv(gap.rows, REDUNDANT_SHARE) @ (gap.rows @ v)
-        step = _correction(gap.rows, gap.size, q, ranges)
+            return q, v - np.linalg.pinv(gap.jacobian, REDUNDANT_SHARE) @ (gap.jacobian @ v)
+        step = _correction(gap.jacobian, gap.size, q, ranges)
         q = np.clip(q - step * min(1.0, LONGEST_CORRECTION / max(float(np.abs(step).max()), SATISFIED_GAP)), *ranges)
     return None
 
 
-def _correction(rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
-    """Smallest correction (n,) that closes gaps (c,) to first order, of those coordinates that it does not press
-    against an end of their ranges."""
+def _correction(jacobian: np.ndarray, gap: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
+    """Smallest correction (n,) of the coordinates that closes gaps (c,) to first order; coordinates that it would push
+    out of their ranges are left unchanged."""
     (low, high), held = ranges, np.zeros(len(q), bool)
     while True:
-        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, rows), REDUNDANT_SHARE) @ size
+        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, jacobian), REDUNDANT_SHARE) @ gap
         pressed = ~held & (((q <= low) & (step > 0.0)) | ((q >= high) & (step < 0.0)))
         if not pressed.any():
             return step

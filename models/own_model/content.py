@@ -1,4 +1,5 @@
-"""What a file holds beside a tree with linear laws: refused by name and line where it has no equal, left out if asked.
+"""Content of a file beyond a tree of bodies with linear force laws: refused by name and line where twinrig has no
+equivalent, left out on request.
 
 Limits of joints are the exception: as long as no coordinate leaves its range they do nothing, so states are drawn
 inside the ranges, limits are switched off in the file's own model, and that is said.
@@ -13,8 +14,8 @@ import numpy as np
 from models.core.errors import InputError
 from models.engines.native_mujoco import SOLVER_TOLERANCE
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
-from models.own_model.equalities import is_tie, joins_bodies
-from models.own_model.names import feature_is_disabled, label, name_of, some_names
+from models.own_model.equalities import couples_joints, joins_bodies
+from models.own_model.names import feature_is_disabled, first_names_text, label, name_of
 from models.own_model.reading import (
     JOINT_TARGETS,
     affine_law,
@@ -38,7 +39,7 @@ TAGS_OF_ELEMENT = {
     "equality": ("connect", "weld", "joint", "tendon", "flex"),
     "flex": ("flex", "flexcomp"),
 }
-"""Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
+"""Tags of the elements of MJCF and URDF that have a name, by MuJoCo's name for the kind of object."""
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 
@@ -50,46 +51,46 @@ class Content:
 
     kind: str
     names: tuple[str, ...]
-    why: str
+    reason: str
 
     def line(self) -> str:
-        """One line of text with kind, names and reason."""
-        return f"{self.kind}: {some_names(self.names)}: {self.why}"
+        """Text of one line with kind, names and reason."""
+        return f"{self.kind}: {first_names_text(self.names)}: {self.reason}"
 
 
 def contents_of_model(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """All parts of the model beyond a tree with linear laws, one entry for each kind that occurs."""
+    """All content of the model beyond a tree with linear force laws, one item for each kind that occurs."""
     return _contents_of_kind(model, document, lambda kind, what, number: True)
 
 
 def without_equal(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """The entries of ``contents_of_model`` that other builds cannot represent."""
+    """The content of ``contents_of_model`` that other builds cannot represent."""
     return _contents_of_kind(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
 
 
 def _contents_of_kind(
-    model: mujoco.MjModel, document: Document, wanted: Callable[[str, str, int], bool]
+    model: mujoco.MjModel, document: Document, is_wanted: Callable[[str, str, int], bool]
 ) -> list[Content]:
     rows = list[Content]()
     for kind, (listed, why, _) in CONTENT_KINDS.items():
-        if names := [_with_line(model, document, *each) for each in listed(model) if wanted(kind, *each)]:
+        if names := [_with_line(model, document, *each) for each in listed(model) if is_wanted(kind, *each)]:
             rows.append(Content(kind, tuple(names), why))
     return rows
 
 
-def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool:
-    """Whether other builds can represent it: a ball joint without rotor, dry friction of a hinge or slide, or an
-    equality constraint between bodies or of one or two hinges or slides."""
+def _has_equal(model: mujoco.MjModel, kind: str, object_kind: str, number: int) -> bool:
+    """Whether other builds can represent an object of the file: a ball joint without rotor, dry friction of a hinge or
+    slide, or an equality constraint between bodies or of one or two hinges or slides."""
     if kind == "friction_loss":
-        return what == "joint" and has_dry_friction(model, number)
+        return object_kind == "joint" and has_dry_friction(model, number)
     if kind == "turning_law":
         return not _has_rotor(model, number)
-    return kind == "equality" and (is_tie(model, number) or joins_bodies(model, number))
+    return kind == "equality" and (couples_joints(model, number) or joins_bodies(model, number))
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
-    """Remove the parts named in ``without`` from the model, and return what was removed. InputError where another part
-    cannot be represented."""
+    """Remove the kinds of content named in ``without`` from the model, and return what was removed. Raises InputError
+    where other content cannot be represented."""
     for kind in without:
         if kind not in CONTENT_KINDS:
             raise InputError("--without", "", kind, "no such content", tuple(CONTENT_KINDS))
@@ -109,7 +110,8 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
 
 
 def _refusal(rows: Sequence[Content], without: Collection[str]) -> str:
-    """What has no equal, and the option that leaves all of it out; without : what is left out already."""
+    """Text of a refusal: the content without an equivalent, and the option that leaves all of it out; without : kinds
+    left out already."""
     told = ". ".join(row.line() for row in rows)
     if any(row.kind == "flex" for row in rows):
         return (
@@ -120,21 +122,21 @@ def _refusal(rows: Sequence[Content], without: Collection[str]) -> str:
     return f"{told}. {subject_and_verb} no equal in the other builds; leave {pronoun} out with `--without {kinds}`"
 
 
-def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int) -> str:
+def _with_line(model: mujoco.MjModel, document: Document, object_kind: str, number: int) -> str:
     if number == NAMELESS_INDEX:
-        return what
-    name = name_of(model, what, number)
-    line = document.line(TAGS_OF_ELEMENT.get(what, ()), name) if name else ""
-    return f"{label(model, what, number)} ({line})" if line else label(model, what, number)
+        return object_kind
+    name = name_of(model, object_kind, number)
+    line = document.line(TAGS_OF_ELEMENT.get(object_kind, ()), name) if name else ""
+    return f"{label(model, object_kind, number)} ({line})" if line else label(model, object_kind, number)
 
 
-Listed = Iterator[tuple[str, int]]
-"""What MuJoCo calls a thing, and its number there."""
+ObjectIterator = Iterator[tuple[str, int]]
+"""Objects of a model: MuJoCo's name for the kind of object, and its number."""
 NAMELESS_INDEX = -1
 
 
-def _touching_geoms(model: mujoco.MjModel) -> Listed:
-    """Geoms that could come into contact with another one, and explicit contact pairs."""
+def _touching_geoms(model: mujoco.MjModel) -> ObjectIterator:
+    """Geoms that could come into contact with another geom, and explicit contact pairs."""
     if feature_is_disabled(model, "CONTACT"):
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
@@ -149,7 +151,7 @@ def _touching_geoms(model: mujoco.MjModel) -> Listed:
         yield "pair", p
 
 
-def _joints_with_dry_friction(model: mujoco.MjModel) -> Listed:
+def _joints_with_dry_friction(model: mujoco.MjModel) -> ObjectIterator:
     if feature_is_disabled(model, "FRICTIONLOSS"):
         return
     for j in sorted(set(model.dof_jntid[model.dof_frictionloss > 0.0])):
@@ -158,14 +160,14 @@ def _joints_with_dry_friction(model: mujoco.MjModel) -> Listed:
         yield "tendon", int(t)
 
 
-def _unbuilt_equalities(model: mujoco.MjModel) -> Listed:
+def _unbuilt_equalities(model: mujoco.MjModel) -> ObjectIterator:
     if not feature_is_disabled(model, "EQUALITY"):
         for e in np.flatnonzero(model.eq_active0):
             yield "equality", int(e)
 
 
-def _odd_actuators(model: mujoco.MjModel) -> Listed:
-    """Actuators that have a state, act along a spatial tendon, or follow a law that is not affine."""
+def _unbuilt_actuators(model: mujoco.MjModel) -> ObjectIterator:
+    """Actuators that have a state, act along a spatial tendon, or follow a force law that is not affine."""
     for i in range(model.nu):
         target = int(model.actuator_trnid[i, 0])
         kind = int(model.actuator_trntype[i])
@@ -179,7 +181,7 @@ def _odd_actuators(model: mujoco.MjModel) -> Listed:
             yield "actuator", i
 
 
-def _limited_elements(model: mujoco.MjModel) -> Listed:
+def _limited_elements(model: mujoco.MjModel) -> ObjectIterator:
     if not model.nu:
         return
     for i in np.flatnonzero(model.actuator_forcelimited):
@@ -190,7 +192,7 @@ def _limited_elements(model: mujoco.MjModel) -> Listed:
         yield "tendon", int(t)
 
 
-def _spatial_tendons(model: mujoco.MjModel) -> Listed:
+def _spatial_tendons(model: mujoco.MjModel) -> ObjectIterator:
     for t in range(model.ntendon):
         forces = model.tendon_stiffness[t] or model.tendon_damping[t] or model.tendon_armature[t]
         slack = model.tendon_stiffness[t] and np.ptp(model.tendon_lengthspring[t])
@@ -199,8 +201,8 @@ def _spatial_tendons(model: mujoco.MjModel) -> Listed:
             yield "tendon", t
 
 
-def _turning_laws(model: mujoco.MjModel) -> Listed:
-    """Joints with springs, dampers or rotors that act about all three axes at once."""
+def _turning_laws(model: mujoco.MjModel) -> ObjectIterator:
+    """Ball and free joints with springs, dampers or rotors that act about all three axes at once."""
     for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
         first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
         if model.jnt_stiffness[j] or model.dof_damping[first] or _has_rotor(model, int(j)):
@@ -212,7 +214,7 @@ def _has_rotor(model: mujoco.MjModel, joint: int) -> bool:
     return bool(model.jnt_type[joint] == BALL_JOINT and model.dof_armature[model.jnt_dofadr[joint]])
 
 
-def _bent_laws(model: mujoco.MjModel) -> Listed:
+def _bent_laws(model: mujoco.MjModel) -> ObjectIterator:
     for j in range(model.njnt):
         bent = model.jnt_stiffnesspoly[j].any() or model.dof_dampingpoly[model.jnt_dofadr[j]].any()
         if bent or (model.nplastic and model.jnt_plasticadr[j] >= 0):
@@ -223,18 +225,18 @@ def _bent_laws(model: mujoco.MjModel) -> Listed:
             yield "tendon", t
 
 
-def _half_lifted(model: mujoco.MjModel) -> Listed:
+def _partly_compensated_bodies(model: mujoco.MjModel) -> ObjectIterator:
     for b in range(1, model.nbody):
         if 0.0 < compensation(model, b) < 1.0:
             yield "body", b
 
 
-def _medium_elements(model: mujoco.MjModel) -> Listed:
+def _medium_elements(model: mujoco.MjModel) -> ObjectIterator:
     if model.opt.density or model.opt.viscosity:
         yield "density and viscosity", NAMELESS_INDEX
 
 
-def _flexible_elements(model: mujoco.MjModel) -> Listed:
+def _flexible_elements(model: mujoco.MjModel) -> ObjectIterator:
     for i in range(model.nflex):
         yield "flex", i
 
@@ -243,7 +245,7 @@ def _forget_contacts(model: mujoco.MjModel) -> None:
     model.opt.disableflags |= int(DSBL.mjDSBL_CONTACT)
 
 
-def _forget_rubbing(model: mujoco.MjModel) -> None:
+def _forget_friction(model: mujoco.MjModel) -> None:
     model.opt.disableflags |= int(DSBL.mjDSBL_FRICTIONLOSS)
 
 
@@ -253,7 +255,7 @@ def _forget_equalities(model: mujoco.MjModel) -> None:
 
 def _forget_actuators(model: mujoco.MjModel) -> None:
     """Switch off the force of the actuators from ``_odd_actuators``, by setting gain and bias to zero."""
-    for i in [i for _, i in _odd_actuators(model)]:
+    for i in [i for _, i in _unbuilt_actuators(model)]:
         model.actuator_gaintype[i], model.actuator_biastype[i] = GAIN.mjGAIN_FIXED, BIAS.mjBIAS_NONE
         model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
         model.actuator_damping[i] = model.actuator_armature[i] = 0.0
@@ -269,7 +271,7 @@ def _forget_tendons(model: mujoco.MjModel) -> None:
         model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_armature[t] = 0.0
 
 
-def _forget_turning(model: mujoco.MjModel) -> None:
+def _forget_turning_laws(model: mujoco.MjModel) -> None:
     for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
         first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
         model.dof_damping[first : first + 3] = model.jnt_stiffness[j] = 0.0
@@ -277,14 +279,14 @@ def _forget_turning(model: mujoco.MjModel) -> None:
             model.dof_armature[first : first + 3] = 0.0
 
 
-def _forget_bends(model: mujoco.MjModel) -> None:
+def _forget_bent_laws(model: mujoco.MjModel) -> None:
     for numbers in ("jnt_stiffnesspoly", "dof_dampingpoly", "tendon_stiffnesspoly", "tendon_dampingpoly"):
         getattr(model, numbers)[:] = 0.0
     model.jnt_springyield[:] = model.tendon_springyield[:] = 0.0
 
 
-def _forget_lifting(model: mujoco.MjModel) -> None:
-    for b in [b for _, b in _half_lifted(model)]:
+def _forget_compensation(model: mujoco.MjModel) -> None:
+    for b in [b for _, b in _partly_compensated_bodies(model)]:
         model.body_gravcomp[b] = 0.0
 
 
@@ -293,15 +295,15 @@ def _forget_medium(model: mujoco.MjModel) -> None:
 
 
 def _keep_flexes(model: mujoco.MjModel) -> None:
-    """Nothing: a model with flexes has been refused."""
+    """Does nothing: a model with flexes has been refused before."""
 
 
-CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {
+CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], ObjectIterator], str, Callable[[mujoco.MjModel], None]]] = {
     "contact": (_touching_geoms, "bodies that may touch", _forget_contacts),
     "friction_loss": (
         _joints_with_dry_friction,
         "dry friction, a soft constraint in MuJoCo, is built for hinges and slides alone",
-        _forget_rubbing,
+        _forget_friction,
     ),
     "equality": (
         _unbuilt_equalities,
@@ -310,7 +312,7 @@ CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable
         _forget_equalities,
     ),
     "actuator": (
-        _odd_actuators,
+        _unbuilt_actuators,
         "a state, a delay, a muscle, a rotor of its own, or a target other than a hinge, a slide, a fixed tendon, or a "
         "site that it does not damp",
         _forget_actuators,
@@ -321,20 +323,25 @@ CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable
         "a spring around bodies or with slack, or a rotor along a way in space",
         _forget_tendons,
     ),
-    "turning_law": (_turning_laws, "a rotor of a ball joint, or what turns it or a free one back", _forget_turning),
-    "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bends),
+    "turning_law": (
+        _turning_laws,
+        "a rotor of a ball joint, or what turns it or a free one back",
+        _forget_turning_laws,
+    ),
+    "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bent_laws),
     "gravity_compensation": (
-        _half_lifted,
+        _partly_compensated_bodies,
         "weight that is compensated at some joints alone, since others leave that to actuators, which are off",
-        _forget_lifting,
+        _forget_compensation,
     ),
     "fluid": (_medium_elements, "forces of a medium", _forget_medium),
     "flex": (_flexible_elements, "a deformable body", _keep_flexes),
 }
-"""Kinds of content without an equal: what of it a model has, why it has none, and how it is left out."""
+"""Kinds of content without an equivalent: function that lists it in a model, reason why other builds lack it, function
+that removes it."""
 
 
 def limits_switched_off(model: mujoco.MjModel) -> list[str]:
-    """Joints and tendons whose limits were switched off."""
+    """Names of the joints and tendons whose limits were switched off."""
     joints = [label(model, "joint", int(j)) for j in np.flatnonzero(model.jnt_limited)]
     return joints + [label(model, "tendon", int(t)) for t in np.flatnonzero(model.tendon_limited)]

@@ -1,4 +1,4 @@
-"""Controls of a model's actuators over time, from a CSV: those of a row hold until the next row's time.
+"""Controls of a model's actuators over time, from a CSV file; the controls of a row apply until the next row's time.
 
 MuJoCo holds controls over each of its steps; so do all builds here, and every row lies on a step.
 """
@@ -17,44 +17,48 @@ from models.core.tables import SECONDS, read_table
 from models.own_model.reading import TwinModel, affine_law, constant_controls, described_model
 
 CONTROL_UNITS = dict.fromkeys(("-", "N", "N m", "m", "rad", "m/s", "rad/s"), 1.0)
-"""Units that a control may have: SI, as MuJoCo takes it."""
-ON_STEP = 1e-6
-"""Share of a step by which a row's time may miss it."""
+"""Units that a control in a CSV file may have, with their factors: SI, as MuJoCo takes it."""
+STEP_TIME_TOLERANCE = 1e-6
+"""Share of a step by which a row's time may differ from a multiple of the step."""
 
 
 class PathSection(NamedTuple):
-    """A section of a path with constant controls (nu,), ``steps`` long; ``twin`` contains their forces as constants of
-    its actuators."""
+    """Section of a path with constant controls (nu,) over a number of steps; ``twin`` is the model with these controls
+    as constants of its actuators."""
 
     twin: TwinModel
-    steps: int
+    step_count: int
     controls: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class ControlTable:
-    """path : of the file; times (rows,) in s from 0, rising; values (rows, nu) in the order of the actuators."""
+    """Table of controls over time. path : of its file; times (rows,) in s from 0, rising; values (rows, nu) in the
+    order of the actuators."""
 
     path: Path
     times: np.ndarray
     values: np.ndarray
 
-    def path_sections(self, twin: TwinModel, steps: int, step: float) -> list[PathSection]:
-        """Sections of a path of ``steps`` steps of ``step`` seconds; InputError where a row's time lies between two
-        steps."""
+    def path_sections(self, twin: TwinModel, step_count: int, step: float) -> list[PathSection]:
+        """Sections of a path of ``step_count`` steps of ``step`` seconds, each with constant controls. Raises
+        InputError where a row's time lies between two steps."""
         first = self.times / step
-        off = np.flatnonzero(abs(first - np.round(first)) > ON_STEP)
+        off = np.flatnonzero(abs(first - np.round(first)) > STEP_TIME_TOLERANCE)
         if len(off):
             time, allowed = float(self.times[off[0]]), f"times must be multiples of the step, {step:g} s"
             raise InputError(self.path, f"row {off[0] + 1}, column 'time'", time, allowed)
-        ends = [*np.round(first).astype(int).tolist(), steps]
-        counts = [min(end, steps) - start for start, end in pairwise(ends) if start < steps]
-        return [PathSection(held_at(twin, row), count, row) for row, count in zip(self.values, counts, strict=False)]
+        ends = [*np.round(first).astype(int).tolist(), step_count]
+        counts = [min(end, step_count) - start for start, end in pairwise(ends) if start < step_count]
+        return [
+            PathSection(with_constant_controls(twin, row), count, row)
+            for row, count in zip(self.values, counts, strict=False)
+        ]
 
 
-def constant_leg(twin: TwinModel, steps: int) -> list[PathSection]:
-    """The whole path as one section with the model's constant controls."""
-    return [PathSection(twin, steps, constant_controls(twin.model))]
+def constant_sections(twin: TwinModel, step_count: int) -> list[PathSection]:
+    """Sections of a path that has the model's constant controls throughout: a single one."""
+    return [PathSection(twin, step_count, constant_controls(twin.model))]
 
 
 def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
@@ -80,11 +84,11 @@ def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
     return ControlTable(path, table["time"], np.column_stack([table[name] for name in names]))
 
 
-def held_at(twin: TwinModel, constant: np.ndarray) -> TwinModel:
-    """A model whose actuators ignore their control and act as with the constant controls (nu,)."""
+def with_constant_controls(twin: TwinModel, controls: np.ndarray) -> TwinModel:
+    """Model whose actuators ignore their control and act as they do with the constant controls (nu,)."""
     model = copy.copy(twin.model)
     for i in range(model.nu):
-        model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(constant[i]))
+        model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(controls[i]))
         model.actuator_gainprm[i, :3] = 0.0
         model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
     return described_model(model, twin.name)

@@ -1,4 +1,4 @@
-"""Between the coordinates of a description and those of MuJoCo.
+"""Conversion between the coordinates of twinrig's description and those of MuJoCo.
 
 Hinges and slides are the same in both but for the zero: here it is the design position, MuJoCo's ``qpos0``. Turning
 without a limit (free and ball joints) has the angles rx, ry, rz here, R = Rx Ry Rz, and a quaternion with angular
@@ -18,23 +18,23 @@ SLIDE_JOINT, BALL_JOINT, FREE_JOINT = (
 
 
 class MujocoState(NamedTuple):
-    """MuJoCo's state qpos (nq,), qvel (n,), the Jacobian J (n, n) from the coordinates' rates to qvel, and J' v
-    (n,)."""
+    """MuJoCo's state: qpos (nq,), qvel (n,), the Jacobian J (n, n) from the rates of the description's coordinates to
+    qvel, and J' v (n,) with these rates v."""
 
     qpos: np.ndarray
     qvel: np.ndarray
     jacobian: np.ndarray
-    rest: np.ndarray
+    bias: np.ndarray
 
 
 @dataclass(frozen=True)
-class Turning:
-    """Three angles in place of a quaternion: index of their first coordinate, index of the quaternion in qpos, axes (3,
-    3) of the body's frame in the design position as columns, and whether the quaternion is the attitude in space (free
-    joint) or relative (ball joint)."""
+class QuaternionJoint:
+    """Three angles of the description in place of MuJoCo's quaternion: index of their first coordinate, index of the
+    quaternion in qpos, axes (3, 3) of the body's frame in the design position as columns, and whether the quaternion is
+    the attitude in space (free joint) or relative to the parent (ball joint)."""
 
-    first: int
-    place: int
+    first_coordinate: int
+    quaternion_index: int
     design_axes: np.ndarray
     free: bool
 
@@ -47,15 +47,15 @@ class Coordinates:
         self.size = int(model.nv)
         self._zero = np.array(model.qpos0)
         self._plain = list[tuple[int, int]]()
-        self.turnings = list[Turning]()
+        self.turnings = list[QuaternionJoint]()
         for j in range(model.njnt):
             kind, place, first = int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
             axes = design.xmat[model.jnt_bodyid[j]].reshape(3, 3).copy()
             if kind == FREE_JOINT:
                 self._plain += [(first + i, place + i) for i in range(3)]
-                self.turnings.append(Turning(first + 3, place + 3, axes, True))
+                self.turnings.append(QuaternionJoint(first + 3, place + 3, axes, True))
             elif kind == BALL_JOINT:
-                self.turnings.append(Turning(first, place, axes, False))
+                self.turnings.append(QuaternionJoint(first, place, axes, False))
             else:
                 self._plain.append((first, place))
 
@@ -72,21 +72,23 @@ class Coordinates:
         for coordinate, place in self._plain:
             qpos[place] += q[coordinate]
         for turning in self.turnings:
-            at = slice(turning.first, turning.first + 3)
-            rotation, rates, bias = turned_by_angles(q[at], v[at])
+            at = slice(turning.first_coordinate, turning.first_coordinate + 3)
+            rotation, rates, bias = rotation_by_angles(q[at], v[at])
             lies = (
                 rotation @ turning.design_axes
                 if turning.free
                 else turning.design_axes.T @ rotation @ turning.design_axes
             )
-            mujoco.mju_mat2Quat(qpos[turning.place : turning.place + 4], np.ascontiguousarray(lies).ravel())
+            mujoco.mju_mat2Quat(
+                qpos[turning.quaternion_index : turning.quaternion_index + 4], np.ascontiguousarray(lies).ravel()
+            )
             jacobian[at, at], rest[at] = turning.design_axes.T @ rates, turning.design_axes.T @ bias
         return MujocoState(qpos, jacobian @ v, jacobian, rest)
 
 
-def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
-    """For every coordinate (n,), the slice of its joint's coordinates that together turn or shift a body along three
-    axes."""
+def joint_coordinate_slices(model: mujoco.MjModel) -> tuple[slice, ...]:
+    """For every coordinate (n,), the slice of its joint's coordinates that together rotate or translate a body along
+    three axes."""
     groups = list[slice]()
     for j in range(model.njnt):
         first = int(model.jnt_dofadr[j])
@@ -95,9 +97,9 @@ def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
     return tuple(groups)
 
 
-def turned_by_angles(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rotation matrix R = Rx Ry Rz (3, 3), G (3, 3) with the angular velocity G rates in the rotated axes, and G' rates
-    (3,)."""
+def rotation_by_angles(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rotation matrix R = Rx Ry Rz (3, 3) of three angles; G (3, 3), such that G rates is the angular velocity in the
+    rotated axes; and G' rates (3,)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)
     first = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     second = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))

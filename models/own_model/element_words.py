@@ -1,4 +1,4 @@
-"""Elements of a model that are no numbers: what is switched off, and what is joined to what.
+"""Properties of a model that are words, not numbers: what is switched off, and which parts are connected.
 
 Each has a reader, which gives one word or none, and a writer, which raises ValueError where a model cannot have that
 word without being another tree.
@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import SLIDE_JOINT
-from models.own_model.equalities import by_sites, is_tie, joins_bodies
+from models.own_model.equalities import couples_joints, is_between_sites, joins_bodies
 from models.own_model.names import feature_is_disabled, label
 from models.own_model.reading import (
     JOINT_TARGETS,
@@ -35,7 +35,7 @@ def _word_value(text: str) -> np.ndarray:
 
 
 def _refusing_writer(what: str) -> Writer:
-    """A writer that raises ValueError, for properties that belong to the structure of the tree."""
+    """Writer that raises ValueError, for properties that belong to the structure of the tree."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
         raise ValueError(f"{what} cannot be changed in a compiled model")
@@ -53,7 +53,7 @@ def _index_of_name(model: mujoco.MjModel, sort: str, owner: str) -> int:
 
 
 def _feature_switch(flag: str) -> tuple[Reader, Writer]:
-    """Reader and writer of a switch by which a file turns off a feature of MuJoCo."""
+    """Reader and writer of the switch by which a file turns off a feature of MuJoCo."""
     bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
 
     def write(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
@@ -63,12 +63,12 @@ def _feature_switch(flag: str) -> tuple[Reader, Writer]:
     return lambda model, _: _word_value(SWITCHED_OFF if feature_is_disabled(model, flag) else "on"), write
 
 
-def _read_acts(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """Whether an actuator acts, or belongs to a group that is switched off."""
+def _read_switch(model: mujoco.MjModel, i: int) -> np.ndarray:
+    """ "on" or "off": whether an actuator acts, or belongs to a group that is switched off."""
     return _word_value("on" if actuator_is_on(model, i) else SWITCHED_OFF)
 
 
-def _write_acts(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+def _write_switch(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
     off = value[0] == SWITCHED_OFF
     free = next((g for g in range(LAST_GROUP) if not model.opt.disableactuator & (1 << g)), None)
     if not off and free is None:
@@ -90,7 +90,7 @@ def _write_type(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
 
 
 def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
-    """The joint before a joint on the path from the world."""
+    """Name of the joint before a joint on the path from the world."""
     body = int(model.jnt_bodyid[j])
     if j > model.body_jntadr[body]:
         return _word_value(label(model, "joint", j - 1))
@@ -98,15 +98,15 @@ def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
 
 
 def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
-    """The last joint on the path from the world to a body."""
+    """Name of the last joint on the path from the world to a body."""
     while body and not model.body_jntnum[body]:
         body = int(model.body_parentid[body])
     last = int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
     return _word_value(label(model, "joint", last) if body else WORLD_BODY)
 
 
-def _read_held(model: mujoco.MjModel, t: int) -> np.ndarray:
-    """Joints of a fixed tendon, or bodies at both ends of a straight one."""
+def _read_attachment(model: mujoco.MjModel, t: int) -> np.ndarray:
+    """Names of the joints of a fixed tendon, or of the bodies at both ends of a straight one."""
     if is_fixed(model, t):
         return _word_value(", ".join(label(model, "joint", j) for j in tendon_travel(model, t)[0]))
     if is_line(model, t):
@@ -114,7 +114,7 @@ def _read_held(model: mujoco.MjModel, t: int) -> np.ndarray:
     return np.zeros(0)
 
 
-def _write_held(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
+def _write_attachment(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
     names, first = value[0].split(", "), int(model.tendon_adr[t])
     if not is_fixed(model, t) or len(names) != model.tendon_num[t]:
         raise ValueError("a tendon of another kind, or of another number of joints")
@@ -127,7 +127,7 @@ def _body_of(model: mujoco.MjModel, site: int) -> str:
 
 
 def _read_target(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """What an actuator drives: a joint, a tendon, the body of a site."""
+    """Name of what an actuator drives: a joint, a tendon, the body of a site."""
     target = int(model.actuator_trnid[i, 0])
     if pushes_site(model, i):
         return _word_value(f"a site of {_body_of(model, target)}")
@@ -144,23 +144,24 @@ def _write_target(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
     model.actuator_trnid[i, 0] = _index_of_name(model, kind, value[0])
 
 
-def _read_between(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Joints or bodies that an equality constraint connects."""
+def _read_partners(model: mujoco.MjModel, e: int) -> np.ndarray:
+    """Names of the joints or bodies that an equality constraint connects."""
     things = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
-    if is_tie(model, e):
+    if couples_joints(model, e):
         return _word_value(" and ".join(label(model, "joint", j) for j in things if j >= 0))
     if not joins_bodies(model, e):
         return np.zeros(0)
     bodies = [
-        _body_of(model, s) if by_sites(model, e) else label(model, "body", s) if s else WORLD_BODY for s in things
+        _body_of(model, s) if is_between_sites(model, e) else label(model, "body", s) if s else WORLD_BODY
+        for s in things
     ]
     return _word_value(" and ".join(bodies))
 
 
-def _write_between(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
-    names, sort = value[0].split(" and "), "joint" if is_tie(model, e) else "body"
-    before = _read_between(model, e)[0].split(" and ")
-    if len(names) != len(before) or by_sites(model, e) or not all(name.startswith(sort) for name in names):
+def _write_partners(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+    names, sort = value[0].split(" and "), "joint" if couples_joints(model, e) else "body"
+    before = _read_partners(model, e)[0].split(" and ")
+    if len(names) != len(before) or is_between_sites(model, e) or not all(name.startswith(sort) for name in names):
         raise ValueError("a constraint of another kind")
     numbers = [_index_of_name(model, sort, name) for name in names]
     model.eq_obj1id[e], model.eq_obj2id[e] = (*numbers, -1)[:2]
@@ -172,12 +173,12 @@ WORD_ELEMENTS: tuple[tuple[str, str, Reader, Writer], ...] = (
     ("model", "actuators", *_feature_switch("ACTUATION")),
     ("model", "equality constraints", *_feature_switch("EQUALITY")),
     ("model", "dry friction", *_feature_switch("FRICTIONLOSS")),
-    ("actuator", "switch", _read_acts, _write_acts),
+    ("actuator", "switch", _read_switch, _write_switch),
     ("joint", "type", _read_type, _write_type),
     ("joint", "parent", _read_parent, _refusing_writer("the joint before a joint")),
     ("body", "supporting joint", _moved_by, _refusing_writer("the joint that moves a body")),
-    ("tendon", "attachment", _read_held, _write_held),
+    ("tendon", "attachment", _read_attachment, _write_attachment),
     ("actuator", "target", _read_target, _write_target),
-    ("equality", "partners", _read_between, _write_between),
+    ("equality", "partners", _read_partners, _write_partners),
 )
-"""What has it, its name, its reader and its writer."""
+"""Properties that are words: kind of owner, name of the property, its reader and its writer."""

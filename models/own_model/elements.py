@@ -1,4 +1,5 @@
-"""The numbers of a compiled model by name: what is compared between two files, and left out to find what matters.
+"""The numbers of a compiled model by name: they are compared between two files, and set to zero to see which ones
+matter.
 
 An element is one property of one thing: "armature of joint 'hip'". Values are those of MuJoCo's compiled model, in SI
 units; an inertia is the tensor in the axes of its body, whichever principal axes a file has.
@@ -12,21 +13,22 @@ import numpy as np
 
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.element_words import WORD_ELEMENTS
-from models.own_model.equalities import CONNECT_EQUALITY, by_sites, is_tie, joins_bodies
+from models.own_model.equalities import CONNECT_EQUALITY, couples_joints, is_between_sites, joins_bodies
 from models.own_model.names import feature_is_disabled, label
 from models.own_model.reading import is_line, pushes_site, sites_of
 
 AFFINE_LAW, CONSTANT_LAW = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIXED)
-"""Laws of actuators, whose numbers are the same for gain and bias."""
+"""MuJoCo's numbers of the kinds of actuator laws, which are the same for gain and bias."""
 EQUALITY_TOLERANCE = 1e-12
 """Relative difference up to which two values of an element are equal."""
 SHOWN_DIGITS, EXACT_DIGITS = 6, 17
-"""Digits in which values are shown, and those in which every two numbers differ."""
+"""Digits in which values are shown, and digits in which any two different numbers differ."""
 
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,), or one word."""
+    """Property of a part of a model. kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,), or
+    one word."""
 
     kind: str
     owner: str
@@ -49,7 +51,7 @@ class Element:
         return value_text(self.value, self.unit)
 
     def has_same_value(self, other: "Element") -> bool:
-        """Whether both have the same value."""
+        """Whether this and another property have the same value."""
         if is_word(self.value) or is_word(other.value):
             return bool(np.array_equal(self.value, other.value))
         if self.value.shape != other.value.shape:
@@ -79,8 +81,8 @@ def value_text(value: np.ndarray, unit: str = "", digits: int = SHOWN_DIGITS) ->
     return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
 
 
-def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
-    """Two different values as text, with as few digits as show the difference."""
+def distinct_texts(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
+    """Two different values as texts, with as few digits as show the difference."""
     texts = value_text(first, unit), value_text(second, unit)
     for digits in range(SHOWN_DIGITS + 1, EXACT_DIGITS + 1):
         if texts[0] != texts[1]:
@@ -95,8 +97,8 @@ def two_digit_text(number: float) -> str:
 
 
 @dataclass(frozen=True)
-class _Kind:
-    """One kind of property, for all parts of a sort: how it is read and written."""
+class _PropertyKind:
+    """A kind of property of all parts of a sort, such as all joints: its name, its unit, its reader and its writer."""
 
     sort: str
     kind: str
@@ -106,13 +108,13 @@ class _Kind:
 
 
 def elements_of_model(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
-    """All elements of a model, in the order of the model."""
+    """All properties of a model, by kind and owner, in the order of the model."""
     return {each.key: each for each in _elements_of_kind(model)}
 
 
-def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
-    """Write a value of an element into a model for ``described_model``; KeyError if the model has no such element,
-    ValueError if the element cannot have this value."""
+def set_value(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
+    """Write the value of a property into a model for ``described_model``. Raises KeyError if the model has no such
+    property, ValueError if the property cannot have this value."""
     kind, number = _kind_and_index(model, key)
     if kind.read(model, number).shape != value.shape:
         raise ValueError(f"{kind.kind} has another number of values")
@@ -120,8 +122,8 @@ def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
     model.body_sameframe[:] = 0
 
 
-def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
-    """Set an element to zero in a model, if its kind allows this; returns whether it does."""
+def remove(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
+    """Set a property to zero in a model, if its kind allows this; returns whether it does."""
     kind, number = _kind_and_index(model, key)
     if kind.kind not in REMOVABLE_KINDS:
         return False
@@ -134,10 +136,10 @@ def _elements_of_kind(model: mujoco.MjModel) -> Iterator[Element]:
         for number in range(_count_of_sort(model, kind.sort)):
             value = np.atleast_1d(kind.read(model, number))
             if value.size:
-                yield Element(kind.kind, _owner_name(model, kind, number), _unit(model, kind, number), value)
+                yield Element(kind.kind, _owner_name(model, kind, number), _unit_text(model, kind, number), value)
 
 
-def _kind_and_index(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_Kind, int]:
+def _kind_and_index(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_PropertyKind, int]:
     for kind in ELEMENT_KINDS:
         if kind.kind == key[0]:
             for number in range(_count_of_sort(model, kind.sort)):
@@ -151,12 +153,12 @@ def _count_of_sort(model: mujoco.MjModel, sort: str) -> int:
     return {**counts, "equality": model.neq, "model": 1}[sort]
 
 
-def _owner_name(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
+def _owner_name(model: mujoco.MjModel, kind: _PropertyKind, number: int) -> str:
     return "the model" if kind.sort == "model" else label(model, kind.sort, number)
 
 
-def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
-    """Unit of this element; of two, that of translation for slides and free joints, else that of rotation."""
+def _unit_text(model: mujoco.MjModel, kind: _PropertyKind, number: int) -> str:
+    """Unit of a property; of two units, that of translation for slides and free joints, else that of rotation."""
     turning, _, shifting = kind.unit.partition(" | ")
     slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE_JOINT, FREE_JOINT)
     return shifting if shifting and slides else turning
@@ -166,21 +168,21 @@ def _body_accessors(field: str) -> tuple[Callable, Callable]:
     return _number_accessors(field, lambda model, b: b)
 
 
-def _number_accessors(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
-    """Reader and writer of numbers of a compiled model."""
+def _number_accessors(field: str, index_of: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
+    """Reader and writer of a field of a compiled model, at the index that ``index_of`` returns."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
         numbers = getattr(model, field)
-        numbers[at(model, number)] = np.reshape(value, np.shape(numbers[at(model, number)]))
+        numbers[index_of(model, number)] = np.reshape(value, np.shape(numbers[index_of(model, number)]))
 
-    return lambda model, number: np.ravel(getattr(model, field)[at(model, number)]).copy(), write
+    return lambda model, number: np.ravel(getattr(model, field)[index_of(model, number)]).copy(), write
 
 
-def _of_joint(field: str) -> tuple[Callable, Callable]:
+def _joint_accessors(field: str) -> tuple[Callable, Callable]:
     return _number_accessors(field, lambda model, j: j)
 
 
-def _of_freedoms(field: str) -> tuple[Callable, Callable]:
+def _freedom_accessors(field: str) -> tuple[Callable, Callable]:
     """Reader and writer of a field's numbers for all degrees of freedom of a joint: 6, 3 or 1."""
 
     def places(model: mujoco.MjModel, j: int) -> slice:
@@ -190,14 +192,14 @@ def _of_freedoms(field: str) -> tuple[Callable, Callable]:
     return _number_accessors(field, places)
 
 
-def _read_spring(model: mujoco.MjModel, j: int) -> np.ndarray:
+def _read_spring_reference(model: mujoco.MjModel, j: int) -> np.ndarray:
     """Rest position of a joint's spring relative to the design position; empty if there is no spring."""
     at = int(model.jnt_qposadr[j])
     several = int(model.jnt_type[j]) in (BALL_JOINT, FREE_JOINT)
     return np.zeros(0) if several or not model.jnt_stiffness[j] else model.qpos_spring[at : at + 1] - model.qpos0[at]
 
 
-def _write_spring(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
+def _write_spring_reference(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
     at = int(model.jnt_qposadr[j])
     if value.size:
         model.qpos_spring[at] = model.qpos0[at] + value[0]
@@ -220,7 +222,7 @@ def _read_axis(model: mujoco.MjModel, j: int) -> np.ndarray:
 
 
 def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
-    """The six entries xx, yy, zz, xy, xz, yz of the tensor in the body's axes."""
+    """The six components xx, yy, zz, xy, xz, yz (kg m^2) of a body's inertia tensor in the body's axes."""
     numbers = np.empty(9)
     mujoco.mju_quat2Mat(numbers, model.body_iquat[b])
     axes = numbers.reshape(3, 3)
@@ -229,7 +231,7 @@ def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
 
 
 def tensor_of(entries: np.ndarray) -> np.ndarray:
-    """Inertia tensor (3, 3) from its six entries."""
+    """Inertia tensor (3, 3) from its six components xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = entries
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
@@ -273,23 +275,23 @@ def _range_accessors(range_field: str, limited_field: str) -> tuple[Callable, Ca
     return read_limited, write_limited
 
 
-def _actuator_law_accessors(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
-    """Reader and writer of an actuator's three numbers of gain or bias. Numbers from index ``first`` on count only for
-    an affine law."""
+def _actuator_law_accessors(numbers: str, kinds: str, first_affine: int) -> tuple[Callable, Callable]:
+    """Reader and writer of the three numbers of an actuator's gain or bias. Numbers from index ``first_affine`` on
+    count only for an affine law."""
 
     def read(model: mujoco.MjModel, i: int) -> np.ndarray:
         law = np.array(getattr(model, numbers)[i, :3])
-        law[first:] *= getattr(model, kinds)[i] == AFFINE_LAW
+        law[first_affine:] *= getattr(model, kinds)[i] == AFFINE_LAW
         return law
 
     def write(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
-        getattr(model, kinds)[i] = AFFINE_LAW if value[first:].any() else CONSTANT_LAW
+        getattr(model, kinds)[i] = AFFINE_LAW if value[first_affine:].any() else CONSTANT_LAW
         getattr(model, numbers)[i, :3] = value
 
     return read, write
 
 
-def _coefficients() -> tuple[Callable, Callable]:
+def _tendon_coefficient_accessors() -> tuple[Callable, Callable]:
     def places(model: mujoco.MjModel, t: int) -> slice:
         return slice(int(model.tendon_adr[t]), int(model.tendon_adr[t] + model.tendon_num[t]))
 
@@ -306,20 +308,20 @@ def _write_ends(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
     model.site_sameframe[sites_of(model, t)] = 0
 
 
-def _read_tie(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Numbers of a coupling: 1 if it is active, its offset and ratio; zeros if it is not."""
-    return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if is_tie(model, e) else np.zeros(0)
+def _read_coupling(model: mujoco.MjModel, e: int) -> np.ndarray:
+    """Numbers of a coupling of joints: 1 if it is active, its offset and ratio; zeros if it is not."""
+    return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if couples_joints(model, e) else np.zeros(0)
 
 
-def _write_tie(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+def _write_coupling(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     model.eq_active0[e], model.eq_data[e, :2] = value[0] != 0.0, value[1:]
 
 
-def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
+def _read_connection(model: mujoco.MjModel, e: int) -> np.ndarray:
     """Numbers of a constraint between bodies: 1 if it is active, and the positions of both ends; zeros if it is not."""
     if not joins_bodies(model, e):
         return np.zeros(0)
-    if by_sites(model, e):
+    if is_between_sites(model, e):
         sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
         ends = np.concatenate((model.site_pos[sites].ravel(), model.site_quat[sites].ravel()))
     else:
@@ -327,11 +329,11 @@ def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
     return np.array([1.0, *ends]) * model.eq_active0[e]
 
 
-def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+def _write_connection(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     model.eq_active0[e] = value[0] != 0.0
     if not value[0]:
         return
-    if by_sites(model, e):
+    if is_between_sites(model, e):
         sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
         model.site_pos[sites], model.site_quat[sites] = value[1:7].reshape(2, 3), value[7:].reshape(2, 4)
         model.site_sameframe[sites] = 0
@@ -340,8 +342,8 @@ def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 
 def _read_softness(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """solref and solimp of a constraint."""
-    built = is_tie(model, e) or joins_bodies(model, e)
+    """MuJoCo's softness parameters solref and solimp of a constraint."""
+    built = couples_joints(model, e) or joins_bodies(model, e)
     return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if built else np.zeros(0)
 
 
@@ -361,37 +363,37 @@ def _write_site(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
 
 
 ELEMENT_KINDS = (
-    _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
-    _Kind("body", "mass", "kg", *_body_accessors("body_mass")),
-    _Kind("body", "centre of mass", "m", *_body_accessors("body_ipos")),
-    _Kind("body", "inertia", "kg m^2", _read_inertia, _write_inertia),
-    _Kind("body", "place", "m", *_body_accessors("body_pos")),
-    _Kind("body", "orientation", "quaternion", *_body_accessors("body_quat")),
-    _Kind("body", "gravity compensation", "", *_body_accessors("body_gravcomp")),
-    _Kind("joint", "axis", "", _read_axis, _of_joint("jnt_axis")[1]),
-    _Kind("joint", "anchor", "m", *_of_joint("jnt_pos")),
-    _Kind("joint", "zero", "rad | m", _read_zero, _write_zero),
-    _Kind("joint", "stiffness", "N m/rad | N/m", *_of_joint("jnt_stiffness")),
-    _Kind("joint", "spring reference", "rad | m", _read_spring, _write_spring),
-    _Kind("joint", "damping", "N m s/rad | N s/m", *_of_freedoms("dof_damping")),
-    _Kind("joint", "armature", "kg m^2 | kg", *_of_freedoms("dof_armature")),
-    _Kind("joint", "friction loss", "N m | N", *_of_freedoms("dof_frictionloss")),
-    _Kind("joint", "range", "rad | m", *_range_accessors("jnt_range", "jnt_limited")),
-    _Kind("tendon", "coefficients", "", *_coefficients()),
-    _Kind("tendon", "ends", "m", _read_ends, _write_ends),
-    _Kind("tendon", "stiffness", "N/m", *_number_accessors("tendon_stiffness", lambda model, t: t)),
-    _Kind("tendon", "damping", "N s/m", *_number_accessors("tendon_damping", lambda model, t: t)),
-    _Kind("tendon", "spring length", "m", *_number_accessors("tendon_lengthspring", lambda model, t: t)),
-    _Kind("tendon", "armature", "kg", *_number_accessors("tendon_armature", lambda model, t: t)),
-    _Kind("equality", "coupling", "(acts, offset, ratio)", _read_tie, _write_tie),
-    _Kind("equality", "joint", "(acts, ends)", _read_joint, _write_joint),
-    _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
-    _Kind("actuator", "gear", "", _read_gear, _write_gear),
-    _Kind("actuator", "gain", "", *_actuator_law_accessors("actuator_gainprm", "actuator_gaintype", 1)),
-    _Kind("actuator", "bias", "", *_actuator_law_accessors("actuator_biasprm", "actuator_biastype", 0)),
-    _Kind("actuator", "control range", "", *_range_accessors("actuator_ctrlrange", "actuator_ctrllimited")),
-    _Kind("actuator", "place of the site", "(m, quaternion)", _read_site, _write_site),
-    *(_Kind(sort, kind, "", read, write) for sort, kind, read, write in WORD_ELEMENTS),
+    _PropertyKind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
+    _PropertyKind("body", "mass", "kg", *_body_accessors("body_mass")),
+    _PropertyKind("body", "centre of mass", "m", *_body_accessors("body_ipos")),
+    _PropertyKind("body", "inertia", "kg m^2", _read_inertia, _write_inertia),
+    _PropertyKind("body", "place", "m", *_body_accessors("body_pos")),
+    _PropertyKind("body", "orientation", "quaternion", *_body_accessors("body_quat")),
+    _PropertyKind("body", "gravity compensation", "", *_body_accessors("body_gravcomp")),
+    _PropertyKind("joint", "axis", "", _read_axis, _joint_accessors("jnt_axis")[1]),
+    _PropertyKind("joint", "anchor", "m", *_joint_accessors("jnt_pos")),
+    _PropertyKind("joint", "zero", "rad | m", _read_zero, _write_zero),
+    _PropertyKind("joint", "stiffness", "N m/rad | N/m", *_joint_accessors("jnt_stiffness")),
+    _PropertyKind("joint", "spring reference", "rad | m", _read_spring_reference, _write_spring_reference),
+    _PropertyKind("joint", "damping", "N m s/rad | N s/m", *_freedom_accessors("dof_damping")),
+    _PropertyKind("joint", "armature", "kg m^2 | kg", *_freedom_accessors("dof_armature")),
+    _PropertyKind("joint", "friction loss", "N m | N", *_freedom_accessors("dof_frictionloss")),
+    _PropertyKind("joint", "range", "rad | m", *_range_accessors("jnt_range", "jnt_limited")),
+    _PropertyKind("tendon", "coefficients", "", *_tendon_coefficient_accessors()),
+    _PropertyKind("tendon", "ends", "m", _read_ends, _write_ends),
+    _PropertyKind("tendon", "stiffness", "N/m", *_number_accessors("tendon_stiffness", lambda model, t: t)),
+    _PropertyKind("tendon", "damping", "N s/m", *_number_accessors("tendon_damping", lambda model, t: t)),
+    _PropertyKind("tendon", "spring length", "m", *_number_accessors("tendon_lengthspring", lambda model, t: t)),
+    _PropertyKind("tendon", "armature", "kg", *_number_accessors("tendon_armature", lambda model, t: t)),
+    _PropertyKind("equality", "coupling", "(acts, offset, ratio)", _read_coupling, _write_coupling),
+    _PropertyKind("equality", "joint", "(acts, ends)", _read_connection, _write_connection),
+    _PropertyKind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
+    _PropertyKind("actuator", "gear", "", _read_gear, _write_gear),
+    _PropertyKind("actuator", "gain", "", *_actuator_law_accessors("actuator_gainprm", "actuator_gaintype", 1)),
+    _PropertyKind("actuator", "bias", "", *_actuator_law_accessors("actuator_biasprm", "actuator_biastype", 0)),
+    _PropertyKind("actuator", "control range", "", *_range_accessors("actuator_ctrlrange", "actuator_ctrllimited")),
+    _PropertyKind("actuator", "place of the site", "(m, quaternion)", _read_site, _write_site),
+    *(_PropertyKind(sort, kind, "", read, write) for sort, kind, read, write in WORD_ELEMENTS),
 )
 REMOVABLE_KINDS = (
     "gravity",
@@ -405,4 +407,4 @@ REMOVABLE_KINDS = (
     "gain",
     "bias",
 )
-"""Kinds that a model can be without, as zero."""
+"""Kinds of properties that can be removed from a model by setting them to zero."""

@@ -1,4 +1,5 @@
-"""Equality constraints of a file as the description has them: couplings of joints, and joints between bodies."""
+"""Equality constraints of a file in twinrig's description: couplings of joint coordinates, and joints between
+bodies."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,13 +8,13 @@ import numpy as np
 
 from models.engines.native_parts import Connection, Coupling
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
-from models.own_model.names import body_with_mass, feature_is_disabled, label, moving_bodies, rotation_of, three_numbers
+from models.own_model.names import feature_is_disabled, label, mass_body_name, moving_bodies, rotation_matrix, vector_of
 
 CONNECT_EQUALITY, WELD_EQUALITY = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 
 
-def is_tie(model: mujoco.MjModel, equality: int) -> bool:
-    """Whether an equality constraint couples a hinge or slide linearly to another one, or fixes it."""
+def couples_joints(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint couples a hinge or slide linearly to another joint, or fixes it."""
     if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
         return False
     joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
@@ -21,10 +22,10 @@ def is_tie(model: mujoco.MjModel, equality: int) -> bool:
 
 
 def joint_couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
-    """Active equality constraints of one or two joints."""
+    """Couplings of the description from the active equality constraints of one or two joints."""
     if feature_is_disabled(model, "EQUALITY"):
         return
-    for e in (e for e in range(model.neq) if model.eq_active0[e] and is_tie(model, e)):
+    for e in (e for e in range(model.neq) if model.eq_active0[e] and couples_joints(model, e)):
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
         driver = int(model.jnt_dofadr[second]) if second >= 0 else None
         offset, ratio = model.eq_data[e, :2].tolist()
@@ -49,52 +50,53 @@ def joins_bodies(model: mujoco.MjModel, equality: int) -> bool:
     return int(model.eq_type[equality]) in (CONNECT_EQUALITY, WELD_EQUALITY)
 
 
-def by_sites(model: mujoco.MjModel, equality: int) -> bool:
+def is_between_sites(model: mujoco.MjModel, equality: int) -> bool:
     """Whether an equality constraint is defined by two sites instead of bodies."""
     return bool(model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE)
 
 
 def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
-    """Active equality constraints between points of two bodies, or between points and axes."""
+    """Connections of the description from the active equality constraints between points, or between points and axes,
+    of two bodies."""
     if feature_is_disabled(model, "EQUALITY"):
         return
     numbers = moving_bodies(model)
     for e in (e for e in range(model.neq) if model.eq_active0[e] and joins_bodies(model, e)):
         things = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-        bodies = [int(model.site_bodyid[thing]) if by_sites(model, e) else thing for thing in things]
-        first, second = (body_with_mass(b) if b in numbers else None for b in bodies)
+        bodies = [int(model.site_bodyid[thing]) if is_between_sites(model, e) else thing for thing in things]
+        first, second = (mass_body_name(b) if b in numbers else None for b in bodies)
         if first == second:
             continue
         (start, turned), (end, other) = _frames_of_ends(model, design, e)
         turns = model.eq_type[e] == WELD_EQUALITY and model.eq_data[e, 10]
         axes = (turned, other) if turns else None
         softness = stiffness_and_damping(model, model.eq_solref[e], model.eq_solimp[e])
-        ends = (first, three_numbers(start)), (second, three_numbers(end))
+        ends = (first, vector_of(start)), (second, vector_of(end))
         yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
 
 
 def _frames_of_ends(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Points (3,) and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
+    """Points (3,) in m and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
     constraint is satisfied.
 
     A weld between bodies gives its point on the second body first.
     """
     things, data = (model.eq_obj1id[equality], model.eq_obj2id[equality]), model.eq_data[equality]
-    if by_sites(model, equality):
+    if is_between_sites(model, equality):
         return [(design.site_xpos[s].copy(), design.site_xmat[s].reshape(3, 3).copy()) for s in things]
     points, axes = [data[:3], data[3:6]], [np.eye(3), np.eye(3)]
     if model.eq_type[equality] == WELD_EQUALITY:
-        points, axes = points[::-1], [rotation_of(data[6:10]), np.eye(3)]
+        points, axes = points[::-1], [rotation_matrix(data[6:10]), np.eye(3)]
     turns = [design.xmat[b].reshape(3, 3) for b in things]
     places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
     return [(place, turn @ axis) for place, turn, axis in zip(places, turns, axes, strict=True)]
 
 
-def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Linear equations rows q = offsets that couplings impose on n coordinates: rows (c, n) and offsets (c,)."""
-    rows = np.zeros((len(ties), size))
-    for row, coupling in zip(rows, ties, strict=True):
+def coupling_rows(couplings: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Linear equations rows q = offsets that couplings impose on n coordinates q: rows (c, n) and offsets (c,)."""
+    rows = np.zeros((len(couplings), size))
+    for row, coupling in zip(rows, couplings, strict=True):
         row[coupling.driven] = 1.0
         if coupling.driver is not None:
             row[coupling.driver] -= coupling.ratio
-    return rows, np.array([coupling.offset for coupling in ties])
+    return rows, np.array([coupling.offset for coupling in couplings])

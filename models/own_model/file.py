@@ -1,4 +1,4 @@
-"""A file of a user as a compiled model of MuJoCo's own parser, and as the description of it."""
+"""Reading of a user's file: MuJoCo's compiled model, and twinrig's description of it."""
 
 import re
 from collections.abc import Collection
@@ -23,7 +23,7 @@ NUMBERS_OF_MOTION = (
     *("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm", "eq_data", "eq_solref", "eq_solimp"),
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
 )
-"""Numbers of a compiled model that move something."""
+"""Names of the numbers of a compiled MuJoCo model that affect motion."""
 REMEDIES = {
     "use 'balanceinertia'": "No mass has this inertia: correct it, or let MuJoCo, by "
     '<compiler balanceinertia="true"/> {place}',
@@ -35,13 +35,13 @@ REMEDIES = {
     "Schema violation": "Is it a part that another model includes? Then give that; or of another version of MuJoCo",
     "not found in": "Is it a part that another model includes, where this name is? Then give that",
 }
-"""What helps against mistakes, by a part of what MuJoCo's parser says."""
+"""Remedies for mistakes in a file, by a part of the message of MuJoCo's parser."""
 FUSED_REMARK = "The static bodies of the spec were fused before this error, and remain so."
-"""What the parser adds for those who go on with the same specification."""
+"""Remark of MuJoCo's parser that is cut off from messages."""
 COMPILER_PLACES = {"MJCF": "below <mujoco>", "URDF": "within a <mujoco> below <robot>"}
-"""Where the element <compiler> belongs."""
+"""Where the element <compiler> belongs, by the format of the file."""
 LARGEST_NUMBER = 1e30
-"""Above, no mechanism has a number, and sums of them are not finite."""
+"""Largest number that a file may contain: sums of larger ones are not finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +55,14 @@ class ModelFile:
 
     document: Document
     twin: TwinModel
-    left_out: tuple[Content, ...]
+    removed_contents: tuple[Content, ...]
     ignored_limits: tuple[str, ...]
     notes: tuple[str, ...]
 
 
 def read(path: Path, without: Collection[str] = (), folder: Path | None = None) -> ModelFile:
-    """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``.
+    """Read the model file at a path. Raises InputError for what cannot be read, or has no equivalent and is not named
+    in ``without``.
 
     folder : in which all files must lie that the model names; the file's own if None.
     """
@@ -74,8 +75,8 @@ def read(path: Path, without: Collection[str] = (), folder: Path | None = None) 
 
 
 def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
-    """The document compiled by MuJoCo's own parser, and notes; InputError with the parser's message, the place of what
-    it names, and what may help."""
+    """The document compiled by MuJoCo's parser, and notes. Raises InputError with the parser's message, the line of
+    what it names, and what may help."""
     path, urdf = document.path, document.urdf
     try:
         with without_warnings():
@@ -88,12 +89,13 @@ def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
             return spec.compile(), list(urdf.notes)
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         reason = " ".join(str(error).split()).removesuffix(FUSED_REMARK).rstrip()
-        told = f"MuJoCo's parser refuses it: {reason}{_place(document, reason)}{_remedy(document, reason)}"
+        told = f"MuJoCo's parser refuses it: {reason}{_place_text(document, reason)}{_remedy_text(document, reason)}"
         raise InputError(path.name, "", None, told) from None
 
 
-def _place(document: Document, reason: str) -> str:
-    """Where the element is that a message of MuJoCo's parser names without its line, or with line 0 for an include."""
+def _place_text(document: Document, reason: str) -> str:
+    """Text " (FILE:LINE)" of the element that a message of MuJoCo's parser names without its line, or with line 0 for
+    an include; "" if unknown."""
     if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", reason):
         place = document.line(("link", "joint", "body", "geom", "mesh"), named[1])
     else:
@@ -102,15 +104,15 @@ def _place(document: Document, reason: str) -> str:
     return f" ({place})" if place else ""
 
 
-def _remedy(document: Document, reason: str) -> str:
-    """What helps against a mistake that a message of MuJoCo's parser tells; "" where that is plain."""
+def _remedy_text(document: Document, reason: str) -> str:
+    """Text on how to correct a mistake that a message of MuJoCo's parser reports; "" where that is plain."""
     said = next((remedy for part, remedy in REMEDIES.items() if part in reason), "")
     return f". {said.format(place=COMPILER_PLACES[document.kind])}" if said else ""
 
 
 def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:
-    """InputError if nothing can move, if a number that affects motion is not finite, if the time step is not above 0,
-    or if dry friction is negative."""
+    """Raise InputError if nothing can move, if a number that affects motion is not finite, if the time step is not
+    above 0, or if dry friction is negative."""
     if not model.nv:
         stands = "; its first link stands on the world: a joint of type floating, from a link before it, sets it free"
         allowed = f"nothing in it can move: it has no joint{stands if kind == 'URDF' else ''}"
@@ -125,24 +127,24 @@ def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:
         raise InputError(name, "frictionloss", float(model.dof_frictionloss.min()), "must be 0 or more")
 
 
-def _check_numbers(model: mujoco.MjModel, name: str, numbers: str) -> None:
-    """InputError that names the part of the model of which a number is not finite, or too large."""
-    values = np.asarray(getattr(model, numbers))
+def _check_numbers(model: mujoco.MjModel, name: str, array_name: str) -> None:
+    """Raise InputError, naming the part of the model, if one of its numbers is not finite or too large."""
+    values = np.asarray(getattr(model, array_name))
     rows = np.array([np.abs(each).max(initial=0.0) for each in values])
     for row in np.flatnonzero(~(rows <= LARGEST_NUMBER)):
-        place = ": ".join(filter(None, (_owner(model, numbers, int(row)), numbers)))
+        place = ": ".join(filter(None, (_owner_name(model, array_name, int(row)), array_name)))
         if not np.isfinite(rows[row]):
             raise InputError(name, place, None, "must be finite numbers")
         raise InputError(name, place, float(rows[row]), f"must be {LARGEST_NUMBER:g} or less")
 
 
 OWNERS = {"jnt": "joint", "eq": "equality", "body": "body", "site": "site", "tendon": "tendon", "actuator": "actuator"}
-"""Kinds of parts of a model by what the names of their numbers begin with."""
+"""Kinds of parts of a model by the prefix of the names of their numbers."""
 
 
-def _owner(model: mujoco.MjModel, numbers: str, row: int) -> str:
-    """Name of the part of the model to which a row of its numbers belongs; "" where these belong to none."""
-    prefix = numbers.partition("_")[0]
+def _owner_name(model: mujoco.MjModel, array_name: str, row: int) -> str:
+    """Name of the part of the model to which a row of the numbers belongs; "" where it belongs to none."""
+    prefix = array_name.partition("_")[0]
     if prefix == "dof":
         return label(model, "joint", int(model.dof_jntid[row]))
     if prefix.startswith("qpos"):

@@ -1,4 +1,4 @@
-"""Limits of joints and tendons, which are not built: which of them a state strikes.
+"""Limits of joints and tendons, which twinrig does not build: which of them a state reaches.
 
 MuJoCo's limit is soft: with d the impedance of its documentation, and a the acceleration without it, it leaves
 (1 - d) a and adds d times a spring and a damper. So a joint that presses on a limit has 1 / (1 - d) of its inertia
@@ -18,12 +18,12 @@ LIMIT_CONSTRAINTS = {
     int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT): "joint",
     int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON): "tendon",
 }
-"""Constraints of MuJoCo that are limits, and of what."""
+"""MuJoCo's constraint types that are limits, with the kind of object that they limit."""
 
 
 def limits_struck(twin: TwinModel) -> Callable[[np.ndarray], tuple[str, ...]]:
-    """Function of coordinates (n,) that returns the joints and tendons whose limits act there in the file's own
-    model."""
+    """Returns a function of coordinates (n,) that returns the names of the joints and tendons whose limits act there in
+    MuJoCo's model of the file."""
     model = copy(twin.model)
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     data, still = mujoco.MjData(model), np.zeros(twin.size)

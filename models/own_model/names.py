@@ -1,4 +1,5 @@
-"""Names of what a compiled model has, of the bodies that stand for its joints, and small readers of its numbers."""
+"""Names of the objects of a compiled MuJoCo model and of the bodies that represent its joints, and small readers of its
+numbers."""
 
 from collections.abc import Sequence
 
@@ -9,27 +10,27 @@ from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.vehicles.spatial import FREEDOMS, Freedom, Vector
 
 ROTATION_NAMES: tuple[Freedom, ...] = ("rx", "ry", "rz")
-OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
-"""Freedoms of joints that have several."""
+FREEDOMS_OF_JOINT: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
+"""Freedoms of the joint types that have several."""
 NAMES_SHOWN = 3
-"""Names in a message."""
+"""Largest count of names in a message."""
 CONSTRAINT_FEATURES = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
-def some_names(names: Sequence[str]) -> str:
-    """The first names, and how many more there are."""
+def first_names_text(names: Sequence[str]) -> str:
+    """Text with the first names, and how many more there are."""
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return ", ".join(names[:NAMES_SHOWN]) + more
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name of a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
+    """Text that names a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
     name = name_of(model, kind, number)
     return f"{kind} {name!r}" if name else f"{kind} {number}"
 
 
 def name_of(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name alone; "" if there is none."""
+    """Name of an object in the file; "" if there is none."""
     return mujoco.mj_id2name(model, int(getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")), number) or ""
 
 
@@ -37,14 +38,14 @@ def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
     """Name of every coordinate: its joint and, where the joint has several freedoms, which freedom."""
     names = list[str]()
     for j in range(model.njnt):
-        of = OF_KIND.get(int(model.jnt_type[j]), ())
+        of = FREEDOMS_OF_JOINT.get(int(model.jnt_type[j]), ())
         names += [f"{label(model, 'joint', j)} {freedom}" for freedom in of] or [label(model, "joint", j)]
     return tuple(names)
 
 
-def place_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
-    """Index of the coordinate of a hinge or slide."""
-    return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
+def coordinate_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
+    """Coordinate of a hinge or slide in the description: body and freedom."""
+    return joint_body_name(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
 
 
 def moving_bodies(model: mujoco.MjModel) -> dict[int, None]:
@@ -57,7 +58,7 @@ def moving_bodies(model: mujoco.MjModel) -> dict[int, None]:
 
 
 def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
-    """All joints that move a body."""
+    """Numbers of all joints that move a body, from the body to the world."""
     joints = list[int]()
     while body:
         first = int(model.body_jntadr[body])
@@ -66,37 +67,37 @@ def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
     return joints
 
 
-def feature_is_disabled(model: mujoco.MjModel, what: str) -> bool:
+def feature_is_disabled(model: mujoco.MjModel, feature: str) -> bool:
     """Whether a file switches off a feature, such as "GRAVITY", or all constraints at once."""
-    kinds = (what, "CONSTRAINT") if what in CONSTRAINT_FEATURES else (what,)
+    kinds = (feature, "CONSTRAINT") if feature in CONSTRAINT_FEATURES else (feature,)
     return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
 
 
-def moved_by(joint: int) -> str:
-    """Name of the massless body that a joint moves. It contains the joint's number, because joints in a file may have
-    no names."""
+def joint_body_name(joint: int) -> str:
+    """Name of the massless body that represents a joint. It contains the joint's number, because joints in a file may
+    have no names."""
     return f"joint {joint}"
 
 
-def body_with_mass(body: int) -> str:
-    """Name of the body that has the mass of a file's body and follows its last joint."""
+def mass_body_name(body: int) -> str:
+    """Name of the description's body that has the mass of a file's body and follows its last joint."""
     return f"body {body}"
 
 
-def three_numbers(numbers: np.ndarray) -> Vector:
-    """Three numbers as a tuple, the form used in descriptions."""
+def vector_of(numbers: np.ndarray) -> Vector:
+    """Three numbers as a tuple, the form of vectors in descriptions."""
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z
 
 
 def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """Matrix (3, 3) as a tuple of rows, the form used in descriptions."""
-    x, y, z = map(three_numbers, matrix)
+    """Matrix (3, 3) as a tuple of rows, the form of matrices in descriptions."""
+    x, y, z = map(vector_of, matrix)
     return x, y, z
 
 
-def rotation_of(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation matrix (3, 3) of a quaternion."""
+def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
     numbers = np.empty(9)
     mujoco.mju_quat2Mat(numbers, quaternion)
     return numbers.reshape(3, 3)

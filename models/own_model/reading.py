@@ -1,4 +1,4 @@
-"""From MuJoCo's compiled model to the description of a vehicle, in the design position ``qpos0``.
+"""Conversion of MuJoCo's compiled model to twinrig's description of a vehicle, in the design position ``qpos0``.
 
 Every joint is a body without mass that moves along its axis, at its anchor; behind the last one of a body of the file
 is a body with its mass, at its centre. What stands still with the world is left out: it moves nothing.
@@ -15,30 +15,30 @@ from models.engines.native_parts import BodyLoad, DryFriction, GroundSpring, Lin
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, Coordinates
 from models.own_model.equalities import connections, joint_couplings, stiffness_and_damping
 from models.own_model.names import (
-    OF_KIND,
-    body_with_mass,
+    FREEDOMS_OF_JOINT,
     coordinate_names,
+    coordinate_of,
     feature_is_disabled,
+    joint_body_name,
     joints_above,
     label,
+    mass_body_name,
     matrix_rows,
-    moved_by,
     moving_bodies,
-    place_of,
-    rotation_of,
-    three_numbers,
+    rotation_matrix,
+    vector_of,
 )
 from models.vehicles.spatial import PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
 JOINT_TARGETS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-"""Kinds of targets of actuators that are the same for a hinge or slide."""
+"""MuJoCo's kinds of actuator targets that mean the same for a hinge or slide."""
 LAST_GROUP = 30
 
 
 @dataclass(frozen=True, eq=False)
 class TwinModel:
-    """A file as MuJoCo parsed it (``model``), without the parts that were left out, and the same model as a description
-    (``driven``)."""
+    """A user's model twice: as MuJoCo parsed it (``model``), without the parts that were left out, and as twinrig's
+    description (``driven``)."""
 
     name: str
     model: mujoco.MjModel
@@ -47,7 +47,7 @@ class TwinModel:
 
     @property
     def size(self) -> int:
-        """Number of coordinates."""
+        """Number of coordinates of the model."""
         return self.coordinates.size
 
     @property
@@ -57,7 +57,8 @@ class TwinModel:
 
 
 def described_model(model: mujoco.MjModel, name: str) -> TwinModel:
-    """The model as a description; parts without an equivalent (see ``content``) must have been removed before."""
+    """A MuJoCo model with twinrig's description of it; parts without an equivalent (see ``content``) must have been
+    removed before."""
     design = mujoco.MjData(model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
@@ -84,24 +85,29 @@ def _bodies(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Body]:
     numbers = moving_bodies(model)
     for b in numbers:
         above = int(model.body_parentid[b])
-        behind = body_with_mass(above) if above in numbers else None
+        behind = mass_body_name(above) if above in numbers else None
         for j in range(model.body_jntadr[b], model.body_jntadr[b] + model.body_jntnum[b]):
             yield _joint_body(model, design, j, behind)
-            behind = moved_by(j)
+            behind = joint_body_name(j)
         axes = design.ximat[b].reshape(3, 3)
         inertia = matrix_rows(axes * model.body_inertia[b] @ axes.T + _armature_inertia(model, b))
-        yield Body(body_with_mass(b), float(model.body_mass[b]), three_numbers(design.xipos[b]), (), inertia, behind)
+        yield Body(mass_body_name(b), float(model.body_mass[b]), vector_of(design.xipos[b]), (), inertia, behind)
 
 
 def _joint_body(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | None) -> Body:
-    """A body without mass that moves as a joint does."""
+    """Massless body that moves as a joint of the file does."""
     kind, body = int(model.jnt_type[j]), int(model.jnt_bodyid[j])
-    if kind in OF_KIND:
+    if kind in FREEDOMS_OF_JOINT:
         anchor = design.xpos[body] if kind == FREE_JOINT else design.xanchor[j]
-        return Body(moved_by(j), 0.0, three_numbers(anchor), OF_KIND[kind], parent=behind)
-    freedoms: tuple[Freedom, ...] = (place_of(model, j)[1],)
+        return Body(joint_body_name(j), 0.0, vector_of(anchor), FREEDOMS_OF_JOINT[kind], parent=behind)
+    freedoms: tuple[Freedom, ...] = (coordinate_of(model, j)[1],)
     return Body(
-        moved_by(j), 0.0, three_numbers(design.xanchor[j]), freedoms, parent=behind, axes=_axes_along(design.xaxis[j])
+        joint_body_name(j),
+        0.0,
+        vector_of(design.xanchor[j]),
+        freedoms,
+        parent=behind,
+        axes=_axes_along(design.xaxis[j]),
     )
 
 
@@ -126,7 +132,7 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
     for j in range(model.njnt):
         first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
         free, ball = model.jnt_type[j] == FREE_JOINT, model.jnt_type[j] == BALL_JOINT
-        freedoms: tuple[Freedom, ...] = ("x", "y", "z") if free else () if ball else (place_of(model, j)[1],)
+        freedoms: tuple[Freedom, ...] = ("x", "y", "z") if free else () if ball else (coordinate_of(model, j)[1],)
         for i, freedom in enumerate(freedoms):
             stiffness = float(model.jnt_stiffness[j]) * springs
             damping, inertia = float(model.dof_damping[first + i]) * dampers, float(model.dof_armature[first + i])
@@ -134,11 +140,11 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
             if stiffness or damping or inertia:
                 numbers = (stiffness, damping, held, inertia)
                 name = f"{label(model, 'joint', j)} {freedom if free else ''}".rstrip()
-                yield JointElement(name, ((moved_by(j), freedom),), (1.0,), *numbers)
+                yield JointElement(name, ((joint_body_name(j), freedom),), (1.0,), *numbers)
 
 
 def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[float]]:
-    """Joints of a fixed tendon, and their coefficients."""
+    """Numbers of the joints of a fixed tendon, and their coefficients."""
     of = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
     return [int(model.wrap_objid[w]) for w in of], [float(model.wrap_prm[w]) for w in of]
 
@@ -161,7 +167,7 @@ def sites_of(model: mujoco.MjModel, tendon: int) -> list[int]:
 
 
 def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineSpring]:
-    """Springs and dampers of tendons between two sites."""
+    """Springs and dampers of the tendons that run straight between two sites."""
     springs, dampers, numbers = (
         not feature_is_disabled(model, "SPRING"),
         not feature_is_disabled(model, "DAMPER"),
@@ -171,14 +177,14 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
         stiffness, damping = float(model.tendon_stiffness[t]) * springs, float(model.tendon_damping[t]) * dampers
         bodies = [int(model.site_bodyid[s]) for s in sites_of(model, t)]
         if (stiffness or damping) and bodies[0] != bodies[1]:
-            first, second = (body_with_mass(b) if b in numbers else None for b in bodies)
-            start, end = (three_numbers(design.site_xpos[s]) for s in sites_of(model, t))
+            first, second = (mass_body_name(b) if b in numbers else None for b in bodies)
+            start, end = (vector_of(design.site_xpos[s]) for s in sites_of(model, t))
             length = float(model.tendon_lengthspring[t, 0])
             yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
 
 
 def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[TurningSpring]:
-    """Springs and dampers of the rotation of ball and free joints; those of translation are in ``joint_elements``."""
+    """Rotational springs and dampers of ball and free joints; those of translation are in ``joint_elements``."""
     springs, dampers = not feature_is_disabled(model, "SPRING"), not feature_is_disabled(model, "DAMPER")
     for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL_JOINT, FREE_JOINT)):
         body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE_JOINT
@@ -187,7 +193,7 @@ def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Tu
         if not (stiffness or damping):
             continue
         place, axes = int(model.jnt_qposadr[j]) + 3 * free, design.xmat[body].reshape(3, 3).copy()
-        rest = rotation_of(model.qpos_spring[place : place + 4])
+        rest = rotation_matrix(model.qpos_spring[place : place + 4])
         yield TurningSpring(
             label(model, "joint", j),
             _bodies_beside(model, j),
@@ -202,8 +208,14 @@ def _bodies_beside(model: mujoco.MjModel, joint: int) -> tuple[str | None, str]:
     body = int(model.jnt_bodyid[joint])
     first, above = int(model.body_jntadr[body]), int(model.body_parentid[body])
     last = first + int(model.body_jntnum[body]) - 1
-    before = moved_by(joint - 1) if joint > first else body_with_mass(above) if above in moving_bodies(model) else None
-    return before, moved_by(joint) if joint < last else body_with_mass(body)
+    before = (
+        joint_body_name(joint - 1)
+        if joint > first
+        else mass_body_name(above)
+        if above in moving_bodies(model)
+        else None
+    )
+    return before, joint_body_name(joint) if joint < last else mass_body_name(body)
 
 
 def has_dry_friction(model: mujoco.MjModel, joint: int) -> bool:
@@ -223,10 +235,10 @@ def dry_frictions(model: mujoco.MjModel) -> Iterator[DryFriction]:
 
 
 def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[float, ...], float]:
-    """Coordinates and factors of a fixed tendon, and its length in the design position."""
+    """Coordinates and factors of a fixed tendon, and its length (m) in the design position."""
     joints, factors = tendon_travel(model, tendon)
     length = sum(k * float(model.qpos0[model.jnt_qposadr[j]]) for j, k in zip(joints, factors, strict=True))
-    return tuple(place_of(model, j) for j in joints), tuple(factors), length
+    return tuple(coordinate_of(model, j) for j in joints), tuple(factors), length
 
 
 def _tendon_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
@@ -255,8 +267,7 @@ def pushes_site(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def affine_law(model: mujoco.MjModel, actuator: int, control: float) -> np.ndarray:
-    """Three numbers (3,) of an actuator at a control: its constant force, and its coefficients of length and of
-    speed."""
+    """Force law of an actuator at a control, (3,): its constant force, and its coefficients of length and of speed."""
     gain = np.array(model.actuator_gainprm[actuator, :3])
     gain[1:] *= model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE
     affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
@@ -271,7 +282,7 @@ def actuator_is_on(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def _active_actuators(model: mujoco.MjModel) -> list[int]:
-    """Actuators that are not switched off."""
+    """Numbers of the actuators that are not switched off."""
     return [i for i in range(model.nu) if actuator_is_on(model, i) and not feature_is_disabled(model, "ACTUATION")]
 
 
@@ -285,7 +296,7 @@ def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoa
         wrench = force * model.actuator_gear[i].reshape(2, 3) @ axes.T
         if wrench.any() and body in numbers:
             yield BodyLoad(
-                label(model, "actuator", i), body_with_mass(body), three_numbers(design.site_xpos[site]), *wrench
+                label(model, "actuator", i), mass_body_name(body), vector_of(design.site_xpos[site]), *wrench
             )
 
 
@@ -297,7 +308,7 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
             places, factors, start = _along_tendon(model, target)
         else:
-            places, factors = (place_of(model, target),), (1.0,)
+            places, factors = (coordinate_of(model, target),), (1.0,)
             start = float(model.qpos0[model.jnt_qposadr[target]])
         offset, slope, rate = affine_law(model, i, float(constant[i]))
         if offset or slope or rate:
@@ -306,8 +317,8 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def compensation(model: mujoco.MjModel, body: int) -> float:
-    """Share of a body's weight that is compensated, as the share of the joints above it that transmit the compensation;
-    0 for none.
+    """Share of a body's weight that MuJoCo compensates, as the share of the joints above it that transmit the
+    compensation; 0 for none.
 
     MuJoCo has it among the passive forces, which are none at all without springs and dampers, or among the forces of
     actuators where a joint says so (``actuatorgravcomp``), which are none without actuators.
@@ -325,5 +336,5 @@ def _compensated_loads(model: mujoco.MjModel, design: mujoco.MjData, gravity: np
     for b in moving_bodies(model):
         if model.body_mass[b] and gravity.any() and compensation(model, b) == 1.0:
             load, still = -gravity * float(model.body_gravcomp[b] * model.body_mass[b]), np.zeros(3)
-            point = three_numbers(design.xipos[b])
-            yield GroundSpring(body_with_mass(b), point, point, still, still, load)  # type: ignore[arg-type]
+            point = vector_of(design.xipos[b])
+            yield GroundSpring(mass_body_name(b), point, point, still, still, load)  # type: ignore[arg-type]

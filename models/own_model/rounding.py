@@ -1,4 +1,4 @@
-"""What rounding makes of mass matrices, forces and accelerations, measured on the file's own model.
+"""Effect of floating-point rounding on mass matrices, forces and accelerations, measured on the file's model in MuJoCo.
 
 A computation in floating point is at best the exact answer for numbers that are changed by their rounding (backward
 stability). So the model is computed again with every number of it, and the state, changed at random by a small share
@@ -23,16 +23,18 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from models.own_model.builds import Equations, Moved, State, as_parsed, forward_state
+from models.own_model.builds import Equations, Motion, State, equations_of_file, forward_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import joins_bodies
 from models.own_model.names import moving_bodies
 from models.own_model.reading import TwinModel
 
 CHANGED_SHARE = 1e-9
-"""Changes of numbers: far above their rounding, and small enough for the answer to change in proportion."""
+"""Relative size of the random changes of numbers: far above rounding, and small enough for results to change in
+proportion."""
 RANDOM_CHANGES, SEED = 8, 27
-"""Random changes, of whose effects the root mean square is taken: by one alone, effects may cancel."""
+"""Count of random changes, whose effects are averaged as root mean square because those of a single change may cancel;
+seed of the random numbers."""
 RELATIVE_NUMBERS = (
     *("body_mass", "body_inertia", "body_gravcomp", "jnt_stiffness", "dof_damping", "dof_armature"),
     *("dof_frictionloss", "tendon_stiffness", "tendon_damping", "tendon_armature", "tendon_lengthspring", "wrap_prm"),
@@ -40,43 +42,49 @@ RELATIVE_NUMBERS = (
 )
 LENGTH_NUMBERS = ("body_pos", "body_ipos", "jnt_pos", "site_pos")
 DIRECTION_NUMBERS = ("body_quat", "body_iquat", "site_quat", "jnt_axis")
-"""Numbers of a compiled model: changed by a share of themselves, of the reach, and unit vectors."""
-Law = Callable[[TwinModel], Equations]
-"""The file's own model as a function of coordinates and rates: with soft constraints, or with rigid ones."""
+"""Names of the numbers of a compiled model that are changed at random: by a share of themselves, by a share of the
+model's reach (m), and as unit vectors."""
+EquationsOfModel = Callable[[TwinModel], Equations]
+"""Function from a model to its equations of motion: with soft constraints, or with rigid ones."""
 
 
-def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Sequence[Moved]) -> list[Moved]:
-    """Sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative random
-    change of all input numbers.
+def sensitivities(
+    twin: TwinModel, equations_of: EquationsOfModel, states: Sequence[State], motions: Sequence[Motion]
+) -> list[Motion]:
+    """Rounding sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative
+    random change of all input numbers.
 
-    law, moved : the file's own model, and what it does at the states.
+    equations_of, motions : the equations of MuJoCo's model of the file, and its motion at the states.
     """
     draw, reach = np.random.default_rng(SEED), reach_of(twin)
-    squares = [Moved(*map(np.zeros_like, each)) for each in moved]
+    squares = [Motion(*map(np.zeros_like, each)) for each in motions]
     for _ in range(RANDOM_CHANGES):
-        move = law(replace(twin, model=changed_model(twin.model, draw, reach)))
-        for square, exact, (q, v) in zip(squares, moved, states, strict=True):
+        move = equations_of(replace(twin, model=changed_model(twin.model, draw, reach)))
+        for square, exact, (q, v) in zip(squares, motions, states, strict=True):
             other = move(*_changed_state(twin, draw, q, v))
             for total, there, here in zip(square, other, exact, strict=True):
                 total += ((there - here) / CHANGED_SHARE) ** 2 / RANDOM_CHANGES
     by_numbers = [
-        _with_solver_rounding(_summed(Moved(*map(np.sqrt, square)), exact, sums), exact)
-        for square, exact, sums in zip(squares, moved, _sums_of_rates(twin, states), strict=True)
+        _with_solver_rounding(_with_summation_rounding(Motion(*map(np.sqrt, square)), exact, sums), exact)
+        for square, exact, sums in zip(squares, motions, _sums_of_rates(twin, states), strict=True)
     ]
     return (
-        by_numbers if not twin.driven.tied else list(map(_constrained, by_numbers, _unconstrained_motion(twin, states)))
+        by_numbers
+        if not twin.driven.tied
+        else list(map(_with_constraint_rounding, by_numbers, _unconstrained_motion(twin, states)))
     )
 
 
-def _summed(sensitive: Moved, moved: Moved, sums: np.ndarray) -> Moved:
-    """Sensitivities with that of summing forces of the sizes (n,) ``sums``, whatever remains of them."""
-    by_sums = np.abs(np.linalg.pinv(moved.mass)) @ sums
-    return sensitive._replace(force=sensitive.force + sums, acceleration=sensitive.acceleration + by_sums)
+def _with_summation_rounding(sensitivity: Motion, motion: Motion, sums: np.ndarray) -> Motion:
+    """Rounding sensitivities, with the rounding of summing forces of the sizes (n,) ``sums`` added; these forces may
+    cancel."""
+    by_sums = np.abs(np.linalg.pinv(motion.mass)) @ sums
+    return sensitivity._replace(force=sensitivity.force + sums, acceleration=sensitivity.acceleration + by_sums)
 
 
 def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndarray]:
-    """For each state, sums (n,) over the bodies of the sizes of what their rates alone take on each coordinate: mass
-    times centripetal acceleration by lever, and gyroscopic moments."""
+    """For each state, the sums (n,) over the bodies of the sizes of the velocity-dependent forces on each coordinate:
+    mass times centripetal acceleration by lever, and gyroscopic moments."""
     model, data = twin.model, mujoco.MjData(twin.model)
     shifts, turns, shifting, turning = (np.empty((3, twin.size)) for _ in range(4))
     for q, v in states:
@@ -93,34 +101,34 @@ def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndar
         yield np.abs(state.jacobian).T @ sums
 
 
-def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
-    """Sensitivities to rounding, those of accelerations increased by that of solving M a = f, in which every entry of M
-    is rounded.
+def _with_solver_rounding(sensitivity: Motion, motion: Motion) -> Motion:
+    """Rounding sensitivities, with that of solving M a = f for the accelerations a added, where every entry of the mass
+    matrix M is rounded.
 
     This is Skeel's componentwise condition, |M^-1| |M| |a| (Higham 2002, Accuracy and Stability of Numerical
     Algorithms, section 7.2; recalled). A light seat on a car takes its share of the rounding of wheels that spin up a
     million times as fast; a coordinate that the mass matrix does not couple with others takes none.
     """
-    inverse = np.abs(np.linalg.pinv(moved.mass))
-    solution = inverse @ np.abs(moved.mass) @ np.abs(moved.acceleration)
-    return sensitive._replace(acceleration=sensitive.acceleration + solution)
+    inverse = np.abs(np.linalg.pinv(motion.mass))
+    solution = inverse @ np.abs(motion.mass) @ np.abs(motion.acceleration)
+    return sensitivity._replace(acceleration=sensitivity.acceleration + solution)
 
 
-def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
-    """Motion of the file's own model at the states, without its equality constraints."""
+def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Motion]:
+    """Motion of the file's model in MuJoCo at the states, without its equality constraints."""
     model = copy(twin.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
-    move = as_parsed(replace(twin, model=model))
+    move = equations_of_file(replace(twin, model=model))
     return [move(q, v) for q, v in states]
 
 
-def _constrained(sensitive: Moved, free: Moved) -> Moved:
-    """Sensitivities that include the motion suppressed by constraints. Rounding errors of all other coordinates remain
-    in a stopped coordinate, weighted with the root of inertia."""
-    weight = np.sqrt(free.mass.diagonal())
-    taken = float((weight * np.abs(free.acceleration)).max())
-    return sensitive._replace(
-        force=sensitive.force + taken * weight, acceleration=sensitive.acceleration + taken / weight
+def _with_constraint_rounding(sensitivity: Motion, unconstrained: Motion) -> Motion:
+    """Rounding sensitivities, with the motion that constraints suppress added. Rounding errors of all other coordinates
+    remain in a stopped coordinate, weighted with the root of inertia."""
+    weight = np.sqrt(unconstrained.mass.diagonal())
+    taken = float((weight * np.abs(unconstrained.acceleration)).max())
+    return sensitivity._replace(
+        force=sensitivity.force + taken * weight, acceleration=sensitivity.acceleration + taken / weight
     )
 
 
@@ -168,8 +176,8 @@ def _equality_magnitudes(model: mujoco.MjModel, reach: float) -> Iterator[tuple[
 
 
 def _changed_state(twin: TwinModel, draw: np.random.Generator, q: np.ndarray, v: np.ndarray) -> State:
-    """A state changed by a small relative amount; coordinates are changed including the offset that the file gives
-    them."""
+    """State changed at random by a small relative amount; coordinates are changed including the offset that the file
+    gives them."""
     model, size = twin.model, np.abs(q)
     for j in range(model.njnt):
         first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL_JOINT, FREE_JOINT))

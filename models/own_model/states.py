@@ -1,4 +1,4 @@
-"""Random states of a model, every coordinate within its range, or as its constraints want it."""
+"""Random states of a user's model, with every coordinate within its range and all constraints satisfied."""
 
 import mujoco
 import numpy as np
@@ -6,29 +6,29 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.own_model.constraints import plain_constraints, satisfying_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
-from models.own_model.equalities import tie_rows
-from models.own_model.names import some_names
+from models.own_model.equalities import coupling_rows
+from models.own_model.names import first_names_text
 from models.own_model.reading import TwinModel
 
 STATE_COUNT = 100
 SEED = 26
 LARGEST_ANGLE, LARGEST_SHIFT, LARGEST_SPEED, LARGEST_TILT = np.pi, 0.5, 1.0, 1.2
-"""rad, m, and rad/s or m/s: what a coordinate without a range may reach; LARGEST_TILT (rad): the three angles of what
-turns without limit, the second of which is singular at a quarter turn."""
+"""Limits (rad, m, and rad/s or m/s) within which a coordinate without a range, and its rate, are drawn; LARGEST_TILT
+(rad): limit of the three angles of a ball or free joint, the second of which is singular at a quarter turn."""
 
 STEEPEST_MIDDLE_ANGLE = 1.45
-"""rad: how near the middle one of three angles comes to a quarter turn."""
-WAY_SHARES = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
-"""Shares of a random way from the design position, of which the first is taken at which constraints can be met."""
+"""Largest size (rad) of the second of three angles, which is singular at a quarter turn."""
+DISTANCE_SHARES = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
+"""Shares of a random distance from the design position; the first at which constraints can be satisfied is taken."""
 UNMET_GAP = 1e-9
-"""rad, m: gap of couplings that no coordinates satisfy all at once."""
+"""Violation (rad, m) of couplings above which no coordinates satisfy all of them."""
 UNMET_REASON = (
     "constraints cannot be satisfied all at once by coordinates in their ranges: {}; try `--without equality`"
 )
 
 
 def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Random coordinates and rates (count, n), uniform in their ranges; equal for equal count and seed.
+    """Random coordinates and rates (count, n), uniform in their ranges; equal for equal ``count`` and ``seed``.
 
     Those that constraints tie go to the nearest place, and the nearest rate, that satisfies them. RunFailed where no
     state does.
@@ -37,7 +37,7 @@ def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.nda
     q, v = draw.uniform(low, high, (count, len(low))), draw.uniform(-LARGEST_SPEED, LARGEST_SPEED, (count, len(low)))
     if twin.driven.connections:
         return _constrained_states(twin, q, v)
-    rows, offsets = tie_rows(twin.driven.couplings, twin.size)
+    rows, offsets = coupling_rows(twin.driven.couplings, twin.size)
     if not len(rows):
         return q, v
     nearest = np.linalg.pinv(rows).T
@@ -50,19 +50,19 @@ def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.nda
 
 
 def _constrained_states(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States (count, n) that satisfy the constraints between bodies, found from random ones; a state moves towards the
-    design position where no solution is near."""
+    """States (count, n) that satisfy the constraints between bodies, computed from random ones; a state moves towards
+    the design position where no solution is near."""
     constraints, (low, high) = plain_constraints(twin), file_limits(twin.model)
     middle = np.clip(0.0, low, high)
 
     def nearest(place: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         for ranges in ((-np.inf, np.inf), (low, high)):  # within them alone where the nearest ones lie beyond
-            for share in WAY_SHARES:
+            for share in DISTANCE_SHARES:
                 state = satisfying_state(constraints, middle + share * (place - middle), rate, ranges)
                 if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
                     return state
         names = [each.name for each in twin.driven.couplings] + [each.name for each in twin.driven.connections]
-        raise RunFailed("twin", UNMET_REASON.format(some_names(names)))
+        raise RunFailed("twin", UNMET_REASON.format(first_names_text(names)))
 
     states = [nearest(*each) for each in zip(q, v, strict=True)]
     return np.array([place for place, _ in states]), np.array([rate for _, rate in states])

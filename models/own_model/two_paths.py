@@ -1,4 +1,4 @@
-"""Paths of two files from one state, by the same build, tableau and step."""
+"""Comparison of the paths of two model files from the same state, by the same build, integration method and step."""
 
 from dataclasses import dataclass
 
@@ -6,9 +6,16 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import ENGINES
-from models.own_model.control_table import constant_leg
+from models.own_model.control_table import constant_sections
 from models.own_model.elements import two_digit_text
-from models.own_model.path import DISTURBANCE, PATH_DURATION, blown_up, path_by, rows_alike, steps_of_path
+from models.own_model.path import (
+    DISTURBANCE,
+    PATH_DURATION,
+    count_of_equal_states,
+    has_diverged,
+    path_of_build,
+    step_count_of_path,
+)
 from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
@@ -17,7 +24,7 @@ from models.own_model.states import random_states
 class PathGap:
     """Difference of two files' paths. horizon : time (s) up to which paths are compared, as in ``PathReport``; distance
     : largest difference of a coordinate or rate, relative to the largest value in the first file, at least 1; worst :
-    which coordinate; failed : why there is no comparison."""
+    name of the coordinate with this difference; failed : why there is no comparison."""
 
     horizon: float
     distance: float
@@ -25,7 +32,7 @@ class PathGap:
     failed: str = ""
 
     def line(self) -> str:
-        """One line of text for the terminal."""
+        """Text of one line for the terminal."""
         if self.failed:
             return f"paths of both files from one state are not compared: {self.failed}"
         until = (
@@ -38,22 +45,22 @@ class PathGap:
         )
 
 
-def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
-    """Difference between two files' paths over 1 s, at the step of the first file; both must have the same names of
-    coordinates."""
-    steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
+def compare_two_paths(first: TwinModel, second: TwinModel) -> PathGap:
+    """Difference between two files' paths over 1 s, at the step of the first file; both files must have coordinates of
+    the same names."""
+    steps, (q,), (v,) = step_count_of_path(first), *random_states(first, 1)
     step, order = PATH_DURATION / steps, [first.names.index(name) for name in second.names]
-    legs = [constant_leg(twin, steps) for twin in (first, second)]
+    legs = [constant_sections(twin, steps) for twin in (first, second)]
     try:
         with np.errstate(all="ignore"):  # what blows up is told
-            path = path_by(legs[0], ENGINES[0], (q, v), step)
-            disturbed = path_by(legs[0], ENGINES[0], (q + DISTURBANCE, v), step)
-            other = path_by(legs[1], ENGINES[0], (q[order], v[order]), step)
+            path = path_of_build(legs[0], ENGINES[0], (q, v), step)
+            disturbed = path_of_build(legs[0], ENGINES[0], (q + DISTURBANCE, v), step)
+            other = path_of_build(legs[1], ENGINES[0], (q[order], v[order]), step)
     except RunFailed as error:
         return PathGap(0.0, np.nan, "", error.reason)
-    if blown_up(path) or blown_up(other):
+    if has_diverged(path) or has_diverged(other):
         return PathGap(0.0, np.nan, "", "the motion blows up at this step")
-    rows, places = rows_alike(path, disturbed, steps), np.argsort(order)
+    rows, places = count_of_equal_states(path, disturbed, steps), np.argsort(order)
     there = other[:rows, np.concatenate((places, first.size + places))]
     apart = np.abs(there - path[:rows]).max(axis=0)
     at, size = int(apart.argmax()), max(1.0, float(np.abs(path[:rows]).max()))

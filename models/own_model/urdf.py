@@ -1,4 +1,5 @@
-"""A URDF read without MuJoCo, and held to what MuJoCo's parser made of it: masses, inertias, origins and axes.
+"""Masses, inertias, origins and axes of a URDF, read without MuJoCo and compared with the model that MuJoCo's parser
+makes of it.
 
 Links that are fixed to one another are one body in MuJoCo: masses, centres and inertias are summed over them. All is
 compared in the design position, in the axes of space. After the specification of URDF (ROS): rpy turns about the fixed
@@ -18,12 +19,13 @@ from models.own_model.urdf_text import parsed_root
 from models.vehicles.spatial import steiner
 
 PARSER_TOLERANCE = 1e-6
-"""Relative: MuJoCo's parser keeps all digits, yet principal axes cost some."""
+"""Relative difference allowed between file and parser: the parser keeps all digits, yet computing principal axes costs
+some."""
 MOVING_JOINT_TYPES = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 
 @dataclass(frozen=True)
-class Misread:
+class MisreadNumber:
     """A number that MuJoCo's parser changed: kind, owner, unit, the file's value, and the parser's value."""
 
     kind: str
@@ -33,23 +35,24 @@ class Misread:
     parsed: np.ndarray
 
     def sentence(self) -> str:
-        """A sentence on the two values."""
+        """Sentence that states the number in the file and as MuJoCo parsed it."""
         said = [", ".join(f"{number:.6g}" for number in np.ravel(each)) for each in (self.in_file, self.parsed)]
         return f"{self.kind} of {self.owner}: ({said[0]}) {self.unit} in the file, ({said[1]}) as MuJoCo parsed it"
 
 
 @dataclass
-class _Link:
-    """A link in the design position: its position and axes, the moving link to which it is fixed, and its joint."""
+class _UrdfLink:
+    """Link of a URDF in the design position: its position and axes in space, and the name of the moving link to which
+    it is fixed."""
 
-    place: np.ndarray
+    position: np.ndarray
     axes: np.ndarray
     group: str
 
 
 @dataclass
-class _Mass:
-    """Mass (kg), centre (m) and inertia about it (kg m^2), in space."""
+class _LinkMass:
+    """Mass properties of rigidly connected links: mass (kg), centre (m) and inertia about it (kg m^2), in space."""
 
     mass: float = 0.0
     centre: np.ndarray | None = None
@@ -66,14 +69,14 @@ class _Mass:
         self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
 
 
-def misread_numbers(file: ModelFile) -> list[Misread]:
-    """Numbers of a URDF that differ in MuJoCo's compiled model, each with both values."""
+def misread_numbers(file: ModelFile) -> list[MisreadNumber]:
+    """Numbers of a URDF that differ in MuJoCo's compiled model, each with the file's and the parser's value."""
     root = parsed_root(file.document.path.read_bytes())
     model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
     links, joints = _links_in_place(root, file.document.path.name)
-    rows = list[Misread]()
+    rows = list[MisreadNumber]()
     for name, expected in _masses_of_groups(root, links, file.document.path.name).items():
         rows += _compared_mass(model, design, name, expected)
     for name, (anchor, axis) in joints.items():
@@ -81,7 +84,7 @@ def misread_numbers(file: ModelFile) -> list[Misread]:
     return rows
 
 
-def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expected: _Mass) -> list[Misread]:
+def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expected: _LinkMass) -> list[MisreadNumber]:
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     stands = body <= 0 or model.body_weldid[body] == 0
     if stands or expected.centre is None or expected.inertia is None:
@@ -93,18 +96,22 @@ def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expe
         ("centre of mass", "m", expected.centre, design.xipos[body]),
         ("inertia", "kg m^2", expected.inertia, tensor),
     )
-    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)]
+    return [
+        MisreadNumber(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)
+    ]
 
 
 def _compared_joint(
     model: mujoco.MjModel, design: mujoco.MjData, name: str, anchor: np.ndarray, axis: np.ndarray
-) -> list[Misread]:
+) -> list[MisreadNumber]:
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
     if joint < 0:
         return []
     owner = label(model, "joint", joint)
     pairs = (("axis", "", axis, design.xaxis[joint]), ("anchor", "m", anchor, design.xanchor[joint]))
-    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)]
+    return [
+        MisreadNumber(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)
+    ]
 
 
 def _equal_numbers(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
@@ -115,36 +122,36 @@ def _equal_numbers(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
 
 def _links_in_place(
     root: ElementTree.Element, file: str
-) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """Links by name in the design position; for hinges and slides by name, anchors and axes in space."""
+) -> tuple[dict[str, _UrdfLink], dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """Links by name in the design position; and for hinges and slides by name, their anchors and axes in space."""
     joints = list(root.iter("joint"))
-    children = {_end(joint, "child") for joint in joints}
+    children = {_link_name(joint, "child") for joint in joints}
     links = {
-        name: _Link(np.zeros(3), np.eye(3), name)
+        name: _UrdfLink(np.zeros(3), np.eye(3), name)
         for name in (link.get("name", "") for link in root.iter("link"))
         if name not in children
     }
     axes, waiting = dict[str, tuple[np.ndarray, np.ndarray]](), joints
     while waiting:
-        ready = [joint for joint in waiting if _end(joint, "parent") in links]
+        ready = [joint for joint in waiting if _link_name(joint, "parent") in links]
         if not ready:
             return links, axes  # a loop, which MuJoCo's parser has refused
         for joint in ready:
-            above, child = links[_end(joint, "parent")], _end(joint, "child")
+            above, child = links[_link_name(joint, "parent")], _link_name(joint, "child")
             shift, turn = _origin_of(joint, file)
             moves = joint.get("type") in MOVING_JOINT_TYPES
-            link = _Link(above.place + above.axes @ shift, above.axes @ turn, child if moves else above.group)
+            link = _UrdfLink(above.position + above.axes @ shift, above.axes @ turn, child if moves else above.group)
             links[child] = link
             if joint.get("type") in MOVING_JOINT_TYPES[:3]:
                 axis = _numbers_in_attribute(joint.find("axis"), "xyz", (1.0, 0.0, 0.0), file)
-                axes[joint.get("name", "")] = link.place, link.axes @ (axis / np.linalg.norm(axis))
+                axes[joint.get("name", "")] = link.position, link.axes @ (axis / np.linalg.norm(axis))
         waiting = [joint for joint in waiting if joint not in ready]
     return links, axes
 
 
-def _masses_of_groups(root: ElementTree.Element, links: dict[str, _Link], file: str) -> dict[str, _Mass]:
+def _masses_of_groups(root: ElementTree.Element, links: dict[str, _UrdfLink], file: str) -> dict[str, _LinkMass]:
     """Mass, centre and inertia of each group of links that are fixed to one another, by the name of its moving link."""
-    sums = dict[str, _Mass]()
+    sums = dict[str, _LinkMass]()
     for element in root.iter("link"):
         inertial, link = element.find("inertial"), links.get(element.get("name", ""))
         if inertial is None or link is None:
@@ -152,7 +159,7 @@ def _masses_of_groups(root: ElementTree.Element, links: dict[str, _Link], file: 
         shift, turn = _origin_of(inertial, file)
         mass = float(_numbers_in_attribute(inertial.find("mass"), "value", (0.0,), file)[0])
         tensor, axes = _inertia_tensor(inertial.find("inertia"), file), link.axes @ turn
-        sums.setdefault(link.group, _Mass()).add(mass, link.place + link.axes @ shift, axes @ tensor @ axes.T)
+        sums.setdefault(link.group, _LinkMass()).add(mass, link.position + link.axes @ shift, axes @ tensor @ axes.T)
     return sums
 
 
@@ -162,13 +169,13 @@ def _inertia_tensor(element: ElementTree.Element | None, file: str) -> np.ndarra
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
 
-def _end(joint: ElementTree.Element, which: str) -> str:
-    end = joint.find(which)
+def _link_name(joint: ElementTree.Element, end_tag: str) -> str:
+    end = joint.find(end_tag)
     return "" if end is None else end.get("link", "")
 
 
 def _origin_of(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
-    """Translation (3,) and rotation (3, 3) of an <origin>."""
+    """Translation (3,) in m and rotation (3, 3) of the <origin> in an element."""
     origin = element.find("origin")
     roll, pitch, yaw = _numbers_in_attribute(origin, "rpy", (0.0, 0.0, 0.0), file)
     (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
@@ -181,7 +188,7 @@ def _origin_of(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.
 def _numbers_in_attribute(
     element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str
 ) -> np.ndarray:
-    """Numbers in an attribute; InputError where they are not numbers, or not as many as wanted."""
+    """Numbers in an attribute of an element. Raises InputError where they are not numbers, or not as many as wanted."""
     text = None if element is None else element.get(name)
     if text is None:
         return np.array(default)

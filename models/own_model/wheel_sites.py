@@ -1,4 +1,4 @@
-"""Sites of an MJCF file that are named as tyres or hubs: where the wheels of a car are, and what their tyres are like.
+"""Sites of an MJCF file that are named as tyres or hubs: positions of a car's wheels, and parameters of their tyres.
 
 A site at the centre of a wheel whose name begins with "tyre" or "hub" makes a tyre of the rest of its name. What MJCF
 has no word for stands in the site's ``user``: vertical stiffness (N/m), damping (N s/m), cornering stiffness (N/rad).
@@ -18,14 +18,15 @@ from models.own_model.xml_guard import Document
 WHEEL_SITE_PATTERN = re.compile(r"(?:tyre|hub)[ _.:-]*(.*)", re.IGNORECASE)
 EXAMPLE_SITE = '<site name="tyre front_left" pos="X Y Z" user="STIFFNESS DAMPING CORNERING"/>'
 SAME_AXLE_DISTANCE, AXLE_SEPARATION = 1e-6, 0.2
-"""m: wheels of one axle lie so close along x, and those of two axles at least so far apart."""
+"""Largest distance (m) along x between the wheels of one axle, and smallest distance between two axles."""
 MOST_WHEELS_PER_AXLE = 2
-"""Wheels of an axle at the most."""
+"""Largest count of wheels of an axle."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelSite:
-    """name : of the tyre; site, body : their numbers in the model; point (3,) in the design position, m.
+    """Site of an MJCF file that marks a wheel. name : of the tyre; site, body : their numbers in the model; point (3,)
+    in the design position, m.
 
     axle : from the front, 0 first; stiffness (N/m), damping (N s/m), cornering (N/rad)."""
 
@@ -40,7 +41,7 @@ class WheelSite:
 
 
 def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[WheelSite, ...]:
-    """Wheel sites from front to rear, left before right; InputError if the sites do not form the axles of a car.
+    """Wheel sites from front to rear, left before right. Raises InputError if the sites do not form the axles of a car.
 
     design : data of the model in the design position, with kinematics computed.
     """
@@ -62,23 +63,23 @@ def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document
     )
 
 
-def place(model: mujoco.MjModel, document: Document, site: int) -> str:
+def site_text(model: mujoco.MjModel, document: Document, site: int) -> str:
     """Text by which messages name a site."""
     name = model.site(site).name
     line = document.line(("site",), name)
     return f"site {name!r}" + (f" ({line})" if line else "")
 
 
-def _refuse(model: mujoco.MjModel, document: Document, site: int, value: object, said: str) -> NoReturn:
-    raise InputError(document.path.name, place(model, document, site), value, said)
+def _refuse(model: mujoco.MjModel, document: Document, site: int, value: object, reason: str) -> NoReturn:
+    raise InputError(document.path.name, site_text(model, document, site), value, reason)
 
 
 def _check_site(
-    model: mujoco.MjModel, design: mujoco.MjData, document: Document, site: int, name: str, twice: bool
+    model: mujoco.MjModel, design: mujoco.MjData, document: Document, site: int, name: str, is_repeated: bool
 ) -> None:
     if not name:
         _refuse(model, document, site, None, 'needs the name of its tyre behind "tyre" or "hub", as "tyre front_left"')
-    if twice:
+    if is_repeated:
         _refuse(model, document, site, name, "two sites have this name behind their first word")
     if not model.site_bodyid[site]:
         _refuse(model, document, site, None, "lies in the world: it must be in the body of its wheel")
@@ -90,7 +91,7 @@ def _check_site(
 def _axles(
     design: mujoco.MjData, document: Document, model: mujoco.MjModel, ordered: list[int]
 ) -> list[tuple[int, ...]]:
-    """Sites of every axle, from the front; InputError where they do not form axles."""
+    """Numbers of the sites of every axle, from the front. Raises InputError where they do not form axles."""
     axles, x = [ordered[:1]], design.site_xpos[:, 0]
     for before, site in pairwise(ordered):
         apart = round(float(x[before] - x[site]), 9)
@@ -113,7 +114,7 @@ def _axles(
 
 
 def _check_axle(design: mujoco.MjData, document: Document, model: mujoco.MjModel, sites: list[int]) -> None:
-    """Require that an axle has a left and a right wheel, or one wheel in the middle."""
+    """Raise InputError unless an axle has a left and a right wheel, or one wheel in the middle."""
     y, at = design.site_xpos[sites, 1], f"the axle at x = {design.site_xpos[sites[0], 0]:.6g} m"
     if len(sites) > MOST_WHEELS_PER_AXLE:
         names = ", ".join(repr(model.site(s).name) for s in sites)
@@ -133,7 +134,7 @@ def _check_axle(design: mujoco.MjData, document: Document, model: mujoco.MjModel
 
 
 def _tyre_numbers(model: mujoco.MjModel, document: Document, site: int) -> tuple[float, float, float]:
-    """Stiffness, damping and cornering stiffness from a site's ``user``."""
+    """Stiffness (N/m), damping (N s/m) and cornering stiffness (N/rad) from a site's ``user`` attribute."""
     numbers = np.zeros(3)
     given = model.site_user[site][:3] if model.nuser_site else numbers[:0]
     numbers[: len(given)] = given

@@ -1,4 +1,4 @@
-"""What a file of a model may ask of the parser, looked at before MuJoCo sees it; nothing in a file is executed.
+"""Check of an XML model file before MuJoCo parses it; nothing in a file is executed.
 
 Refused, with the line: what is no XML, document types and entities, plugins, includes, attached models, meshes and
 pictures outside the file's folder, or that which the user names, and counts that no machine could hold. Of a URDF all
@@ -15,22 +15,24 @@ from models.core.errors import InputError
 from models.own_model.urdf_text import UrdfText, text_for_mujoco
 
 LARGEST_FILE = 20_000_000
-"""Bytes of a file."""
+"""Largest size of a file in bytes."""
 DEEPEST_INCLUDE = 8
-"""Includes within includes."""
-MOST_COPIES = 2000
-"""Copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an attack."""
+"""Largest depth of includes within includes."""
+LARGEST_COPY_COUNT = 2000
+"""Largest count of copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an
+attack."""
 FORMAT_OF_ROOT = {"mujoco": "MJCF", "robot": "URDF"}
 PART_ROOT = "mujocoinclude"
-"""Root of a file that is a part of models, and none itself."""
+"""Root tag of a file that other models include, and that is no model itself."""
 PLUGIN_TAGS = ("plugin", "extension")
-ASSETS = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
+ASSET_FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
 """Elements that name files, by the attribute of <compiler> with the folder of these files."""
 
 
 @dataclass(frozen=True)
 class XmlElement:
-    """An element: tag, attributes, and its location: file, line, and the enclosing tags, outermost first."""
+    """Element of an XML file: tag, attributes, and its location: file, line, and the enclosing tags, outermost
+    first."""
 
     tag: str
     attributes: dict[str, str]
@@ -41,8 +43,8 @@ class XmlElement:
 
 @dataclass(frozen=True)
 class Document:
-    """path; kind : "MJCF" or "URDF"; elements : of the file and all that it includes, in their order; urdf : of a URDF,
-    the text that MuJoCo gets."""
+    """A checked model file. path; kind : "MJCF" or "URDF"; elements : of the file and all that it includes, in their
+    order; urdf : of a URDF, the text that MuJoCo gets."""
 
     path: Path
     kind: str
@@ -57,7 +59,7 @@ class Document:
         return ""
 
     def line_of_attribute(self, tag: str, attribute: str) -> str:
-        """Position "FILE:LINE" of the first element of a tag that has an attribute; "" if there is none."""
+        """Position "FILE:LINE" of the first element with this tag that has an attribute; "" if there is none."""
         there = (each for each in self.elements if each.tag == tag and attribute in each.attributes)
         return next((f"{each.file}:{each.line}" for each in there), "")
 
@@ -66,7 +68,7 @@ class Document:
 class _Reader:
     path: Path
     elements: list[XmlElement] = field(default_factory=list)
-    around: list[str] = field(default_factory=list)
+    enclosing_tags: list[str] = field(default_factory=list)
 
     def read(self, content: bytes) -> list[XmlElement]:
         parser = self._parser = expat.ParserCreate()
@@ -83,11 +85,11 @@ class _Reader:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         line = self._parser.CurrentLineNumber
-        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.around)))
-        self.around.append(tag)
+        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.enclosing_tags)))
+        self.enclosing_tags.append(tag)
 
     def _end(self, tag: str) -> None:
-        self.around.pop()
+        self.enclosing_tags.pop()
 
     def _refuse_types(self, *_: Any) -> None:
         place = f"line {self._parser.CurrentLineNumber}"
@@ -96,16 +98,16 @@ class _Reader:
 
 class _Folders(NamedTuple):
     """Folders of included files. allowed : folder that must contain all of them; base : folder in which MuJoCo looks
-    for them, that of the model file, not of the including file; an attached model has its own; elements : of the files
+    for them, that of the model file, not of the including file (an attached model has its own); elements : of the files
     with this base."""
 
-    allowed: Path
-    base: Path
+    allowed_folder: Path
+    model_folder: Path
     elements: list[XmlElement]
 
 
 def checked_document(path: Path, folder: Path | None = None) -> Document:
-    """The file's elements, after checks; InputError for content that must not reach the parser.
+    """Elements of a model file after checks. Raises InputError for content that must not reach the parser.
 
     folder : in which all files must lie that the model names; its own if None.
     """
@@ -136,7 +138,7 @@ def _file_content(path: Path) -> bytes:
 
 
 def _read_model(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
-    """Read a model with all that it includes, and look where the files of its meshes and pictures lie."""
+    """Read a model with all that it includes, and check where the files of its meshes and pictures lie."""
     _read_elements(path, _file_content(path), folders, elements, depth)
     _check_assets(folders)
 
@@ -154,47 +156,47 @@ def _read_elements(path: Path, content: bytes, folders: _Folders, elements: list
 
 
 def _read_included(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
-    """Read a file that an element includes or attaches; InputError if it lies outside the allowed folder."""
+    """Read a file that an element includes or attaches. Raises InputError if it lies outside the allowed folder."""
     name, place = element.attributes["file"], f"line {element.line}"
-    target = (folders.base / name).resolve()
-    if not target.is_relative_to(folders.allowed):
+    target = (folders.model_folder / name).resolve()
+    if not target.is_relative_to(folders.allowed_folder):
         raise InputError(path.name, place, name, _outside_text(element, folders, target))
     if not target.is_file():
         raise InputError(path.name, place, name, f"<{element.tag}> names a file that is not there: {target}")
     if depth >= DEEPEST_INCLUDE:
         raise InputError(path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
     if element.tag == "model":
-        _read_model(target, _Folders(folders.allowed, target.parent, []), elements, depth + 1)
+        _read_model(target, _Folders(folders.allowed_folder, target.parent, []), elements, depth + 1)
     else:
         _read_elements(target, _file_content(target), folders, elements, depth + 1)
 
 
 def _outside_text(element: XmlElement, folders: _Folders, target: Path) -> str:
-    """What is allowed in place of a file outside the allowed folder, and the option that allows this file."""
-    both = Path(os.path.commonpath((folders.allowed, target.parent)))
+    """Text on the folder that is allowed in place of an outside file, and the option that allows this file."""
+    both = Path(os.path.commonpath((folders.allowed_folder, target.parent)))
     option = f"; if all below {both} may be read: `--folder {both}`" if both != Path(both.anchor) else ""
     return f"<{element.tag}> must name a file in the folder of the model{option}"
 
 
 def _check_assets(folders: _Folders) -> None:
-    """InputError for a file of a mesh or a picture outside the allowed folder, in any folder that a <compiler> says."""
+    """Raise InputError for a mesh or picture file outside the allowed folder, in any folder that a <compiler> names."""
     compilers = [element.attributes for element in folders.elements if element.tag == "compiler"]
     urdf = folders.elements[0].tag == "robot"
     strips = any(_strips_paths(compiler, urdf) for compiler in compilers or [{}])
-    for element in (element for element in folders.elements if element.tag in ASSETS):
-        keys = (ASSETS[element.tag], "assetdir")
+    for element in (element for element in folders.elements if element.tag in ASSET_FOLDERS):
+        keys = (ASSET_FOLDERS[element.tag], "assetdir")
         within = {compiler[key] for compiler in compilers for key in keys if key in compiler} or {""}
         names = [name for key, name in element.attributes.items() if key.startswith("file")]
         names = [Path(name).name for name in names] if strips else names
         for path in (Path(folder) / name for name in names for folder in within):
-            target = (folders.base / path).resolve()
-            if not target.is_relative_to(folders.allowed):
+            target = (folders.model_folder / path).resolve()
+            if not target.is_relative_to(folders.allowed_folder):
                 told = _outside_text(element, folders, target)
                 raise InputError(element.file, f"line {element.line}", str(path), told)
 
 
 def _strips_paths(compiler: dict[str, str], urdf: bool) -> bool:
-    """Whether MuJoCo takes the last part alone of the names of files, as it does in a URDF unless told otherwise."""
+    """Whether MuJoCo drops the folders from the names of files, as it does in a URDF unless told otherwise."""
     return compiler.get("strippath", str(urdf).lower()) == "true"
 
 
@@ -212,8 +214,10 @@ def _check_counts(path: Path, element: XmlElement, place: str) -> None:
             product *= max(1.0, abs(float(text)))
         except ValueError:
             raise InputError(path.name, place, text, "count must be whole numbers") from None
-    if not product <= MOST_COPIES:
-        raise InputError(path.name, place, element.attributes["count"], f"asks for more than {MOST_COPIES} copies")
+    if not product <= LARGEST_COPY_COUNT:
+        raise InputError(
+            path.name, place, element.attributes["count"], f"asks for more than {LARGEST_COPY_COUNT} copies"
+        )
 
 
 def _memory_is_modest(text: str) -> bool:

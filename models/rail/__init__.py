@@ -1,4 +1,4 @@
-"""Wheels on rails: a wheelset on straight track, from its linear theory to the limit cycle.
+"""A railway wheelset on straight track, from its linear theory to the limit cycle.
 
 Axes
     Of the track: x in the direction of travel, y to the right, z down. The frame moves along x with the speed; y and z

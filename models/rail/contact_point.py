@@ -1,4 +1,4 @@
-"""Where a cone touches a rail whose head is a circular cylinder along the track, exactly and in closed form.
+"""Contact of a conical wheel with a rail whose head is a circular cylinder along the track, in closed form.
 
 All planes that touch a cone pass through its apex. A plane that touches the rail as well has a normal square to x,
 which singles out one of them: the one whose distance from the cylinder's axis is the head's radius where wheel and rail
@@ -15,8 +15,8 @@ RIGHT, LEFT = 1.0, -1.0
 
 
 class Cone(NamedTuple):
-    """A wheel and its rail: radius of the wheel and half the distance of both places of contact in the middle of the
-    track (m), tangent of the cone's half angle, radius of the rail's head (m)."""
+    """Geometry of a conical wheel and its rail: radius of the wheel and half the distance of both contact points in the
+    middle of the track (m), tangent of the cone's half angle, radius of the rail's head (m)."""
 
     radius: float
     half_gauge: float
@@ -26,7 +26,7 @@ class Cone(NamedTuple):
 
 @inlined
 def cone_on_rail(wheel_side, pose, cone):
-    """Contact of one wheel: (penetration, rolling radius, n_y, n_z, x, y, z).
+    """Contact of one conical wheel with its rail: (penetration, rolling radius, n_y, n_z, x, y, z).
 
     wheel_side : RIGHT or LEFT; pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
     The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in the track's axes

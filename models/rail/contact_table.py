@@ -1,4 +1,5 @@
-"""Contact of a wheelset with profiles, over its lateral displacement and yaw: the Manchester contact benchmark.
+"""Wheel-rail contact of a wheelset with measured or standard profiles, over lateral displacement and yaw: the
+Manchester contact benchmark.
 
 The wheelset is held at a lateral displacement and a yaw angle. Its roll and the approach of each wheel follow from the
 vertical load of each wheel; both wheels carry the same. Without friction the vertical parts of the normal forces make
@@ -26,29 +27,29 @@ from models.contact.material import MaterialPair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
 from models.contact.wheel_on_rail import Pose, TouchingPlace, WheelAndRail, touches_of, touching_pose
 from models.core.errors import RunFailed
-from models.rail.joined_patches import Share, press_exactly
+from models.rail.joined_patches import PatchShare, exact_patch_shares
 
-Triple = tuple[float, float, float]
+ForceOrCreepage = tuple[float, float, float]
 SIDE_SIGNS = (1.0, -1.0)
-"""Of the right wheel, and of the left one seen in a mirror."""
+"""Factors of lateral displacement, yaw and roll for the right wheel, and for the left wheel seen in a mirror."""
 ROLL_ITERATIONS = 3
-"""Times that the roll angle is found anew with the approaches of both wheels."""
+"""Count of iterations for the roll angle with the approaches of both wheels."""
 SPIN_ITERATIONS = 2
-"""Times that the speed of spin is found anew with the exact loads of the patches."""
+"""Count of iterations for the speed of spin with the exact loads of the patches."""
 ITERATIONS = 60
 SPIN_SEARCH_SHARE = 0.05
-"""Share of the nominal speed of spin within which the one without moment is looked for."""
+"""Share of the nominal speed of spin within which the speed without moment about the axle is searched."""
 CELLS_PER_STRIP = 31
-"""Strips of a patch, and cells along each."""
+"""Count of strips of a patch, and of cells along each."""
 LOAD_PRECISION = 1e-7
-"""Relative, of the load that a wheel carries."""
+"""Relative precision of the load that a wheel carries."""
 CLIMBING_DEPTH = 2e-3
-"""Distance (m) of a touch below the flange's tip from which on a wheel has left its rail's side."""
+"""Distance (m) from the flange's tip to the first touch below which a wheel counts as having climbed the rail."""
 
 
 @dataclass(frozen=True)
 class PatchReport:
-    """One piece of a wheel's contact area: a patch, or several that have grown together.
+    """Report of one connected piece of a wheel's contact area: a patch, or several that have grown together.
 
     The left wheel as in a mirror, so that y and fy point away from the track's middle.
 
@@ -98,19 +99,19 @@ class PatchReport:
 
     @property
     def on_rail(self) -> float:
-        """Centre of pressure on the rail, y from the rail's highest point (m)."""
+        """Position of the centre of pressure on the rail, y from the rail's highest point (m)."""
         return self.y - self.top
 
     @property
     def touch_on_rail(self) -> float:
-        """Point of first touch on the rail, y from the rail's highest point (m)."""
+        """Position of first touch on the rail, y from the rail's highest point (m)."""
         return self.touch_y - self.top
 
 
 @dataclass(frozen=True)
 class WheelsetPlacement:
-    """Contact at one lateral displacement (m) and yaw (rad): the wheelset's roll (rad), its speed of spin (rad/s), and
-    reports of the patches."""
+    """Contact at a lateral displacement (m) and yaw (rad): the wheelset's roll (rad), its speed of spin (rad/s), and
+    reports of the patches of both wheels."""
 
     shift: float
     yaw: float
@@ -122,7 +123,7 @@ class WheelsetPlacement:
 
 @dataclass(frozen=True, eq=False)
 class LoadedWheel:
-    """One wheel under its load: pressure of each patch, and creep forces and moment (N, N, N m); mirrored for the left
+    """A wheel under its load: pressure of each patch, and creep forces and moment (N, N, N m); mirrored for the left
     wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
@@ -132,12 +133,12 @@ class LoadedWheel:
 
     pose: Pose
     touches: list[TouchingPlace]
-    creepages: list[Triple]
+    creepages: list[ForceOrCreepage]
     normal_contact: NormalContact
     approach: float
-    normal: float
-    forces: Sequence[Triple] = ()
-    shares: Sequence[Share] = ()
+    normal_force: float
+    forces: Sequence[ForceOrCreepage] = ()
+    shares: Sequence[PatchShare] = ()
     creep_lift: float = 0.0
     moment: float = 0.0
 
@@ -147,11 +148,12 @@ class LoadedWheel:
         if self.shares:
             return [share.load for share in self.shares]
         return [
-            0.0 if patch_pressure is None else patch_pressure.load for patch_pressure in map(self.part, self.touches)
+            0.0 if patch_pressure is None else patch_pressure.load
+            for patch_pressure in map(self.pressure_at, self.touches)
         ]
 
-    def part(self, touch: TouchingPlace) -> PatchPressure | None:
-        """Pressure of one patch by the simplified theory; None if the theory finds no contact there."""
+    def pressure_at(self, touch: TouchingPlace) -> PatchPressure | None:
+        """Pressure of the patch at a touch by the simplified theory; None if the theory finds no contact there."""
         return next(
             (patch_pressure for patch_pressure in self.normal_contact.patches if patch_pressure.patch is touch.patch),
             None,
@@ -160,14 +162,15 @@ class LoadedWheel:
 
 @dataclass(frozen=True, eq=False)
 class WheelsetContact:
-    """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
-    0 for a smooth contact. cell_factor : how many times as large as usual cells are, which tells their error."""
+    """Contact problem of a wheelset on its track. side : the right wheel on its rail. load : N on each wheel. speed :
+    m/s. friction : coefficient, 0 for a smooth contact. cell_factor : size of the cells divided by the usual size, to
+    estimate their error."""
 
     side: WheelAndRail
     load: float
     speed: float
     friction: float = 0.0
-    pair: MaterialPair = MaterialPair()  # noqa: RUF009 - a frozen value
+    material_pair: MaterialPair = MaterialPair()  # noqa: RUF009 - a frozen value
     cell_factor: float = 1.0
 
     def at(self, lateral_shift: float, yaw: float = 0.0) -> WheelsetPlacement:
@@ -192,75 +195,83 @@ class WheelsetContact:
             if self.friction == 0.0:
                 break
             rolling = self._free_spin(wheels)
-            wheels = [self._at_other_spin(wheel, rolling) for wheel in wheels]
-        return _standing_placement(
+            wheels = [self._with_spin_speed(wheel, rolling) for wheel in wheels]
+        return _checked_placement(
             WheelsetPlacement(lateral_shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels))
         )
 
-    def _both_wheels(self, pose: Pose, spin: float) -> list[LoadedWheel]:
+    def _both_wheels(self, pose: Pose, spin_speed: float) -> list[LoadedWheel]:
         """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
         return [
-            self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin) for sign in SIDE_SIGNS
+            self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin_speed)
+            for sign in SIDE_SIGNS
         ]
 
-    def _wheel(self, wheel_pose: Pose, spin: float) -> LoadedWheel:
+    def _wheel(self, wheel_pose: Pose, spin_speed: float) -> LoadedWheel:
         pose = replace(wheel_pose, fall=self.side.clearance(wheel_pose))
         touches = touches_of(self.side, pose)
-        creepages = [self._creepage(pose, touch, spin) for touch in touches]
+        creepages = [self._creepage(pose, touch, spin_speed) for touch in touches]
 
         def by_normal(normal: float) -> LoadedWheel:
-            pressed = press([touch.patch for touch in touches], self.pair, load=normal)
+            pressed = press([touch.patch for touch in touches], self.material_pair, load=normal)
             return LoadedWheel(pose, touches, creepages, pressed, pressed.approach, normal)
 
-        return self._balanced(by_normal, self.load)
+        return self._in_vertical_equilibrium(by_normal, self.load)
 
     def _with_exact_normal(self, approximate: LoadedWheel) -> LoadedWheel:
         """The loaded wheel with its normal contact solved exactly instead of by the simplified theory."""
         patches = [touch.patch for touch in approximate.touches]
 
         def by_normal(normal: float) -> LoadedWheel:
-            shares, approach = press_exactly(
-                patches, approximate.normal_contact.patches, normal, approximate.approach, self.pair, self.cell_factor
+            shares, approach = exact_patch_shares(
+                patches,
+                approximate.normal_contact.patches,
+                normal,
+                approximate.approach,
+                self.material_pair,
+                self.cell_factor,
             )
-            return replace(approximate, shares=shares, approach=approach, normal=normal)
+            return replace(approximate, shares=shares, approach=approach, normal_force=normal)
 
-        return self._balanced(by_normal, approximate.normal)
+        return self._in_vertical_equilibrium(by_normal, approximate.normal_force)
 
-    def _balanced(self, by_normal: Callable[[float], LoadedWheel], normal: float) -> LoadedWheel:
-        """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``by_normal`` gives the
-        wheel for a vertical part (N) of the normal forces, which is iterated from ``normal``."""
+    def _in_vertical_equilibrium(
+        self, wheel_by_normal: Callable[[float], LoadedWheel], normal_force: float
+    ) -> LoadedWheel:
+        """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``wheel_by_normal``
+        returns the wheel for a vertical part (N) of the normal forces, which is iterated from ``normal_force``."""
         for _ in range(ITERATIONS):
-            wheel = self._rolled(by_normal(normal))
-            if abs(normal - wheel.creep_lift - self.load) < LOAD_PRECISION * self.load:
+            wheel = self._with_creep_forces(wheel_by_normal(normal_force))
+            if abs(normal_force - wheel.creep_lift - self.load) < LOAD_PRECISION * self.load:
                 return wheel
-            normal *= self.load / (normal - wheel.creep_lift)
+            normal_force *= self.load / (normal_force - wheel.creep_lift)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
     def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
-        """Speed of spin (rad/s) of a freely rolling wheelset: its creep forces have no moment about the axle, under the
-        present normal forces."""
+        """Speed of spin (rad/s) of a freely rolling wheelset, whose creep forces have no moment about the axle under
+        the present normal forces."""
 
         def moment(spin: float) -> float:
-            return sum(self._at_other_spin(wheel, spin).moment for wheel in wheels)
+            return sum(self._with_spin_speed(wheel, spin).moment for wheel in wheels)
 
         rolling = -self.speed / self.side.wheelset.radius
         return float(
             brentq(moment, rolling * (1.0 - SPIN_SEARCH_SHARE), rolling * (1.0 + SPIN_SEARCH_SHARE), xtol=1e-9)
         )
 
-    def _at_other_spin(self, wheel: LoadedWheel, spin: float) -> LoadedWheel:
+    def _with_spin_speed(self, wheel: LoadedWheel, spin_speed: float) -> LoadedWheel:
         """The wheel with unchanged normal contact at another speed of spin (rad/s)."""
-        creepages = [self._creepage(wheel.pose, touch, spin) for touch in wheel.touches]
-        return self._rolled(replace(wheel, creepages=creepages))
+        creepages = [self._creepage(wheel.pose, touch, spin_speed) for touch in wheel.touches]
+        return self._with_creep_forces(replace(wheel, creepages=creepages))
 
-    def _rolled(self, wheel: LoadedWheel) -> LoadedWheel:
+    def _with_creep_forces(self, wheel: LoadedWheel) -> LoadedWheel:
         """The wheel with the creep forces of each patch; patches without contact get zero forces."""
         forces = []
         for touch, creepage, load in zip(wheel.touches, wheel.creepages, wheel.loads, strict=True):
-            patch_pressure = wheel.part(touch)
+            patch_pressure = wheel.pressure_at(touch)
             if patch_pressure is None or load == 0.0 or self.friction == 0.0:
                 forces.append((0.0, 0.0, 0.0))
                 continue
@@ -272,14 +283,14 @@ class WheelsetContact:
         moment = sum(float(axle @ _patch_moment(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
         return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
 
-    def _creepage(self, pose: Pose, touch: TouchingPlace, spin: float) -> Triple:
-        """Creepages and spin (1/m) at a point of first touch."""
+    def _creepage(self, pose: Pose, touch: TouchingPlace, spin_speed: float) -> ForceOrCreepage:
+        """Longitudinal and lateral creepage, and spin (1/m), at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
         axle, arm = pose.rotation[:, 1], self._arm(pose, touch)
-        velocity = spin * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
+        velocity = spin_speed * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
         across, into = _surface_axes(touch)
-        slips = velocity[0] / self.speed, velocity @ across / self.speed, spin * axle @ into / self.speed
+        slips = velocity[0] / self.speed, velocity @ across / self.speed, spin_speed * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
 
     def _radius(self, touch: TouchingPlace) -> float:
@@ -301,10 +312,10 @@ class WheelsetContact:
         return tuple(self._joined_report(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
 
     def _joined_report(
-        self, wheel: LoadedWheel, rows: list[tuple[TouchingPlace, Triple, Triple, Share]]
+        self, wheel: LoadedWheel, rows: list[tuple[TouchingPlace, ForceOrCreepage, ForceOrCreepage, PatchShare]]
     ) -> PatchReport:
-        """Report of one piece of the contact area; its first touch and creepages are those of the patch with the
-        largest load."""
+        """Report of one connected piece of the contact area; its first touch and creepages are those of the patch with
+        the largest load."""
         side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
         top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
         loads = np.array([share.load for *_, share in rows])
@@ -345,8 +356,8 @@ class WheelsetContact:
         )
 
 
-def _standing_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
-    """The contact unchanged; an error if a wheel stands on the tip of its flange."""
+def _checked_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
+    """The placement unchanged; RunFailed if a wheel stands on the tip of its flange."""
     for name, patches_of_wheel in (("right", placement.right), ("left", placement.left)):
         least_depth = min(patch.below_tip for patch in patches_of_wheel)
         if least_depth < CLIMBING_DEPTH:
@@ -358,10 +369,10 @@ def _standing_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
     return placement
 
 
-def rolling_radius_difference(placed_at: WheelsetPlacement) -> float:
-    """Rolling radius of the right wheel less that of the left one (m), each at the patch with the largest load."""
+def rolling_radius_difference(placement: WheelsetPlacement) -> float:
+    """Rolling radius of the right wheel minus that of the left one (m), each at the patch with the largest load."""
     right, left = (
-        max(patches_of_wheel, key=lambda patch: patch.normal) for patches_of_wheel in (placed_at.right, placed_at.left)
+        max(patches_of_wheel, key=lambda patch: patch.normal) for patches_of_wheel in (placement.right, placement.left)
     )
     return right.rolling_radius - left.rolling_radius
 
@@ -372,7 +383,7 @@ def _surface_axes(touch: TouchingPlace) -> tuple[Array, Array]:
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _patch_moment(lever: Array, touch: TouchingPlace, force: Triple) -> Array:
+def _patch_moment(lever: Array, touch: TouchingPlace, force: ForceOrCreepage) -> Array:
     """Moment (3,) of a patch's creep forces and spin moment about a point; ``lever`` is the vector (m) from that point
     to the patch."""
     across, into = _surface_axes(touch)

@@ -1,12 +1,11 @@
-"""The energy of a wheelset on rails along a path: what it has, what came in and what went out.
+"""Energy balance of a wheelset on rails along its path: stored energies and works.
 
-Has: kinetic energy, that of the springs, of gravity (with what the vehicle weighs on the axle), and the work done on
-the elastic contacts so far, flanges of cones included. Came in: the work of the drive, which holds the frame at its
-speed against the creep forces along the track. Went out: in the suspension's dampers, in the contacts' damping and in
-creep. Each work is a state more: its power is added up at the stages of RK4 with the weights of RK4, as the path itself
-came about. So the ledger closes to the integrator's order also where creep forces have kinks, at which a curve through
-the powers of the path's instants would not.
-"""
+Stored: kinetic energy, energy of the springs and of gravity (with the vehicle's weight on the axle), and the work done
+on the elastic contacts so far, flanges of cones included. Supplied: the work of the drive, which holds the frame at its
+speed against the creep forces along the track. Dissipated: in the suspension's dampers, in the contacts' damping and in
+creep. Each work is a further state: its power is added up at the stages of RK4 with the weights of RK4, as the path
+itself is computed. So the ledger closes to the integrator's order also where creep forces have kinks, at which a curve
+through the powers of the path's instants would not."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,7 +32,8 @@ from models.rail.wheelset import GRAVITY
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
-    """Energies (n,) in J at times (n,) in s; works count from the path's start, those done by the wheelset positive."""
+    """Energy balance of a wheelset over time: energies (n,) in J at times (n,) in s; works count from the path's start,
+    works done by the wheelset positive."""
 
     times: Array
     kinetic: Array
@@ -53,7 +53,7 @@ class Ledger:
 
 
 def energy_ledger(equations: Equations, path: WheelsetPath) -> Ledger:
-    """Energy balance along a path computed by RK4, of which every step must be recorded."""
+    """Energy balance along a path computed by RK4, of which every step must be stored."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
     works, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
     for stage_fraction, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
@@ -63,7 +63,7 @@ def energy_ledger(equations: Equations, path: WheelsetPath) -> Ledger:
 
 
 def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
-    """Rates (n, 10) of the states, and powers (n, 5) whose integrals are the works, in the order of the ledger."""
+    """Rates (n, 10) of the states, and powers (n, 5) in W whose integrals are the works, in the order of the ledger."""
     rates, contacts = equations.at(states)
     names = "elastic_power", "fx", "damping_power", "power"
     elastic, forward_force, damping, creep = (-contacts[name].sum(axis=1) for name in names)
@@ -77,19 +77,23 @@ def energies_at_states(equations: Equations, states: Array) -> tuple[Array, Arra
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
     squared_speed = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
     kinetic = 0.5 * (w.mass * squared_speed + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
-    return kinetic, _spring_energy_and_damping(body, states)[0], -(w.mass * GRAVITY + 2.0 * body.carried) * states[:, Z]
+    return (
+        kinetic,
+        _spring_energy_and_damping(body, states)[0],
+        -(w.mass * GRAVITY + 2.0 * body.carried_weight) * states[:, Z],
+    )
 
 
 def _spring_energy_and_damping(body: Body, states: Array) -> tuple[Array, Array]:
-    """Energy stored in the springs (n,), and power dissipated in the dampers (n,)."""
+    """Energy stored in the suspension springs (n,) in J, and power dissipated in the dampers (n,) in W."""
     (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])
     turning = np.array([cy * states[:, ROLL_RATE], sy * states[:, ROLL_RATE], states[:, YAW_RATE]])
     energy = power = np.zeros(len(states))
-    for arm in (body.arm, -body.arm):
+    for arm in (body.half_spacing, -body.half_spacing):
         spring_travel, rate = arm * axle, np.cross(turning, arm * axle, axis=0)
         spring_travel[1] += states[:, Y] - arm
-        spring_travel[2] += states[:, Z] - body.sunk
+        spring_travel[2] += states[:, Z] - body.rest_height
         rate[1] += states[:, Y_RATE]
         rate[2] += states[:, Z_RATE]
         energy = energy + 0.5 * np.array(body.stiffness) @ spring_travel**2

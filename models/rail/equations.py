@@ -1,4 +1,5 @@
-"""A wheelset on straight track, nonlinear: equations written out, rest, linearisation, fixed-step RK4.
+"""Nonlinear equations of motion of a wheelset on straight track: rest position, linearisation, integration by RK4 with
+fixed steps.
 
 States (10): y, z, roll, yaw, angle of spin; their rates but for the last, which is the spin about the axle itself,
 the body's whole angular velocity along it. The frame of the coordinates moves with the speed of travel. Its angular
@@ -38,53 +39,54 @@ from models.rail.wheel_forces import (
     Rails,
     count_of_patches,
     plain_rails,
-    rails_in,
+    rails_from_tuples,
     rails_of,
-    room_for,
     supported_force,
     wheel_forces,
+    workspace_for,
 )
 from models.rail.wheelset import GRAVITY, Wheelset
 
 STATE_COUNT = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATE_COUNT)
 ALLOWED_STEP_RATE, LIMIT_OF_RK4 = 2.5, 2.785
-"""Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
+"""Largest product of step and rate of the fastest motion: the allowed one, with a margin, and the stability limit of
+RK4."""
 DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
-"""Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
+"""Steps (10,) of the finite differences that linearise the rates: small against penetration (7e-5 m) and creepage."""
 LARGEST_SPEED = 200.0
-"""m/s"""
+"""Largest speed (m/s) of a wheelset."""
 DERAILED_LIMIT = 0.3
-"""Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
+"""Sum of yaw and roll (rad) and displacements (m) from which the wheelset counts as derailed."""
 DEEPEST_POSITION = 5e-3
-"""Height (m) above which the rails carry every load that is allowed."""
+"""Lowest position z (m, down) searched at which the rails carry the load."""
 NO_REPORT = np.empty(0, REPORT)
-"""Contacts of which nobody asks; to make those that are asked for takes longer than the rates."""
+"""Report without rows, for rates without contact reports, which take longer to compute than the rates."""
 
 
-Along = tuple[float, float, float]
-"""Of the track's axes."""
+TrackVector = tuple[float, float, float]
+"""Values along the track's axes x, y, z."""
 
 
 class Body(NamedTuple):
-    """The wheelset's body and suspension (SI): inertia along and across the axle; half spacing of the springs, springs
-    and dampers of one side, weight on each side, height at which the springs carry exactly that weight; lean of the
-    track; whether there is a spring or a damper."""
+    """Body and suspension of a wheelset (SI): mass; inertia along and across the axle; half spacing of the springs;
+    springs and dampers of one side; weight of the vehicle on each side; height z at which the springs carry exactly
+    that weight; lean of the track; whether there is a spring or a damper."""
 
     mass: float
-    along: float
-    across: float
-    arm: float
-    stiffness: Along
-    damping: Along
-    carried: float
-    sunk: float
+    spin_inertia: float
+    yaw_inertia: float
+    half_spacing: float
+    stiffness: TrackVector
+    damping: TrackVector
+    carried_weight: float
+    rest_height: float
     lean: float
-    held: bool
+    has_suspension: bool
 
 
 class Stages(NamedTuple):
-    """Arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
+    """Work arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
     summed_rate: Array
     rate: Array
@@ -99,15 +101,14 @@ def rates(state, speed, body, rails, state_rate, report):
 
     speed, body, rails : ``parameters`` of ``Equations``.
     """
-    rails_record = rails_in(rails)
-    set_rates(state, speed, Body(*body), rails_record, state_rate, report, room_for(rails_record.profile))
+    rails_record = rails_from_tuples(rails)
+    set_rates(state, speed, Body(*body), rails_record, state_rate, report, workspace_for(rails_record.profile))
 
 
 @lean
 def set_rates(state, speed, body, rails, state_rate, report, workspace):
-    """Fill ``state_rate`` with the time derivative of a state. workspace : ``Workspace``, written over; report : has no
-    rows where nobody asks for contacts.
-    """
+    """Fill ``state_rate`` with the time derivative of a state (10,). workspace : ``Workspace``, written over; report :
+    has no rows where no contact report is wanted."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -121,9 +122,9 @@ def set_rates(state, speed, body, rails, state_rate, report, workspace):
     turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
     turning[2] = yaw_rate + axle_z * rolling
     wheel_forces(Pose(y, z, roll, yaw), rails, report, workspace)
-    force[1] += 2.0 * body.carried * body.lean
-    force[2] += 2.0 * body.carried
-    if body.held:
+    force[1] += 2.0 * body.carried_weight * body.lean
+    force[2] += 2.0 * body.carried_weight
+    if body.has_suspension:
         _add_suspension_forces(state, body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
@@ -132,10 +133,10 @@ def set_rates(state, speed, body, rails, state_rate, report, workspace):
     state_rate[ANGLE] = rolling
     state_rate[Y_RATE] = force[1] / body.mass + GRAVITY * body.lean
     state_rate[Z_RATE] = force[2] / body.mass + GRAVITY
-    whirl = body.along * spin
-    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.across - yaw_rate**2 * sr * cr
-    state_rate[SPIN] = m2 / body.along
-    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / body.across + 2.0 * roll_rate * yaw_rate * sr) / cr
+    whirl = body.spin_inertia * spin
+    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.yaw_inertia - yaw_rate**2 * sr * cr
+    state_rate[SPIN] = m2 / body.spin_inertia
+    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / body.yaw_inertia + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @lean
@@ -145,12 +146,12 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
     """
     (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = angular_velocity, body.stiffness, body.damping
     for side in (1.0, -1.0):
-        arm, turn_z = side * body.arm, state[YAW_RATE]
+        arm, turn_z = side * body.half_spacing, state[YAW_RATE]
         ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
         vx, vy, vz = turn_y * az - turn_z * ay, turn_z * ax - turn_x * az, turn_x * ay - turn_y * ax
         fx = -kx * ax - dx * vx
         fy = -ky * (state[Y] + ay - arm) - dy * (state[Y_RATE] + vy)
-        fz = -kz * (state[Z] + az - body.sunk) - dz * (state[Z_RATE] + vz)
+        fz = -kz * (state[Z] + az - body.rest_height) - dz * (state[Z_RATE] + vz)
         force[0] += fx
         force[1] += fy
         force[2] += fz
@@ -160,25 +161,34 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def march(state, parameters, steps, path, reports):
+def march(state, parameters, step_numbers, path, reports):
     """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
 
-    parameters : of ``Equations``; steps : of a length (s), how many, and every so many steps one goes into path and
-    reports.
-    """
+    parameters : of ``Equations``; step_numbers : of a length (s), how many, and every so many steps one goes into path
+    and reports."""
     stages = Stages(np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(0, REPORT))
     speed, body, rails = parameters
-    rails_record = rails_in(rails)
+    rails_record = rails_from_tuples(rails)
     return _march_with_arrays(
-        state, (speed, Body(*body), rails_record), steps, path, reports, room_for(rails_record.profile), stages
+        state,
+        (speed, Body(*body), rails_record),
+        step_numbers,
+        path,
+        reports,
+        workspace_for(rails_record.profile),
+        stages,
     )
 
 
 @lean
-def _march_with_arrays(state, parameters, steps, path, reports, workspace, stages):
-    """March the state over all steps with arrays allocated by the caller; holding no references to them saves 5 % of
-    the time of a bare wheelset."""
-    (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = parameters, steps, stages
+def _march_with_arrays(state, parameters, step_numbers, path, reports, workspace, stages):
+    """Integrate the state over all steps with arrays allocated by the caller. Holding no references to them saves 5 %
+    of the time of a bare wheelset."""
+    (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = (
+        parameters,
+        step_numbers,
+        stages,
+    )
     for i in range(count + 1):
         row = i // stride
         for stage in range(4):  # one call of the rates, or it is compiled four times
@@ -204,22 +214,22 @@ def _march_with_arrays(state, parameters, steps, path, reports, workspace, stage
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelsetPath(Trajectory):
-    """Path of a run: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the right wheel's
-    first."""
+    """Motion of a wheelset over time: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the
+    right wheel's first."""
 
     contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells :
-    of FASTSIM's strips.
+    """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : creep law, "linear" or
+    "fastsim"; cells : of FASTSIM's strips.
 
     lean : of the track to the right, the weight across the track as a share of that square to it.
     """
 
     ENGINE: ClassVar[str] = "wheelset"
-    """Who says that a run failed."""
+    """Name of the engine in messages of failed runs."""
 
     wheelset: Wheelset
     speed: float
@@ -235,10 +245,10 @@ class Equations:
 
     @cached_property
     def body(self) -> Body:
-        """The body and its suspension."""
+        """Body and suspension of the wheelset."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
-        sunk = float(w.ellipse.approach) / w.slant[1]
+        sunk = float(w.ellipse.approach) / w.cone_sine_and_cosine[1]
         if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
             rails = rails_of(w)
             sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST_POSITION, xtol=1e-15))
@@ -249,7 +259,7 @@ class Equations:
 
     @cached_property
     def rails(self) -> Rails:
-        """The compiled record of the rails or profiles that the wheels roll on."""
+        """Compiled record of the rails or profiles that the wheels roll on."""
         return rails_of(self.wheelset, self.law, self.cells)
 
     @cached_property
@@ -266,14 +276,14 @@ class Equations:
         return int(count_of_patches(self.rails.profile))
 
     def empty_contacts(self, *record_shape: int) -> Array:
-        """Records REPORT (*shape, patches) for contacts that are not yet known.
+        """Contact records REPORT (*shape, patches) filled with NaN.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
         return np.full((*record_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
-        """Time derivative (10,) of a state (10,)."""
+        """Time derivative (10,) of a wheelset's state (10,)."""
         state_rate = np.empty(STATE_COUNT)
         rates(np.asarray(state, float), *self.parameters, state_rate, NO_REPORT)
         return state_rate
@@ -290,7 +300,7 @@ class Equations:
     def rest(self) -> Array:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATE_COUNT)
-        start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
+        start[Z], start[SPIN] = self.body.rest_height, -self.speed / self.wheelset.radius
         return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
     def displaced_state(self, lateral_shift: float) -> Array:
@@ -298,18 +308,18 @@ class Equations:
         equilibrium."""
         start, w = self.rest.copy(), self.wheelset
         start[Y] = lateral_shift
-        start[ROLL] = -lateral_shift * w.tilt
+        start[ROLL] = -lateral_shift * w.roll_per_displacement
         if w.profiles:
-            rise, start[ROLL] = w.profiles.touching(w.radius, lateral_shift)
+            rise, start[ROLL] = w.profiles.first_touch_pose(w.radius, lateral_shift)
             start[Z] += rise
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
     def _state_in_balance(
         self, start_state: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]
     ) -> Array:
-        """State in which two values, ``coordinates``, are solved for so that two accelerations vanish."""
+        """State in which two coordinates are solved for so that two accelerations vanish."""
         state_indices = list(coordinates)
-        scale = np.maximum(np.abs(start_state[state_indices]), self.body.sunk)
+        scale = np.maximum(np.abs(start_state[state_indices]), self.body.rest_height)
 
         def displaced(unknowns: Array) -> Array:
             state = start_state.copy()
@@ -328,28 +338,28 @@ class Equations:
 
     @cached_property
     def state_matrix(self) -> Array:
-        """State matrix A (9, 9), linearised about rest; the angle of spin is left out."""
+        """State matrix A (9, 9) of the equations linearised about rest; the angle of spin is left out."""
         return rate_jacobian(self.rates, self.rest)
 
     @cached_property
     def _fastest_rate(self) -> float:
-        """Largest eigenvalue magnitude (1/s) of the motions about rest."""
+        """Largest magnitude (1/s) of the eigenvalues of the motion about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
     def run(self, state: Array, duration: float, step: float, stride: int = 1) -> WheelsetPath:
-        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``stride``-th step is kept.
+        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``stride``-th step is stored.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
         contacts' largest loads among the states that are kept or, where all are, for the motion.
         """
-        count = self._steps(state, duration, step, stride)
-        states, contacts = self._marched(np.array(state, float), count, step, stride)
+        count = self._checked_step_count(state, duration, step, stride)
+        states, contacts = self._states_and_contacts(np.array(state, float), count, step, stride)
         path = WheelsetPath(np.arange(len(states)) * step * stride, states, contacts=contacts)
         self.check(path, step, stride)
         return path
 
-    def _marched(self, state: Array, step_count: int, step: float, stride: int) -> tuple[Array, Array]:
+    def _states_and_contacts(self, state: Array, step_count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
         row_count = step_count // stride + 1
         states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
@@ -359,7 +369,7 @@ class Equations:
         return states, contacts
 
     def check(self, path: WheelsetPath, step: float, stride: int) -> None:
-        """Raise RunFailed if the step was too large for the contact loads or, where every step is kept, for the
+        """Raise RunFailed if the step was too large for the contact loads or, where every step is stored, for the
         motion."""
         self.check_loads(path, step)
         if stride == 1:
@@ -380,7 +390,7 @@ class Equations:
                     path.times[k],
                 )
 
-    def _steps(self, state: Array, duration: float, step: float, stride: int) -> int:
+    def _checked_step_count(self, state: Array, duration: float, step: float, stride: int) -> int:
         """Number of steps of a run, after checks of state, duration, step and stride."""
         if quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
             raise InputError("", "state", None, f"must be {STATE_COUNT} finite numbers")
@@ -401,7 +411,7 @@ class Equations:
 
 
 def rate_jacobian(rates: Callable[[Array], Array], state: Array, step_factor: float = 1.0) -> Array:
-    """Jacobian (9, 9) of the rates about a state without the angle of spin, by fourth-order central differences over
+    """Jacobian (9, 9) of the rates at a state, without the angle of spin, by fourth-order central differences over
     ``step_factor`` times the usual distance."""
     columns, steps = [], step_factor * DIFFERENCE_STEPS
     for k in range(STATE_COUNT):

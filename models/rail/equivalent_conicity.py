@@ -1,4 +1,4 @@
-"""Equivalent conicity of a wheelset from the difference of its rolling radii: EN 15302, and its first harmonic.
+"""Equivalent conicity of a wheelset from its rolling radius difference: by EN 15302, and by the first harmonic.
 
 Without slip a wheelset on straight track follows Klingel's wave, y'' = -dr(y) / (s r) over the way, with s the distance
 of the contact points and r the rolling radius. Equivalent conicity at an amplitude is that of the cones whose wave is
@@ -33,11 +33,11 @@ from models.core.errors import InputError
 from models.rail.rolling_radius_table import RollingRadiusTable
 
 SERIES_LIMIT = 1e-6
-"""Argument below which arctan z / z is its series to rounding."""
+"""Argument z below which arctan z / z is 1 to rounding."""
 AMPLITUDE_TOLERANCE = 1e-9
-"""Share of an amplitude within which two waves are the same, or an amplitude is that of the table's ends."""
+"""Share of an amplitude within which two waves count as equal, or an amplitude as that of the table's ends."""
 HARMONIC_PHASES = 720
-"""Phases of the first harmonic."""
+"""Count of phases at which the first harmonic is summed."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class KlingelWave:
 def equivalent_conicity(
     displacements: Array, differences: Array, amplitude: float, *, centre_guess: float | None = None
 ) -> float:
-    """Equivalent conicity by EN 15302 at an amplitude, which is half of peak to peak; see ``klingel_wave``.
+    """Equivalent conicity by EN 15302 at an amplitude (half of peak to peak); see ``klingel_wave``.
 
     displacements : (n,) lateral, to the right, rising; differences : (n,) of the rolling radii, right less left;
     amplitude : above 0. All in one unit of length.
@@ -85,14 +85,15 @@ def equivalent_conicity(
 
 
 def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> KlingelWave:
-    """Klingel's wave of an amplitude (the table's unit, half of peak to peak).
+    """Klingel's wave of an amplitude (in the table's unit, half of peak to peak) from a table of rolling radius
+    differences.
 
     centre_guess : where the centre is looked for, if several waves have this amplitude. Raises InputError where there
     is no wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the
     table; or where there are several and ``centre_guess`` is not given.
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
-    first_displacement, last_displacement = table.ends
+    first_displacement, last_displacement = table.displacement_range
     if 0.0 <= 2.0 * amplitude - (last_displacement - first_displacement) <= AMPLITUDE_TOLERANCE * amplitude:
         amplitude = (last_displacement - first_displacement) / 2.0
     if 2.0 * amplitude > last_displacement - first_displacement:
@@ -114,8 +115,8 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: f
 
 
 def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
-    """Possible left turning points of waves of an amplitude: the potential there equals that at the right turning
-    point.
+    """Possible left turning points of waves of an amplitude: the potential there equals the potential at the right
+    turning point.
 
     Between the rows of the table, the difference of both potentials is a parabola in the left turning point.
     """
@@ -156,7 +157,7 @@ def _parabola_roots(begin_value: float, middle_value: float, end_value: float) -
 
 def _wave_from_turning_point(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
     """The wave whose left turning point is ``low``; None if the motion would stop before the other turning point."""
-    y, dr = table.between(low, low + 2.0 * amplitude)
+    y, dr = table.section(low, low + 2.0 * amplitude)
     if dr[0] > 0.0 or dr[-1] < 0.0:
         return None
     length = np.diff(y)
@@ -186,16 +187,16 @@ def _swing_energy(dr: Array, length: Array) -> Array:
 
 
 def _lowest_energy(dr: Array, length: Array, energy: Array) -> Array:
-    """Energy at the maxima of the potential inside a piece, where a falling difference ``dr`` passes zero."""
+    """Energies at the maxima of the potential inside pieces of the table, where a falling difference ``dr`` passes
+    zero."""
     falls = (dr[:-1] > 0.0) & (dr[1:] < 0.0) & (length > 0.0)
     distance_to_zero = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
     return energy[:-1][falls] - 0.5 * distance_to_zero * dr[:-1][falls]
 
 
 def _crossing_times(length_by_speeds: Array, slope: Array) -> Array:
-    """Time (n,) to cross each piece of dr; ``length_by_speeds`` : ratio of the piece's length to the sum of the speeds
-    at both ends; slope : of dr.
-    """
+    """Times (n,) to cross each straight piece of the table; ``length_by_speeds`` : ratio of the piece's length to the
+    sum of the speeds at both ends; slope : of the rolling radius difference."""
     root = np.sqrt(np.abs(slope))
     angle = root * length_by_speeds
     small, rising = angle < SERIES_LIMIT, slope > 0.0
@@ -205,12 +206,12 @@ def _crossing_times(length_by_speeds: Array, slope: Array) -> Array:
 
 
 def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
-    """A wave of zero conicity if the wheels do not steer over the whole swing; else the error that explains why there
-    is no wave."""
+    """A wave of zero conicity if the wheels do not steer over the whole swing; otherwise raises the InputError that
+    explains why there is no wave."""
     idle = _idle_centre(table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
-    dr, (first_displacement, last_displacement) = table.differences, table.ends
+    dr, (first_displacement, last_displacement) = table.differences, table.displacement_range
     rises = table.difference(last_displacement, "left") - table.difference(first_displacement)
     if (dr >= 0.0).all() or (dr <= 0.0).all():
         why = (
@@ -240,7 +241,8 @@ def _idle_centre(table: RollingRadiusTable, amplitude: float) -> float | None:
 def harmonic_linearised_conicity(
     displacements: Array, differences: Array, amplitude: float, centre: float = 0.0
 ) -> float:
-    """Conicity of the cones whose first harmonic is that of wheels that move as ``amplitude`` times a sine.
+    """Conicity of the cones whose rolling radius difference has the same first harmonic as the wheels', for lateral
+    motion as ``amplitude`` times a sine.
 
     displacements : (n,) ascending, over the whole of the swing about ``centre``, or from 0 on for wheels that are alike
     and a swing about 0; differences : (n,) of the rolling radii, right less left. All in one unit of length.
@@ -264,8 +266,8 @@ def harmonic_linearised_conicity(
 
 @dataclass(frozen=True)
 class ConicityRow:
-    """Equivalent conicity at one amplitude (m), according to the standard and to the first harmonic, and the wave's
-    centre (m).
+    """Equivalent conicity at one amplitude (m), by the standard and by the first harmonic, and the centre of the wave
+    (m).
 
     spacing_error : difference of the standard's conicity on the table without every other row; NaN where that has no
     such wave.
@@ -280,7 +282,8 @@ class ConicityRow:
 
 
 def conicity_row(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> ConicityRow:
-    """Both conicities of a table at an amplitude; InputError as ``klingel_wave``."""
+    """Equivalent conicity of a table at an amplitude, by the standard and by the first harmonic. Raises InputError as
+    ``klingel_wave`` does."""
     wave = klingel_wave(table, amplitude, centre_guess=centre_guess)
     harmonic = harmonic_linearised_conicity(
         table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre

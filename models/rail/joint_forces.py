@@ -1,4 +1,4 @@
-"""Forces of both rails as forces of a wheelset's joints, for engines that count coordinates joint by joint.
+"""Forces of both rails as joint forces of a wheelset, for engines whose coordinates are those of joints.
 
 Joints, from the track to the wheelset: sliding along y and along z, yaw about z, roll about the axle's own x, spin
 about the axle. The rate of the last is the wheelset's spin against axes that do not spin: the spin of ``equations`` is
@@ -30,22 +30,22 @@ from models.rail.equations import (
     Z,
 )
 from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile, Pose
-from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
+from models.rail.wheel_forces import REPORT, WHEELS, Rails, wheel_forces, workspace_for
 
 JOINTS = 5
 TABLE_HEAD = record("speed", "law", "middle", "nodes", "knots", "strips", "cells")
 """Head of the table: speed (m/s), creep law, FASTSIM's middle; counts of the wheel's nodes, of the rail's knots, of
 strips and of cells. Then WHEELS, PROFILE_COUNTS, nodes, knots, and FASTSIM's strips and cells."""
-IN_HEAD, IN_WHEELS, IN_PROFILE, IN_NODE, IN_KNOT = (
+HEAD_SIZE, WHEELS_SIZE, PROFILE_SIZE, NODE_SIZE, KNOT_SIZE = (
     size_of(kind) for kind in (TABLE_HEAD, WHEELS, PROFILE_COUNTS, WHEEL_NODE, RAIL_KNOT)
 )
 PER_STRIP, PER_CELL = 4, 5
-"""Rows of the strips and of the cells, see ``fastsim_grid``."""
+"""Count of numbers of a strip and of a cell, see ``fastsim_grid``."""
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
 
 
 def table(speed: float, rails: Rails) -> Array:
-    """Table of the numbers that the compiled joint forces read."""
+    """Table of the numbers that the compiled joint forces of a wheelset read."""
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
     parts = (rails.wheels, profile, nodes, knots)
@@ -53,15 +53,15 @@ def table(speed: float, rails: Rails) -> Array:
 
 
 @inlined
-def rails_at(table_pointer):
-    """``Rails`` as views of a table at a pointer to doubles."""
+def rails_from_table(table_pointer):
+    """``Rails`` as views of the table at a pointer to doubles."""
     head = records(table_pointer, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
-    wheels = beyond(table_pointer, IN_HEAD)
-    profile = beyond(wheels, IN_WHEELS)
-    first_node = beyond(profile, IN_PROFILE)
-    first_knot = beyond(first_node, IN_NODE * nodes)
-    first_strip = beyond(first_knot, IN_KNOT * knots)
+    wheels = beyond(table_pointer, HEAD_SIZE)
+    profile = beyond(wheels, WHEELS_SIZE)
+    first_node = beyond(profile, PROFILE_SIZE)
+    first_knot = beyond(first_node, NODE_SIZE * nodes)
+    first_strip = beyond(first_knot, KNOT_SIZE * knots)
     first_cell = beyond(first_strip, PER_STRIP * strips)
     return Rails(
         records(wheels, 1, WHEELS),
@@ -77,23 +77,24 @@ def rails_at(table_pointer):
     )
 
 
-def to_joints(states: Array) -> Array:
-    """Joint positions and rates (..., 10) from states (..., 10)."""
+def joints_from_states(states: Array) -> Array:
+    """Joint positions and rates (..., 10) from a wheelset's states (..., 10)."""
     of_joints = states[..., _POSITIONS + _RATES]
     of_joints[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return of_joints
 
 
-def from_joints(joints: Array) -> Array:
-    """States (..., 10) from joint positions and rates (..., 10)."""
+def states_from_joints(joints: Array) -> Array:
+    """States (..., 10) of a wheelset from joint positions and rates (..., 10)."""
     states = np.empty(joints.shape)
     states[..., _POSITIONS + _RATES] = joints
     states[..., SPIN] += states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return states
 
 
-def rates_of(joints: Array, accelerations: Array) -> Array:
-    """Time derivative (10,) of the state, from positions and rates (10,) and accelerations (5,) of the joints."""
+def state_rates(joints: Array, accelerations: Array) -> Array:
+    """Time derivative (10,) of a wheelset's state, from positions and rates (10,) and accelerations (5,) of the
+    joints."""
     state_rate = np.empty(STATE_COUNT)
     state_rate[_POSITIONS], state_rate[_RATES] = joints[JOINTS:], accelerations
     roll, yaw_rate, roll_rate = joints[3], joints[JOINTS + 2], joints[JOINTS + 3]
@@ -103,12 +104,12 @@ def rates_of(joints: Array, accelerations: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(table_pointer, t, q, v, forces_out):
-    """Add the joints' forces (N, N m) to ``forces_out`` (5,). For callbacks: all arguments but the time are pointers to
-    doubles.
+    """Add the rails' forces on the joints (N, N m) to ``forces_out`` (5,). For callbacks: all arguments but the time
+    are pointers to doubles.
 
     The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
-    rails, speed = rails_at(table_pointer), records(table_pointer, 1, TABLE_HEAD)[0].speed
+    rails, speed = rails_from_table(table_pointer), records(table_pointer, 1, TABLE_HEAD)[0].speed
     y, z, yaw, roll, _ = array(q, (JOINTS,))
     y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
     joint_forces_view = array(forces_out, (JOINTS,))
@@ -117,7 +118,7 @@ def joint_forces(table_pointer, t, q, v, forces_out):
         return
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
-    room = room_for(rails.profile)
+    room = workspace_for(rails.profile)
     wheelset = room.wheelset[0]
     force, moment, velocity, turning = wheelset.force, wheelset.moment, wheelset.velocity, wheelset.turning
     velocity[0], velocity[1], velocity[2] = speed, y_rate, z_rate
@@ -135,8 +136,8 @@ def joint_forces(table_pointer, t, q, v, forces_out):
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
-    then the table."""
+    """Set ``f`` to the forces of ``joint_forces``. All data lie in one block of doubles at a memory address: f, q and v
+    (n,), then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

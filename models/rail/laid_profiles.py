@@ -1,4 +1,4 @@
-"""Profiles of wheels and rails as a wheelset has them, prepared for ``profile_contact``."""
+"""Wheel and rail profiles as a wheelset has them, prepared for the compiled contact of ``profile_contact``."""
 
 from functools import cache
 from itertools import pairwise
@@ -20,15 +20,16 @@ from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, L
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 NODE_SPACING, KNOT_SPACING = 1e-4, 2.5e-4
-"""Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
+"""Spacing (m) of the nodes along the wheel's contour and of the knots along the rail's."""
 LATERAL_SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
-"""Lateral displacements (m) at which first contact is looked for."""
+"""Lateral displacements (m) at which the first contact is computed."""
 CONTACT_JUMP, DISPLACEMENT_STEP = 3e-3, 1e-6
-"""Way (m) on the wheel that first contact must jump between displacements that are so close (m)."""
+"""Distance (m) on the wheel that first contact must jump; difference (m) of the two displacements between which it
+jumps."""
 RIDGE_HEIGHT = 1e-5
-"""Height (m) of the gap between both places of a jump from which on the patches are two."""
+"""Height (m) of the gap between both positions of a jump above which the patches count as two."""
 BLEND_HALF_LENGTH = 1e-3
-"""Half the length (m) over which one zone passes into the next."""
+"""Half the length (m) of the transition from one zone of the contour to the next."""
 
 
 class Profiles(Strict):
@@ -48,8 +49,9 @@ class Profiles(Strict):
     back_to_back: float = quantity("m", "between the backs of the flanges", default=1.360)
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
-    def located(self, scene: SceneFile) -> "Profiles":
-        """These profiles with full paths of the files; InputError for a name that is neither a file nor built in."""
+    def with_full_paths(self, scene: SceneFile) -> "Profiles":
+        """These profiles with full paths of the files. Raises InputError for a name that is neither a file nor built
+        in."""
         files = {}
         for kind, known in BUILT_IN.items():
             name = getattr(self, kind)
@@ -59,8 +61,8 @@ class Profiles(Strict):
                 raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(known))
         return self.model_copy(update=files)
 
-    def side(self, radius: float) -> WheelAndRail:
-        """The right wheel with a radius (m) on its rail; raises InputError for files that contain no profile."""
+    def wheel_on_rail(self, radius: float) -> WheelAndRail:
+        """The right wheel with a radius (m) on its rail. Raises InputError for files that contain no profile."""
         rail = _contact_profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _contact_profile(self.wheel, "wheel", self.smoothing),
@@ -68,12 +70,12 @@ class Profiles(Strict):
             Wheelset(radius, self.back_to_back, self.taping),
         )
 
-    def touching(self, radius: float, lateral_shift: float) -> tuple[float, float]:
-        """Rise of the wheelset (m) from its height at the track's middle, and roll (rad), at which both wheels just
-        touch; InputError if they cannot."""
-        side = self.side(radius)
-        pose = touching_pose(side, lateral_shift, 0.0)
-        return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
+    def first_touch_pose(self, radius: float, lateral_shift: float) -> tuple[float, float]:
+        """Rise (m) of the wheelset from its height in the middle of the track, and roll (rad), at which both wheels
+        just touch at a lateral displacement (m). Raises InputError if they cannot."""
+        wheel_on_rail = self.wheel_on_rail(radius)
+        pose = touching_pose(wheel_on_rail, lateral_shift, 0.0)
+        return pose.fall - wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
 def _contact_profile(name: str, profile_kind: Kind, smoothing: float) -> ContactProfile:
@@ -90,20 +92,22 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
     """``LaidProfile`` that ``profile_on_rail`` reads, for wheels with a radius (m) at the taping line."""
     from scipy.interpolate import CubicSpline
 
-    side = profiles.side(radius)
-    tip = int(np.argmax(side.wheel.z))
-    y = _evenly_spaced(side.wheel.y[tip:], side.wheel.z[tip:], NODE_SPACING)
-    curve = side.wheel.curve
+    wheel_on_rail = profiles.wheel_on_rail(radius)
+    tip = int(np.argmax(wheel_on_rail.wheel.z))
+    y = _evenly_spaced(wheel_on_rail.wheel.y[tip:], wheel_on_rail.wheel.z[tip:], NODE_SPACING)
+    curve = wheel_on_rail.wheel.curve
     touched = [
-        (shift, touch[0]) for shift in LATERAL_SHIFTS.tolist() if (touch := _first_contact(side, shift)) is not None
+        (shift, touch[0])
+        for shift in LATERAL_SHIFTS.tolist()
+        if (touch := _first_contact(wheel_on_rail, shift)) is not None
     ]
-    cuts = [cut for cut in (_ridge_position(side, *pair) for pair in pairwise(touched)) if cut is not None]
+    cuts = [cut for cut in (_ridge_position(wheel_on_rail, *pair) for pair in pairwise(touched)) if cut is not None]
     nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones_of_positions(y, cuts)])
-    knots = _evenly_spaced(side.rail.y, side.rail.z, KNOT_SPACING)
-    cubic = CubicSpline(knots, side.rail.curve(knots)).c
+    knots = _evenly_spaced(wheel_on_rail.rail.y, wheel_on_rail.rail.z, KNOT_SPACING)
+    cubic = CubicSpline(knots, wheel_on_rail.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
-    level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
-    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, side.wheelset.arm, level]]
+    level = wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
+    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, wheel_on_rail.wheelset.arm, level]]
     return LaidProfile(
         *(_read_only_records(*pair) for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE), (rail, RAIL_KNOT)))
     )
@@ -128,8 +132,8 @@ def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
 
 
 def _first_contact(wheel_and_rail: WheelAndRail, lateral_shift: float) -> tuple[float, Array, Array] | None:
-    """Position of first contact on the wheel (m from the taping line), all positions of the outline and their gaps (m).
-    None where the profiles do not meet."""
+    """Position of first contact on the wheel (m from the taping line), all positions of the outline, and their gaps
+    (m). None where the profiles do not meet."""
     try:
         pose = touching_pose(wheel_and_rail, lateral_shift, 0.0)
     except InputError:
@@ -142,8 +146,8 @@ def _first_contact(wheel_and_rail: WheelAndRail, lateral_shift: float) -> tuple[
 def _ridge_position(
     wheel_and_rail: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]
 ) -> float | None:
-    """Position of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after`` are
-    pairs (shift, position). None if contact does not jump between them."""
+    """Position (m) of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after``
+    are pairs (shift, position). None if contact does not jump between them."""
     while abs(touch_after[1] - touch_before[1]) > CONTACT_JUMP:
         middle = (touch_before[0] + touch_after[0]) / 2.0
         touch = _first_contact(wheel_and_rail, middle)

@@ -1,4 +1,4 @@
-"""Limit cycles of a wheelset by shooting, those that attract and those that only part two behaviours; their branch.
+"""Limit cycles of a wheelset by the shooting method, stable and unstable ones, and their branch over the speed.
 
 An orbit begins where the lateral displacement is at its maximum, the amplitude. It is marched with a whole number of
 steps to the period, so that halving the step asks the same question again. Newton's method makes the state come back;
@@ -32,42 +32,43 @@ from models.rail.wheelset import Wheelset
 
 SoughtQuantity = Literal["amplitude", "speed"]
 STATE_SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
-"""Of the states (m, rad, m/s, rad/s): what a difference of each is measured by."""
+"""Typical sizes of the states (m, rad, m/s, rad/s), by which differences of the states are scaled."""
 CLOSURE_TOLERANCE = 1e-9
-"""Largest difference of start and end, by STATE_SIZES, of a state that has come back."""
+"""Largest scaled difference between the start and end of a period at which the orbit counts as closed."""
 DIFFERENCE_SHARE = 1e-2
-"""Of the sizes, of 1 m/s and the period: steps of the central differences that linearise the return, wide enough to
-reach over the kinks that cells of FASTSIM make where they begin to slide."""
+"""Steps of the central differences that linearise the return map, as a share of the typical sizes, of 1 m/s and of the
+period. They are wide enough to reach over the kinks that FASTSIM's cells make where they begin to slide."""
 MOST_NEWTON_STEPS, LEAST_GAIN = 15, 0.3
-"""Corrections at most; share of the difference that one may leave before the return is linearised anew."""
+"""Largest count of Newton corrections; share of the mismatch that a correction may leave before the return map is
+linearised anew."""
 DISPLACED_GUESS = 0.01
-"""Share by which a guess for other equations is displaced, so that they find the orbit by themselves."""
+"""Share by which a guess for other equations is displaced, so that they find the orbit independently."""
 AMPLITUDE_HALVINGS = 5
-"""Of the way to the next amplitude, where Newton's method does not reach it at once."""
+"""Largest count of halvings of the interval to the next amplitude, where Newton's method does not reach it at once."""
 RETURNING_STATES = [k for k in range(STATE_COUNT) if k != ANGLE]
-"""States that must come back; the angle of spin does not."""
+"""Indices of the states that must return after a period; the angle of spin does not."""
 SPEED_COLUMN, PERIOD_COLUMN = len(RETURNING_STATES), len(RETURNING_STATES) + 1
-"""Columns of the slopes after those of the states."""
+"""Columns of the slopes with respect to speed and period, after those of the states."""
 AMPLITUDE_INDEX, RATE_INDEX = RETURNING_STATES.index(Y), RETURNING_STATES.index(Y_RATE)
 SECTION_COORDINATES = [k for k in range(len(RETURNING_STATES)) if k != RATE_INDEX]
 """Indices of the coordinates that span the Poincaré section."""
 DECAYED_DISPLACEMENT = 1e-5
-"""Displacement (m) below which a motion has died out."""
+"""Lateral displacement (m) below which a motion counts as decayed."""
 MARCH_DURATION, MOST_MARCHES = 2.0, 20
-"""Seconds of one march towards the cycle, and how many there are at most."""
+"""Duration (s) of one integration towards the cycle, and largest count of integrations."""
 AMPLITUDE_CHANGE = 2e-3
-"""Relative change of the amplitude from cycle to cycle from which Newton's method takes over."""
+"""Relative change of the amplitude from cycle to cycle below which Newton's method takes over."""
 FIRST_AMPLITUDES = (0.1, 0.2, 0.4)
-"""Amplitudes at which a branch may begin, by the clearance of the flanges: of the smallest that leads to an orbit."""
+"""Ratios of amplitude to flange clearance at which a branch may begin; the smallest that leads to an orbit is taken."""
 INNER_AMPLITUDES, OUTER_STEP = 12, 0.03
-"""Amplitudes of a branch up to the clearance; step of those beyond, by the clearance."""
+"""Count of amplitudes of a branch up to the flange clearance; step of the ratio of amplitude to clearance beyond."""
 LARGEST_AMPLITUDE = 2.0
-"""Amplitude at which a branch ends, by the clearance."""
+"""Ratio of amplitude to flange clearance at which a branch ends."""
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One periodic motion. state (10,) : at a maximum of y; period : s, with the number of steps in it.
+    """A periodic motion of a wheelset. state (10,) : at a maximum of y; period : s, with the number of steps in it.
 
     slopes (9, 11) : derivatives of the state after a period (without the angle of spin) with respect to the state
     before, the speed and the period, in units of STATE_SIZES, 1 m/s and the period. error : change of the unknown when
@@ -77,8 +78,8 @@ class Orbit:
     equations: Equations
     state: Array
     period: float
-    steps: int
-    slopes: Array
+    step_count: int
+    return_slopes: Array
     error: float = math.nan
     frequency_error: float = math.nan
 
@@ -94,24 +95,24 @@ class Orbit:
 
     @property
     def frequency(self) -> float:
-        """Frequency of the limit cycle (Hz)."""
+        """Frequency of the periodic motion (Hz)."""
         return 1.0 / self.period
 
     @property
     def multiplier(self) -> float:
-        """Largest magnitude of the Floquet multipliers."""
-        by_states, back = self.slopes[:, : len(RETURNING_STATES)], self.slopes[:, PERIOD_COLUMN]
+        """Largest magnitude of the Floquet multipliers of the orbit; it is stable below 1."""
+        by_states, back = self.return_slopes[:, : len(RETURNING_STATES)], self.return_slopes[:, PERIOD_COLUMN]
         returned = by_states - np.outer(back, by_states[RATE_INDEX]) / back[RATE_INDEX]
         return float(np.abs(np.linalg.eigvals(returned[np.ix_(SECTION_COORDINATES, SECTION_COORDINATES)])).max())
 
     @property
     def stable(self) -> bool:
-        """Whether neighbouring motions approach this one."""
+        """Whether neighbouring motions approach this orbit."""
         return self.multiplier < 1.0
 
     def path(self) -> WheelsetPath:
-        """Path over one period, with its start and end."""
-        return self.equations.run(self.state, self.period, self.period / self.steps)
+        """Motion of the wheelset over one period, including both ends."""
+        return self.equations.run(self.state, self.period, self.period / self.step_count)
 
 
 def guess_near_state(
@@ -121,7 +122,9 @@ def guess_near_state(
     most ``step`` (s)."""
     start = state.copy()
     start[Y_RATE] = 0.0
-    return _with_slopes(Orbit(equations, start, orbit_period, math.ceil(orbit_period / step), np.empty(0)), executor)
+    return _with_return_slopes(
+        Orbit(equations, start, orbit_period, math.ceil(orbit_period / step), np.empty(0)), executor
+    )
 
 
 def orbit_of_small_amplitude(
@@ -155,7 +158,7 @@ def guess_from_orbit(known_orbit: Orbit, equations: Equations) -> Orbit:
 
 
 def branch_of_orbits(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
-    """Orbits of successive amplitudes (m), each continued from the ones before; the speed of each is solved for.
+    """Orbits of successive amplitudes (m), each continued from the two before; the speed of each is solved for.
 
     Raises RunFailed where the branch cannot be followed.
     """
@@ -171,8 +174,8 @@ def branch_of_orbits(first: Orbit, amplitudes: Iterable[float], executor: Execut
 def _continued_orbit(
     earlier_orbit: Orbit, latest_orbit: Orbit, amplitude: float, halvings: int, executor: Executor | None
 ) -> Orbit:
-    """Orbit of an amplitude, predicted on the straight line through two earlier orbits; the interval is halved if this
-    fails."""
+    """Orbit of an amplitude (m), predicted on the straight line through two earlier orbits; the interval is halved if
+    this fails."""
     amplitude_change = latest_orbit.amplitude - earlier_orbit.amplitude
     share = (amplitude - latest_orbit.amplitude) / amplitude_change
     state = latest_orbit.state + share * (latest_orbit.state - earlier_orbit.state)
@@ -200,8 +203,8 @@ def _continued_orbit(
 def solved_orbit(
     orbit_guess: Orbit, sought_quantity: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
 ) -> Orbit:
-    """Orbit near a guess. ``sought_quantity`` is solved for: speed or amplitude, while the other keeps the guess's
-    value. A precise one gets its own slopes.
+    """Orbit near a guess. ``sought_quantity`` is solved for: speed or amplitude; the other keeps the guess's value. A
+    precise orbit gets slopes computed about itself.
 
     The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
     Raises RunFailed if none is found.
@@ -209,15 +212,15 @@ def solved_orbit(
     orbit, fresh, left = orbit_guess, False, math.inf
     for _ in range(MOST_NEWTON_STEPS):
         try:
-            end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
+            end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.step_count)
         except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
             break
         missed = ((end - orbit.state) / STATE_SIZES)[RETURNING_STATES]
         size = float(np.abs(missed).max())
         if size < CLOSURE_TOLERANCE:
-            return orbit if fresh or not precise else _with_slopes(orbit, executor)
+            return orbit if fresh or not precise else _with_return_slopes(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
-            orbit, fresh = _with_slopes(orbit, executor), True
+            orbit, fresh = _with_return_slopes(orbit, executor), True
         orbit, left, fresh = _newton_corrected(orbit, missed, sought_quantity), size, False
     raise RunFailed(
         "wheelset", f"no periodic motion was found near {orbit_guess.speed:.6g} m/s and {orbit_guess.amplitude:.3g} m"
@@ -225,9 +228,9 @@ def solved_orbit(
 
 
 def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor: Executor | None = None) -> Orbit:
-    """The orbit computed with half the step, with the changes of its speed or amplitude and of its frequency."""
+    """Orbit computed with half the step, with the changes of its speed or amplitude and of its frequency as errors."""
     half = solved_orbit(
-        replace(known_orbit, steps=2 * known_orbit.steps), sought_quantity, precise=False, executor=executor
+        replace(known_orbit, step_count=2 * known_orbit.step_count), sought_quantity, precise=False, executor=executor
     )
     return replace(
         half,
@@ -236,18 +239,18 @@ def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor:
     )
 
 
-def _state_after(equations: Equations, state: Array, orbit_period: float, steps: int) -> Array:
-    return equations.run(state, orbit_period, orbit_period / steps, steps).states[-1]
+def _state_after(equations: Equations, state: Array, orbit_period: float, step_count: int) -> Array:
+    return equations.run(state, orbit_period, orbit_period / step_count, step_count).states[-1]
 
 
-Guess = tuple[Equations, Array, float]
-"""Equations, state (10,) and period (s)."""
+OrbitGuess = tuple[Equations, Array, float]
+"""Start of an orbit: equations, state (10,) and period (s)."""
 
 
-def _with_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
-    """The orbit with slopes computed about itself."""
+def _with_return_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
+    """The orbit with the derivatives of its return map computed about itself."""
     eq, T, state, signs = known_orbit.equations, known_orbit.period, known_orbit.state, (-1.0, 1.0)
-    pairs: list[list[Guess]] = [
+    pairs: list[list[OrbitGuess]] = [
         *(
             [(eq, state + sign * DIFFERENCE_SHARE * STATE_SIZES[k] * np.eye(STATE_COUNT)[k], T) for sign in signs]
             for k in RETURNING_STATES
@@ -255,25 +258,25 @@ def _with_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
         [(replace(eq, speed=eq.speed + sign * DIFFERENCE_SHARE), state, T) for sign in signs],
         [(eq, state, T * (1.0 + sign * DIFFERENCE_SHARE)) for sign in signs],
     ]
-    ends = block_results(partial(_ends_of_period, steps=known_orbit.steps), pairs, executor)
+    ends = block_results(partial(_ends_of_period, step_count=known_orbit.step_count), pairs, executor)
     columns = [
         ((end_after - end_before) / (2.0 * DIFFERENCE_SHARE * STATE_SIZES))[RETURNING_STATES]
         for end_before, end_after in ends
     ]
-    return replace(known_orbit, slopes=np.array(columns).T)
+    return replace(known_orbit, return_slopes=np.array(columns).T)
 
 
-def _ends_of_period(guess_pair: list[Guess], steps: int) -> list[Array]:
-    return [_state_after(*guess, steps) for guess in guess_pair]
+def _ends_of_period(guess_pair: list[OrbitGuess], step_count: int) -> list[Array]:
+    return [_state_after(*guess, step_count) for guess in guess_pair]
 
 
-def _newton_corrected(known_orbit: Orbit, missed: Array, sought_quantity: SoughtQuantity) -> Orbit:
-    """The orbit after one Newton correction with its slopes; the lateral rate stays zero."""
-    returned = known_orbit.slopes.copy()
+def _newton_corrected(known_orbit: Orbit, mismatch: Array, sought_quantity: SoughtQuantity) -> Orbit:
+    """The orbit after a Newton correction with its slopes; the lateral rate stays zero."""
+    returned = known_orbit.return_slopes.copy()
     returned[:, : len(RETURNING_STATES)] -= np.eye(len(RETURNING_STATES))
     free = [k for k in SECTION_COORDINATES if k != AMPLITUDE_INDEX]
     columns = [*free, AMPLITUDE_INDEX if sought_quantity == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
-    *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
+    *section, change, longer = -np.linalg.solve(returned[:, columns], mismatch)
     state, speed = known_orbit.state.copy(), known_orbit.speed
     state_indices = [RETURNING_STATES[k] for k in free]
     state[state_indices] += section * STATE_SIZES[state_indices]
@@ -288,8 +291,8 @@ def _newton_corrected(known_orbit: Orbit, missed: Array, sought_quantity: Sought
 def attained_cycle(
     equations: Equations, *, start_displacement: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
 ) -> Orbit | None:
-    """The limit cycle that a wheelset reaches from a lateral displacement ``start_displacement`` (m); None if the
-    motion dies out.
+    """Limit cycle that a wheelset reaches from a lateral displacement ``start_displacement`` (m); None if the motion
+    decays.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
@@ -310,18 +313,22 @@ def attained_cycle(
     )
 
 
-def positive_maxima(values: Array) -> np.ndarray:
+def positive_maxima(samples: Array) -> np.ndarray:
     """Indices of the positive local maxima."""
-    previous_values, middle_values, next_values = values[:-2], values[1:-1], values[2:]
+    previous_values, middle_values, next_values = samples[:-2], samples[1:-1], samples[2:]
     return 1 + np.flatnonzero(
         (middle_values > previous_values) & (middle_values >= next_values) & (middle_values > 0.0)
     )
 
 
 def bifurcation(
-    equations: Equations, slowest: float, fastest: float, step: float = 5e-4, executor: Executor | None = None
+    equations: Equations,
+    lowest_speed: float,
+    highest_speed: float,
+    step: float = 5e-4,
+    executor: Executor | None = None,
 ) -> Iterator[Orbit]:
-    """Limit cycles of increasing amplitude, from the critical speed on until a cycle's speed leaves a range (m/s).
+    """Limit cycles of increasing amplitude, from the critical speed on until the speed of a cycle leaves a range (m/s).
 
     Each at half the step (s), with the changes that halving made: of the speed, and of the frequency. Raises
     NoCriticalSpeed if no branch begins, RunFailed where it cannot be followed.
@@ -339,7 +346,7 @@ def bifurcation(
     yield refined_orbit(first, "speed", executor)
     for amplitudes in (inner, outer):
         for orbit in branch_of_orbits(first, amplitudes, executor):
-            if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST_AMPLITUDE * clearance:
+            if not lowest_speed <= orbit.speed <= highest_speed or orbit.amplitude > LARGEST_AMPLITUDE * clearance:
                 return
             first = orbit
             yield refined_orbit(orbit, "speed", executor)

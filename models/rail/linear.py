@@ -1,4 +1,4 @@
-"""Lateral and yaw motion of a conical wheelset at small displacement, with Kalker's linear theory of creep forces.
+"""Linear lateral and yaw motion of a conical wheelset, with Kalker's linear theory of creep forces.
 
 Coordinates are y and psi (yaw); roll and height follow from both cones touching their rails. With c the conicity,
 g = atan c, r the radius, b half the distance of the contacts and R the radius of the rails' heads, geometry gives,
@@ -29,16 +29,16 @@ from models.core.errors import InputError
 from models.rail.wheelset import Wheelset
 
 LOWEST_SPEED, HIGHEST_SPEED = 1.0, 200.0
-"""Speeds (m/s) between which a critical one is looked for."""
-SPEEDS_TRIED = 60
-"""Speeds that are tried on the way from the lowest to the highest."""
+"""Speeds (m/s) between which a critical speed is searched."""
+SPEED_COUNT = 60
+"""Count of speeds tried between the lowest and the highest."""
 SPEED_PRECISION = 1e-12
-"""Relative, of a critical speed."""
+"""Relative precision of a critical speed."""
 
 
 class NoCriticalSpeed(InputError):
-    """A wheelset does not change from stable to unstable at any speed; ``unstable`` is whether it is always
-    unstable."""
+    """Error of a wheelset that does not change from stable to unstable at any speed; ``unstable`` is whether it is
+    always unstable."""
 
     def __init__(self, unstable: bool) -> None:
         self.unstable = unstable
@@ -54,7 +54,8 @@ class NoCriticalSpeed(InputError):
 
 @dataclass(frozen=True)
 class LinearWheelset:
-    """Linear equations M q'' + D q' + K q = 0 for q = (y, psi); matrices (2, 2), SI units."""
+    """Linear equations of motion M q'' + D q' + K q = 0 of a wheelset for q = (y, psi), lateral displacement and yaw;
+    matrices (2, 2), SI units."""
 
     mass: Array
     damping: Array
@@ -62,46 +63,50 @@ class LinearWheelset:
 
     @property
     def state_matrix(self) -> Array:
-        """A (4, 4) of the state (y, psi, y', psi')."""
+        """State matrix A (4, 4) of the state (y, psi, y', psi')."""
         rates = -np.linalg.solve(self.mass, np.hstack([self.stiffness, self.damping]))
         return np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), rates])
 
 
 def klingel_wavelength(wheelset: Wheelset) -> float:
-    """Wavelength (m) of the free wheelset without slip; Klingel's formula but for the heads' radius (see above)."""
+    """Wavelength (m) of the free wheelset without slip: Klingel's formula, extended by the radius of the rails' heads
+    (see above)."""
     r, b, head = wheelset.radius, wheelset.half_gauge, wheelset.head_radius
-    return 2.0 * math.pi * math.sqrt(r * b * b / (wheelset.conicity * (b + head * wheelset.slant[0])))
+    return 2.0 * math.pi * math.sqrt(r * b * b / (wheelset.conicity * (b + head * wheelset.cone_sine_and_cosine[0])))
 
 
 def kalker_matrix(wheelset: Wheelset) -> Array:
-    """Negative forces (3, 3) per creepage of one wheel: rows -fx, -fy, -mz, columns xi_x, xi_y, spin; N, N m, N m^2."""
-    contact, pair = wheelset.ellipse, wheelset.pair
+    """Matrix (3, 3) of Kalker's linear theory, negative creep forces of one wheel per creepage: rows -fx, -fy, -mz,
+    columns xi_x, xi_y, spin; N, N m, N m^2."""
+    contact, pair = wheelset.ellipse, wheelset.material_pair
     c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
     turn = area**1.5 * c.c23
     return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
 
 
 def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
-    """``LinearWheelset`` at a speed (m/s), which must be above 0; raises InputError otherwise."""
+    """``LinearWheelset`` at a speed (m/s), which must be above 0. Raises InputError otherwise."""
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker_matrix(wheelset)
-    gyroscopic = w.tilt * w.spin_inertia * speed / w.radius
+    gyroscopic = w.roll_per_displacement * w.spin_inertia * speed / w.radius
     arm = w.half_spacing**2  # of the suspension; roll goes with the lateral displacement
-    damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
-    stiffness = 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
+    damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.roll_per_displacement**2, w.damping_x * arm])
+    stiffness = 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.roll_per_displacement**2, w.stiffness_x * arm])
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
-    stiffness += gravity(w)
+    stiffness += gravity_stiffness(w)
     for motion, displacement in _contact_kinematics(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ displacement
-    return LinearWheelset(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
+    return LinearWheelset(
+        np.diag([w.mass + w.yaw_inertia * w.roll_per_displacement**2, w.yaw_inertia]), damping, stiffness
+    )
 
 
 def _contact_kinematics(w: Wheelset) -> list[tuple[Array, Array]]:
     """Linear kinematics of the right and the left wheel: matrices (3, 2) from (y', psi') / V and from (y, psi) to the
-    creepages and spin."""
-    cosine, b = w.slant[1], w.half_gauge
+    two creepages and spin."""
+    cosine, b = w.cone_sine_and_cosine[1], w.half_gauge
     across = b / (b - w.conicity * w.radius) / cosine
     return [
         (
@@ -112,15 +117,18 @@ def _contact_kinematics(w: Wheelset) -> list[tuple[Array, Array]]:
     ]
 
 
-def gravity(w: Wheelset) -> Array:
-    """Stiffness matrix of the load, which is raised by lateral displacement y and lowered by yaw."""
+def gravity_stiffness(w: Wheelset) -> Array:
+    """Stiffness matrix (2, 2) of the weight on the wheelset, which lateral displacement y raises and yaw lowers."""
     b, c = w.half_gauge, w.conicity
-    rise = 2.0 * w.tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * w.tilt**2
+    rise = (
+        2.0 * w.roll_per_displacement
+        + (c * b + w.radius + w.head_radius / w.cone_sine_and_cosine[1]) * w.roll_per_displacement**2
+    )
     return w.load * np.diag([rise, -c * (b - c * w.radius)])
 
 
 def kinematic_wavelength(wheelset: Wheelset) -> float:
-    """Wavelength (m) from the eigenvalues of a wheelset with creep forces only: no inertia, suspension or weight."""
+    """Wavelength (m) from the eigenvalues of a wheelset with creep forces alone: no inertia, suspension or weight."""
     creep = kalker_matrix(wheelset)
     motion, displacement = (sum(pair[0].T @ creep @ pair[k] for pair in _contact_kinematics(wheelset)) for k in (0, 1))
     values = np.linalg.eigvals(-np.linalg.solve(motion, displacement))
@@ -128,7 +136,7 @@ def kinematic_wavelength(wheelset: Wheelset) -> float:
 
 
 def largest_growth(wheelset: Wheelset, speed: float) -> float:
-    """Largest real part (1/s) of the eigenvalues at a speed (m/s)."""
+    """Largest real part (1/s) of the linear wheelset's eigenvalues at a speed (m/s)."""
     return float(np.linalg.eigvals(linear_matrices(wheelset, speed).state_matrix).real.max())
 
 
@@ -138,7 +146,7 @@ def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float
     growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed if the
     wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
     """
-    speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEEDS_TRIED)
+    speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEED_COUNT)
     slower = speeds[0]
     if growth(wheelset, slower) >= 0.0:
         raise NoCriticalSpeed(unstable=True)
@@ -151,10 +159,10 @@ def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float
     raise NoCriticalSpeed(unstable=False)
 
 
-def critical_or_why(
+def critical_speed_or_reason(
     wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = largest_growth
 ) -> tuple[float | None, str]:
-    """The critical speed (m/s) and "", or None and the reason, as words that continue "the wheelset"."""
+    """Critical speed (m/s) of the wheelset and "", or None and the reason, as words that continue "the wheelset"."""
     try:
         return critical_speed(wheelset, growth), ""
     except NoCriticalSpeed as error:

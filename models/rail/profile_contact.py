@@ -1,4 +1,5 @@
-"""Compiled contact of a wheel and a rail of any cross-section: its patches, each with depth, normal and curvatures.
+"""Compiled contact of a wheel and a rail of any cross-section: its contact patches, each with penetration, normal and
+curvatures.
 
 The wheel is a body of revolution. Of each of its circles one point is nearest to a straight rail, with roll and yaw in
 it (the outline of ``models.contact.wheel_on_rail``); how deep it lies in the rail along the rail's normal is its depth
@@ -32,15 +33,15 @@ from models.machine.compiled import lean, njit
 from models.machine.records import record
 
 PROFILE_COUNTS = record("zones", "nodes", "knots", "spacing", "arm", "level")
-"""Counts of zones, of the wheel's nodes and of the rail's knots; distance of the nodes along the contour (m), distance
-of the taping line from the middle of the axle, height of the axle over the rail's top where both wheels just touch in
-the middle of the track."""
+"""Head of a laid profile: counts of zones, of the wheel's nodes and of the rail's knots; spacing of the nodes along the
+contour (m), distance of the taping line from the middle of the axle (m), height of the axle over the rail's top where
+both wheels just touch in the middle of the track (m)."""
 WHEEL_NODE = record("y", "radius", "slope", "zone")
-"""Of the wheel: place from the taping line (m), radius (m), slope and zone."""
+"""Node of the wheel's contour: position from the taping line (m), radius (m), slope and zone."""
 RAIL_KNOT = record("y", "c0", "c1", "c2", "c3")
-"""Of the rail: place from the middle of the track (m) and the coefficients of the cubic beyond it."""
+"""Knot of the rail's contour: position from the middle of the track (m) and the coefficients of the cubic beyond it."""
 TOUCH = record("depth", "n_y", "n_z", "x", "y", "z", "along", "across")
-"""A contact: penetration (m), normal into the rail, place from the wheelset's centre in the track's axes (m),
+"""Contact patch: penetration (m), normal into the rail, position from the wheelset's centre in the track's axes (m),
 curvatures A and B of the undeformed distance along and across (1/m)."""
 _SUMS = record("w2", "w3", "s1", "s2", "n_y", "n_z", "x", "y", "z", "radius")
 
@@ -55,7 +56,7 @@ class Pose(NamedTuple):
 
 
 class LaidProfile(NamedTuple):
-    """Profiles of a wheel and its rail as records: PROFILE_COUNTS (1,), WHEEL_NODE (nodes,), RAIL_KNOT (knots,)."""
+    """Wheel and rail profile as records: PROFILE_COUNTS (1,), WHEEL_NODE (nodes,), RAIL_KNOT (knots,)."""
 
     head: Array
     nodes: Array
@@ -63,22 +64,23 @@ class LaidProfile(NamedTuple):
 
 
 COARSE_NODES = 5
-"""Nodes from one to the next that is always looked at."""
+"""Distance, in nodes, of the nodes that are always evaluated."""
 SEARCH_MARGIN = 2e-5
-"""Depth (m) below the rail up to which the nodes between are looked at as well: two radii of 13 mm rise by 5e-6."""
+"""Height (m) over the rail up to which the nodes between are evaluated as well: two radii of 13 mm rise by 5e-6."""
 FAR_HEIGHT = 1e-3
-"""Height (m) over the rail at which no slope of a rail leaves less than the margin."""
+"""Height (m) over the rail above which a node is out of contact whatever the slope of the rail is."""
 SHARE_SWEEPS = 6
-"""Times that the patches' shares are found anew; each makes the error of the last some hundred times less."""
+"""Count of iterations of the patches' loads; each makes the error some hundred times smaller."""
 SHARPEST_CURVATURE = 500.0
-"""Curvature (1/m) of a patch that only one node lies in."""
+"""Curvature (1/m) of a patch that contains a single node."""
 _LEAST_DEPTH_SQUARE = 1e-40
-"""m^2: sums of squares of depths far below an atom's are none."""
+"""Sum of squares of depths (m^2) below which there is no contact."""
 
 
 @njit(cache=True, error_model="numpy")
 def profile_on_rail(wheel_side, pose, profile, modulus, touches):
-    """Fill ``touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or less is no contact.
+    """Fill the contact patches ``touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or
+    less is no contact.
 
     pose : ``Pose``; profile : ``LaidProfile``; modulus : E* (Pa).
     """
@@ -108,7 +110,8 @@ def profile_on_rail(wheel_side, pose, profile, modulus, touches):
 
 @lean
 def _pose_of_wheel(y, z, roll, yaw):
-    """Position, cosines and sines of roll and yaw, and factors for the point of a wheel circle nearest to the rail."""
+    """Position (m), cosines and sines of roll and yaw, and factors for the point of a wheel circle nearest to the
+    rail."""
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     lead = sr * sy / cy
     level = 1.0 / math.sqrt(1.0 + lead * lead)
@@ -117,8 +120,8 @@ def _pose_of_wheel(y, z, roll, yaw):
 
 @lean
 def _node_contact(node, wheel_pose, rail_head, knots, knot):
-    """Contact of one node's circle: depth along the rail's normal (m), position x, y, z from the centre, slope of the
-    rail, and the index of the knot."""
+    """Contact of the wheel circle through a node: depth along the rail's normal (m), position x, y, z from the centre
+    (m), slope of the rail, and the index of the knot."""
     y, z, cr, sr, cy, sy, lead, level, steer = wheel_pose
     sine = min(1.0, max(-1.0, -node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
@@ -173,7 +176,7 @@ def _add_node(node, node_contact, length, zone_sums):
 
 @lean
 def _fill_touch(wheel_side, zone_sums, wheel_pose, touch):
-    """Fill one touch from the sums of its zone."""
+    """Fill a contact patch from the sums of its zone."""
     touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
     weight_sum = zone_sums.w2
     if weight_sum <= _LEAST_DEPTH_SQUARE:
@@ -220,7 +223,8 @@ def settle_depths(touches, modulus):
 
 @lean
 def _cosine_of_normals(first_touch, second_touch, squares):
-    """Ratio (1/m) of the cosine between the normals of two touches to their distance, which ``squares`` enlarge."""
+    """Ratio (1/m) of the cosine between the normals of two patches to their distance; ``squares`` (m^2) are added to
+    the squared distance."""
     squared_distance = (
         (first_touch.x - second_touch.x) ** 2
         + (first_touch.y - second_touch.y) ** 2

@@ -1,4 +1,5 @@
-"""A wheelset on profiles at rest on smooth rails, held sideways: heights, loads, and the cones that steer alike."""
+"""Static equilibrium of a wheelset with profiles on smooth rails at a lateral displacement, and the cones that steer
+like the profiles."""
 
 from dataclasses import dataclass
 
@@ -13,24 +14,24 @@ from models.rail.wheel_forces import contact_points, count_of_patches, rails_of
 from models.rail.wheelset import Wheelset
 
 CHANGE_SIZE = 1e-5
-"""Size (m, rad) of the changes that contact yields."""
+"""Scale (m, rad) of the changes of height and roll that the search makes."""
 LOAD_PRECISION = 1e-9
-"""Share of the load to which each wheel's is found."""
+"""Relative precision of each wheel's load."""
 SHIFT_COUNT = 16
-"""Lateral displacements up to the amplitude at which the rolling radii are found."""
+"""Count of lateral displacements up to the amplitude at which rolling radii are computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """Static position of a wheelset: height z (m) and roll (rad), its touches, TOUCH (patches,), and their loads
-    (patches,) in N, those of the right wheel first."""
+    """Static position of a wheelset: height z (m) and roll (rad), its contact patches, TOUCH (patches,), and their
+    loads (patches,) in N, those of the right wheel first."""
 
     z: float
     roll: float
     touches: Array
     loads: Array
 
-    def radii(self) -> Array:
+    def rolling_radii(self) -> Array:
         """Rolling radii (2,) of the right and the left wheel (m); each is the load-weighted mean over the wheel's
         patches."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
@@ -48,7 +49,7 @@ def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
     if wheelset.profiles is None:
         raise InputError("", "wheelset", None, "has cones: this needs profiles")
     rails, half = rails_of(wheelset), 0.5 * wheelset.load
-    z, roll = wheelset.profiles.touching(wheelset.radius, lateral_shift)
+    z, roll = wheelset.profiles.first_touch_pose(wheelset.radius, lateral_shift)
 
     def pose(unknowns: Array) -> Equilibrium:
         touches = np.zeros(count_of_patches(rails.profile), TOUCH)
@@ -76,5 +77,7 @@ def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     """The wheelset on cones with the equivalent conicity that its profiles have at an amplitude (m), for
     ``models.rail.linear``."""
     shifts = np.linspace(0.0, amplitude, SHIFT_COUNT + 1)
-    differences = np.array([0.0, *(-np.diff(equilibrium(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
+    differences = np.array(
+        [0.0, *(-np.diff(equilibrium(wheelset, float(shift)).rolling_radii())[0] for shift in shifts[1:])]
+    )
     return wheelset.coned(harmonic_linearised_conicity(shifts, differences, amplitude)).changed(profiles=None)

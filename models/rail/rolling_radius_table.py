@@ -1,4 +1,4 @@
-"""Tables of the difference of rolling radii over the lateral displacement of a wheelset.
+"""Tables of the rolling radius difference of a wheelset over its lateral displacement.
 
 The difference dr is the rolling radius of the right wheel less that of the left one; the displacement y is positive to
 the right, so that dr rises with y where a wheelset steers back to the middle. Between two rows dr is a straight line;
@@ -21,14 +21,15 @@ from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
 TABLE_COLUMNS = {"y": METRES, "dr": METRES}
-"""Of a file: displacement to the right, rolling radius of the right wheel less that of the left one."""
+"""Columns of a file: displacement to the right, and rolling radius of the right wheel minus that of the left one."""
 FEWEST_ROWS = 3
-"""Rows of a table."""
+"""Smallest count of rows of a table."""
 
 
 @dataclass(frozen=True, eq=False)
 class RollingRadiusTable:
-    """displacements (n,), rising but for pairs that are jumps, and differences (n,), in one unit of length.
+    """Rolling radius difference over lateral displacement: displacements (n,), rising but for pairs that are jumps, and
+    differences (n,), in one unit of length.
 
     source : the file, for messages. Descending rows are turned round. Raises InputError for values that are not finite,
     fewer than three rows, rows out of order, and three rows at one displacement.
@@ -72,45 +73,48 @@ class RollingRadiusTable:
         return np.append(0.0, np.cumsum(np.diff(y) * (dr[1:] + dr[:-1]) / 2.0))
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """First and last displacement."""
+    def displacement_range(self) -> tuple[float, float]:
+        """First and last displacement of the table."""
         return float(self.displacements[0]), float(self.displacements[-1])
 
-    def between(self, low: float, high: float) -> tuple[Array, Array]:
-        """Displacements and differences of the section from ``low`` to ``high``, including both ends."""
+    def section(self, low: float, high: float) -> tuple[Array, Array]:
+        """Displacements and differences of the section of the table from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
         first_row, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
-        ends = self.difference(low, "right"), self.difference(high, "left")
-        return np.array([low, *y[first_row:last_row], high]), np.array([ends[0], *dr[first_row:last_row], ends[1]])
+        end_differences = self.difference(low, "right"), self.difference(high, "left")
+        return np.array([low, *y[first_row:last_row], high]), np.array(
+            [end_differences[0], *dr[first_row:last_row], end_differences[1]]
+        )
 
     def difference(self, displacement: float, side_of_jump: Any = "right") -> float:
-        """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""
-        i, share = self._row_before(displacement, side_of_jump)
+        """Rolling radius difference at a displacement; at a jump, the value on the given side of the jump."""
+        i, share = self._row_and_fraction(displacement, side_of_jump)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
 
     def integral(self, displacement: float) -> float:
-        """The potential at a displacement."""
-        i, share = self._row_before(displacement, "right")
+        """Integral of the difference from the first row to a displacement, in the square of the table's unit."""
+        i, share = self._row_and_fraction(displacement, "right")
         y, dr = self.displacements, self.differences
         step = share * (y[i + 1] - y[i])
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
-    def _row_before(self, displacement: float, side_of_jump: Any) -> tuple[int, float]:
-        """Index of the row before a displacement, and the position between that row and the next, as a share."""
+    def _row_and_fraction(self, displacement: float, side_of_jump: Any) -> tuple[int, float]:
+        """Index of the row before a displacement, and the fraction of the way from that row to the next."""
         y = self.displacements
         i = int(np.clip(np.searchsorted(y, displacement, side_of_jump) - 1, 0, y.size - 2))
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
     def without_every_second_row(self) -> "RollingRadiusTable":
-        """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
+        """The table without every second row, but with both ends; it serves to estimate the error of the spacing."""
         kept_rows = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
         return replace(self, displacements=self.displacements[kept_rows], differences=self.differences[kept_rows])
 
 
 def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
-    """Table from a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says; converted to m.
+    """Rolling radius table from a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says;
+    converted to m.
 
     InputError names the line that is wrong.
     """
@@ -152,6 +156,6 @@ def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_sh
 
 
 def rolling_radius(wheel_and_rail: WheelAndRail, pose: Pose) -> float:
-    """Radius (m) of a wheel at the point nearest to its rail."""
+    """Rolling radius (m) of a wheel at the point nearest to its rail."""
     across = float((pose.rotation.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.axle_centre(pose)))[1])
     return float(wheel_and_rail.wheelset.radius + wheel_and_rail.wheel.curve(across - wheel_and_rail.wheelset.arm))

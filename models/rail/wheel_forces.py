@@ -1,4 +1,4 @@
-"""Compiled forces of both rails on a wheelset: kinematics to creepages, normal force, creep forces, flanges.
+"""Compiled forces of both rails on a wheelset: creepages, normal forces, creep forces and flange forces.
 
 Normal force
     Hertz' theory at the penetration, times 1 + ``contact_damping`` times the speed of approach, and never below zero:
@@ -37,15 +37,16 @@ from models.rail.laid_profiles import laid_profile, no_profile
 from models.rail.profile_contact import TOUCH, LaidProfile, Pose, normal_force_and_axes, profile_on_rail
 from models.rail.wheelset import Wheelset
 
-REGULAR = 0.1
-"""Speed (m/s) below which creepage is no longer relative to the speed of travel."""
+REGULARISED_SPEED = 0.1
+"""Speed of travel (m/s) below which creepage is taken relative to this speed instead."""
 LINEAR, FASTSIM = 0, 1
 LAW_NUMBERS = {"linear": LINEAR, "fastsim": FASTSIM}
 LEAST_CELLS, MOST_CELLS = 3, 200
 WHEELS = record(
     "radius", "half_gauge", "conicity", "head", "modulus", "shear", "nu", "friction", "damping", "clearance", "flange"
 )
-"""Numbers of the contact (SI): those of ``Cone``; modulus is E*, shear is G, flange its spring's stiffness."""
+"""Numbers of both wheel-rail contacts (SI): those of ``Cone``; modulus is E*, shear is G, flange is the stiffness of
+the flange's spring."""
 REPORT = record(
     "load",
     "fx",
@@ -66,24 +67,24 @@ REPORT = record(
     "elastic_power",
     "damping_power",
 )
-"""What a patch reports: normal force, creep forces and moment on the wheel in its own axes, creepages and spin,
-semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad), place from the wheelset's
-centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and flange and
-of the contact's damping (W)."""
+"""Report of a contact patch: normal force (N), creep forces (N) and moment (N m) on the wheel in the patch's axes,
+creepages and spin (1/m), semi-axes (m), penetration (m), power of the creep forces (W), angle of the rail's surface
+(rad), position from the wheelset's centre in the track's axes (m), lateral force of a cone's flange (N), powers of the
+elastic normal force and flange and of the contact's damping (W)."""
 MOTION = record("vx", "vy", "aside", "turn", "rate", "elastic", "push", "patch")
 """Motion of a patch in contact: that of ``PatchMotion``, elastic normal force (N), lateral force of a cone's flange
-(N), number of the patch."""
+(N), index of the patch."""
 WHEELSET = np.dtype(
     (np.record, np.dtype([(name, np.float64, (3,)) for name in ("velocity", "turning", "force", "moment")], align=True))
 )
-"""Of the wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s); angular velocity,
-spin about the axle included (rad/s); force (N) and moment about the centre (N m) on it."""
+"""Motion and resultant of a wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s);
+angular velocity, spin about the axle included (rad/s); force (N) and moment about the centre (N m) on it."""
 BLENDED_BRISTLES, SECOND_ORDER_MARCH = KINDS["blended"], MARCHES["second-order"]
 
 
 class Rails(NamedTuple):
-    """The rails under the wheels and their law of creep forces: WHEELS (1,); profiles, without a node for cones; tables
-    of FASTSIM's net (``Grid``); law : LINEAR or FASTSIM."""
+    """Rails under the wheels and their creep law: WHEELS (1,); profiles, without a node for cones; tables of FASTSIM's
+    grid (``Grid``); law : LINEAR or FASTSIM."""
 
     wheels: Array
     profile: LaidProfile
@@ -131,9 +132,9 @@ class PatchMotion(NamedTuple):
     rate: float
 
 
-class Pressed(NamedTuple):
-    """Penetration and semi-axes of a patch (m); elastic normal force, the same with damping, and lateral force of a
-    cone's flange (N)."""
+class PatchNormalContact(NamedTuple):
+    """Normal contact of a patch: penetration and semi-axes (m); elastic normal force, normal force with damping, and
+    lateral force of a cone's flange (N)."""
 
     depth: float
     a: float
@@ -144,10 +145,10 @@ class Pressed(NamedTuple):
 
 
 def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) -> Rails:
-    """The rails under a wheelset, with FASTSIM's net for its ellipse at rest (see ``fastsim_grid``)."""
+    """Rails under a wheelset, with FASTSIM's grid for its contact ellipse at rest (see ``fastsim_grid``)."""
     if isinstance(cells, bool) or not isinstance(cells, int) or not LEAST_CELLS <= cells <= MOST_CELLS:
         raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
-    w, pair, ellipse = wheelset, wheelset.pair, wheelset.ellipse
+    w, pair, ellipse = wheelset, wheelset.material_pair, wheelset.ellipse
     shape = w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu
     wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
     profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
@@ -162,7 +163,7 @@ def plain_rails(rails: Rails) -> tuple[Any, ...]:
 
 
 @inlined
-def rails_in(plain_tuples):
+def rails_from_tuples(plain_tuples):
     """``Rails`` made from the plain tuples of ``plain_rails``."""
     wheels, (head, nodes, knots), strips, cells, middle, law = plain_tuples
     return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
@@ -175,7 +176,7 @@ def count_of_patches(profile):
 
 
 @njit(cache=True, error_model="numpy")
-def room_for(profile):
+def workspace_for(profile):
     """``Workspace`` for the contacts of a wheelset on these profiles (or cones)."""
     n = count_of_patches(profile)
     return Workspace(
@@ -190,7 +191,8 @@ def room_for(profile):
 
 @lean
 def contact_points(pose, rails, touches):
-    """Fill ``touches``, TOUCH (patches,), the right wheel's first; touches far from contact get no normal."""
+    """Fill the contact patches ``touches``, TOUCH (patches,), the right wheel's first; patches far from contact get no
+    normal."""
     per_wheel, wheels = len(touches) // 2, rails.wheels[0]
     for k in range(2):
         side, of_side = RIGHT if k == 0 else LEFT, touches[k * per_wheel : (k + 1) * per_wheel]
@@ -220,7 +222,8 @@ def supported_force(z, rails):
 
 @inlined
 def _linear_forces(a, b, motion, shear, poisson):
-    """Creep forces and moment of one patch by Kalker's coefficients, for creepages and spin given as ``motion``."""
+    """Creep forces (N) and moment (N m) of one patch by Kalker's coefficients, for creepages and spin given as
+    ``motion``."""
     x, y, spin = motion
     if a <= 0.0:
         a, b, x, y, spin = 1.0, 1.0, 0.0, 0.0, 0.0
@@ -236,9 +239,9 @@ def _linear_forces(a, b, motion, shear, poisson):
 
 @lean
 def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
-    """Fill fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll backwards (sign
-    -1)."""
-    reference_speed = max(abs(speed), REGULAR)
+    """Fill the creep forces fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll
+    backwards (sign -1)."""
+    reference_speed = max(abs(speed), REGULARISED_SPEED)
     for k in range(len(contacts)):
         contact = contacts[k]
         contact.xi_x, contact.xi_y = sign * slip[k].vx / reference_speed, slip[k].aside / reference_speed
@@ -261,7 +264,7 @@ def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
 
 @inlined
 def fill_creep_forces(contacts, slip, speed, rails, workspace):
-    """Fill the forces fx, fy, mz in ``workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
+    """Fill the creep forces fx, fy, mz in ``workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
 
     Near standstill they are a mixture of forward and backward rolling. The creepages are written into the contacts; for
     a wheel that rolls backwards those of its mirror image.
@@ -292,7 +295,7 @@ def wheel_forces(pose, rails, report, workspace):
     pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; workspace : ``Workspace``, its
     wheelset given in, all else written over.
     """
-    if rails.law == LINEAR and rails.profile.nodes.size == 0 and workspace.wheelset[0].velocity[0] >= REGULAR:
+    if rails.law == LINEAR and rails.profile.nodes.size == 0 and workspace.wheelset[0].velocity[0] >= REGULARISED_SPEED:
         _linear_cones(pose, rails.wheels[0], workspace.wheelset[0], report)
     else:
         patch_by_patch(pose, rails, report, workspace)
@@ -300,7 +303,8 @@ def wheel_forces(pose, rails, report, workspace):
 
 @lean
 def _linear_cones(pose, wheels, wheelset, report):
-    """``patch_by_patch`` for cones with the linear law that roll forwards, without storing intermediate values."""
+    """Add the forces of cones with the linear creep law that roll forwards, as ``patch_by_patch`` does but without
+    storing intermediate values."""
     cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
     speed, modulus, shear, poisson = wheelset.velocity[0], wheels.modulus, wheels.shear, wheels.nu
     damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
@@ -314,7 +318,7 @@ def _linear_cones(pose, wheels, wheelset, report):
         slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
         creeping = _linear_forces(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
-        press = Pressed(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
+        press = PatchNormalContact(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
         _add_patch_forces(patch_point, press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
             _fill_report(patch_point, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
@@ -322,7 +326,8 @@ def _linear_cones(pose, wheels, wheelset, report):
 
 @lean
 def patch_by_patch(pose, rails, report, workspace):
-    """``wheel_forces`` for all kinds of patches, force laws and directions of rolling."""
+    """Add the forces of both rails for all kinds of patches, creep laws and directions of rolling; see
+    ``wheel_forces``."""
     touches, wheels, wheelset, n, count = (
         workspace.touches,
         rails.wheels[0],
@@ -339,11 +344,11 @@ def patch_by_patch(pose, rails, report, workspace):
             workspace.motion[count].patch, count = k, count + 1
     fill_creep_forces(workspace.contacts[:count], workspace.motion[:count], velocity[0], rails, workspace)
     for k in range(len(report)):
-        _blank_report(report[k])
+        _clear_report(report[k])
     for i in range(count):
         contact, m, answer = workspace.contacts[i], workspace.motion[i], workspace.forces[i]
         touch = touches[int(m.patch)]
-        press = Pressed(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
+        press = PatchNormalContact(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz
         _add_patch_forces(_patch_place(touch), press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
@@ -359,7 +364,7 @@ def _longitudinal_curvature(rolling, conicity):
 
 @inlined
 def _flange_force(wheel_side, y, wheels):
-    """Lateral force (N) of a cone's flange at a lateral position y."""
+    """Lateral force (N) of a cone's flange at a lateral displacement y (m)."""
     return -wheel_side * wheels.flange * max(0.0, wheel_side * y - wheels.clearance)
 
 
@@ -371,7 +376,7 @@ def _patch_place(touch):
 
 @inlined
 def _patch_motion(patch_point, velocity, angular_velocity):
-    """``PatchMotion`` of a patch, from velocity and angular velocity of the wheelset."""
+    """``PatchMotion`` of a patch, from velocity (m/s) and angular velocity (rad/s) of the wheelset."""
     n_y, n_z, cx, cy, cz = patch_point
     vx = velocity[0] + angular_velocity[1] * cz - angular_velocity[2] * cy
     vy = velocity[1] + angular_velocity[2] * cx - angular_velocity[0] * cz
@@ -383,7 +388,7 @@ def _patch_motion(patch_point, velocity, angular_velocity):
 
 @inlined
 def _fill_contact(touch, wheelset, wheels, push, contact, motion):
-    """Kinematics and normal force of one patch: fill its contact for the creep law and its motion."""
+    """Fill the contact of one patch for the creep law and its motion: kinematics and normal force."""
     moving = _patch_motion(_patch_place(touch), wheelset.velocity, wheelset.turning)
     elastic, a, b = normal_force_and_axes(touch.depth, touch.along, touch.across, wheels.modulus)
     motion.vx, motion.vy, motion.aside, motion.turn, motion.rate = moving
@@ -407,7 +412,7 @@ def _add_patch_forces(patch_point, press, creeping, force, moment):
 
 
 @lean
-def _blank_report(report):
+def _clear_report(report):
     """Fill the report of a patch without contact with zeros."""
     report.load = report.fx = report.fy = report.mz = report.xi_x = report.xi_y = report.spin = 0.0
     report.a = report.b = report.depth = report.power = report.angle = report.x = report.y = report.z = 0.0
@@ -416,11 +421,11 @@ def _blank_report(report):
 
 @lean
 def _fill_report(patch_point, motion, press, creeping, speed, report):
-    """Fill the report of one patch."""
+    """Fill the report of a patch from its position, motion, normal contact and creep forces."""
     fx, fy, mz = creeping
     vx, vy, side_speed, turn, rate = motion
     report.load, report.fx, report.fy, report.mz = press.load, fx, fy, mz
-    reference_speed = max(abs(speed), REGULAR)
+    reference_speed = max(abs(speed), REGULARISED_SPEED)
     report.xi_x, report.xi_y, report.spin = vx / reference_speed, side_speed / reference_speed, turn / reference_speed
     report.a, report.b, report.depth = press.a, press.b, press.depth
     report.angle = math.atan2(-patch_point.n_y, patch_point.n_z)

@@ -1,4 +1,4 @@
-"""A wheelset in its primary suspension on two straight rails: cones on round heads, or profiles."""
+"""Parameters of a wheelset in its primary suspension on two straight rails: cones on round heads, or profiles."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from models.core.strict import Strict, input_error_from_faults, quantity
 from models.rail.laid_profiles import Profiles
 
 GRAVITY = 9.81
-"""m/s^2"""
+"""Acceleration of gravity (m/s^2)."""
 LEAST_CONICITY, LARGEST_CONICITY = 1e-4, 0.5
 
 
 class Wheelset(Strict):
-    """A wheelset on its track; raises InputError for values that are none of one.
+    """Parameters of a wheelset on its track. Raises InputError for values that no wheelset can have.
 
     The wheelset turns about its axle, so its inertia about all axes across that is one number. On each side, at
     ``half_spacing`` from the middle, a spring and a damper along each axis of the track hold the axle to a frame that
@@ -61,29 +61,29 @@ class Wheelset(Strict):
         return self
 
     @property
-    def pair(self) -> MaterialPair:
-        """Materials of wheel and rail, which are the same."""
+    def material_pair(self) -> MaterialPair:
+        """Materials of wheel and rail, which are equal."""
         return MaterialPair(self.material, self.material)
 
     @property
-    def slant(self) -> tuple[float, float]:
+    def cone_sine_and_cosine(self) -> tuple[float, float]:
         """Sine and cosine of the cone's half angle."""
         cosine = (1.0 + self.conicity**2) ** -0.5
         return self.conicity * cosine, cosine
 
     @property
-    def tilt(self) -> float:
+    def roll_per_displacement(self) -> float:
         """Roll to the left per lateral displacement to the right (rad/m), for small displacements."""
         return self.conicity / (self.half_gauge - self.conicity * self.radius)
 
     @property
     def equivalent_conicity(self) -> float:
-        """Change of a wheel's rolling radius per lateral displacement, including the effect of roll (exact for small
-        displacements)."""
-        return self.tilt * (self.half_gauge + self.head_radius * self.slant[0])
+        """Change of a wheel's rolling radius per lateral displacement (-), including the effect of roll; exact for
+        small displacements."""
+        return self.roll_per_displacement * (self.half_gauge + self.head_radius * self.cone_sine_and_cosine[0])
 
     def coned(self, equivalent: float) -> "Wheelset":
-        """A copy of the wheelset on cones with this equivalent conicity, as profiles have at some amplitude."""
+        """Returns a copy of the wheelset on cones with this equivalent conicity, as profiles have at some amplitude."""
         largest_conicity = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
         conicity = brentq(
             lambda c: self.changed(conicity=c).equivalent_conicity - equivalent,
@@ -94,15 +94,15 @@ class Wheelset(Strict):
         return self.changed(conicity=float(conicity))
 
     def changed(self, **values: Any) -> "Wheelset":
-        """A copy of the wheelset with some values changed and checked as in a file."""
+        """Returns a copy of the wheelset with some values changed, and checked as in a file."""
         return Wheelset(**{name: getattr(self, name) for name in type(self).model_fields} | values)
 
     @property
     def ellipse(self) -> Hertz:
         """Contact ellipse of one wheel in the middle of the track, under half the load."""
-        cosine = self.slant[1]
+        cosine = self.cone_sine_and_cosine[1]
         load = self.load / (2.0 * cosine)
-        return by_load(cosine / (2.0 * self.radius), 1.0 / (2.0 * self.head_radius), load, self.pair)
+        return by_load(cosine / (2.0 * self.radius), 1.0 / (2.0 * self.head_radius), load, self.material_pair)
 
 
 CHOSEN_WHEELSET = Wheelset(
@@ -126,4 +126,4 @@ CHOSEN_WHEELSET = Wheelset(
     flange_stiffness=1.5e7,
     contact_damping=0.5,
 )
-"""A wheelset with values of the usual size. They are chosen, not published: no source is claimed for them."""
+"""Wheelset with values of the usual size. They are chosen, not published: no source is claimed for them."""

@@ -1,4 +1,5 @@
-"""Vehicles on random roads: linear vehicle, road, covariance, and what engineers read from it.
+"""Random vibration of linear vehicles on rough roads: covariances of the outputs, and the measures that engineers read
+from them.
 
 Axes of this package are those of ride and of ISO 8855: x forward, y to the **left**, z **up** from the ground; roll,
 pitch and yaw (rx, ry, rz) are right-handed rotations about them, so that pitch is positive nose **down**. Road heights

@@ -1,4 +1,4 @@
-"""Variances of a quarter car and of a half car in closed form, against which every other route is held.
+"""Variances of a quarter car and of a half car on a random road in closed form, as a check of all other methods.
 
 A body m_s on spring k and damper c, a wheel m_u, a tyre k_t without damping; the road's height is white noise of
 intensity q per second through z' = -corner z + w (corner in rad/s; 0: a random walk, whose height has no variance,
@@ -13,7 +13,8 @@ from scipy.linalg import expm
 
 @dataclass(frozen=True)
 class QuarterCar:
-    """A quarter car: body and wheel. Masses in kg, stiffnesses in N/m, damping in N s/m."""
+    """Quarter car: body mass m_s and wheel mass m_u (kg), suspension stiffness k and tyre stiffness k_t (N/m),
+    suspension damping c (N s/m)."""
 
     m_s: float
     m_u: float
@@ -23,23 +24,23 @@ class QuarterCar:
 
     @property
     def mass(self) -> float:
-        """Mass of body and wheel together, kg."""
+        """Mass of body and wheel together (kg)."""
         return self.m_s + self.m_u
 
     def body_acceleration_variance(self, q: float, corner: float = 0.0) -> float:
-        """Variance of the body's acceleration, m^2/s^4; q : intensity of the road, m^2/s."""
+        """Variance of the body's acceleration, m^2/s^4; q : intensity of the road's white noise, m^2/s."""
         s, u, k, c, t, w = self.m_s, self.m_u, self.k, self.c, self.k_t, corner
         top = c**3 * t * w + c**2 * k * t + c**2 * t * s * w**2 + c * k**2 * self.mass * w + k**3 * self.mass
         return q * t / (2 * c * s**2) * (top + k**2 * s * u * w**2) / self._common(w)
 
     def suspension_travel_variance(self, q: float, corner: float = 0.0) -> float:
-        """Variance of the suspension travel, body height less wheel height, m^2."""
+        """Variance of the suspension travel (body height minus wheel height), m^2."""
         slow = self.mass * (self.c * corner + self.k) + self.m_s * self.m_u * corner**2
         return q * self.k_t / (2 * self.c) * slow / self._common(corner)
 
     def tyre_deflection_variance(self, q: float) -> float:
-        """Variance of the tyre deflection, wheel height less road height, m^2, on a random-walk road; times k_t^2, that
-        of the wheel load."""
+        """Variance of the tyre deflection (wheel height minus road height), m^2, on a random-walk road; times k_t^2 it
+        is the variance of the wheel load."""
         s, u, k, c, t, m = self.m_s, self.m_u, self.k, self.c, self.k_t, self.mass
         return q / 2 * (c * m**2 / (t * s**2) + (k**2 * m**3 / (t * s) ** 2 - 2 * k * m * u / (t * s) + u) / c)
 
@@ -49,7 +50,8 @@ class QuarterCar:
         return slow + c * self.mass * w**3 + s * u * w**4
 
     def correlation_of_acceleration(self, q: float, delay: float) -> float:
-        """E[a(t) a(t + delay)] of the body on a random walk, m^2/s^4: C e^(A delay) P C' of four states.
+        """Correlation E[a(t) a(t + delay)] of the body's acceleration a on a random-walk road, m^2/s^4: C e^(A delay) P
+        C' of four states with covariance P.
 
         States: tyre deflection, wheel speed, suspension travel, body speed. None of them walks with the road, so P
         solves a Lyapunov equation without cancellation.
@@ -77,7 +79,7 @@ def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, spee
 
 
 def split_half_car(corner: QuarterCar, a: float, b: float) -> tuple[QuarterCar, QuarterCar, float]:
-    """Front and rear corner of a half car that splits: 2 b / (a + b) and 2 a / (a + b) times ``corner``; inertia in kg
-    m^2."""
+    """Front and rear quarter car of a half car that splits: 2 b / (a + b) and 2 a / (a + b) times ``corner``; and its
+    pitch inertia in kg m^2."""
     front, rear = (QuarterCar(*(2 * share / (a + b) * value for value in vars(corner).values())) for share in (b, a))
     return front, rear, 2 * corner.m_s * a * b

@@ -1,6 +1,4 @@
-"""Compiled loops over copies of a vehicle whose springs are bent or whose tyres may lift: its laws, and steps of the
-Runge-Kutta method.
-"""
+"""Compiled time integration of many copies of a vehicle with nonlinear springs, or with tyres that may lift off."""
 
 import math
 from typing import NamedTuple
@@ -10,14 +8,15 @@ import numpy as np
 from models.machine.compiled import lean, njit
 
 POWERS_SUMMED = 4
-"""Of the outputs, from the first on, that are summed."""
+"""Count of powers of the outputs, from the first on, that are summed."""
 COPIES_SIDE_BY_SIDE = 64
-"""Copies that are stepped side by side, in vector registers: one after the other they take four times as long."""
+"""Count of copies that are integrated side by side in vector registers: one after the other they take four times as
+long."""
 
 
 class Curves(NamedTuple):
-    """Curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope (s,), and changes of
-    slope, bends (s, k), at k corners (s, k); unused bends are 0."""
+    """Piecewise linear force curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope
+    (s,), and changes of slope, bends (s, k), at k corners (s, k); unused bends are 0."""
 
     offset: np.ndarray
     slope: np.ndarray
@@ -26,8 +25,8 @@ class Curves(NamedTuple):
 
 
 class PushingTyres(NamedTuple):
-    """Tyres that only push: index (u,) of the wheel of each, static load (u,) in N, stiffness (u,) in N/m, damping (u,)
-    in N s/m, heights (u, n): rise of the wheel per coordinate."""
+    """Tyres that cannot pull: index (u,) of the wheel of each, static load (u,) in N, stiffness (u,) in N/m, damping
+    (u,) in N s/m, heights (u, n): rise of the wheel per coordinate."""
 
     wheel: np.ndarray
     load: np.ndarray
@@ -36,37 +35,38 @@ class PushingTyres(NamedTuple):
     heights: np.ndarray
 
 
-class Laws(NamedTuple):
-    """Force laws and linear motion of n coordinates over w wheels, with s nonlinear springs, u tyres that only push,
-    and p outputs.
+class ForceLaws(NamedTuple):
+    """Force laws and linear equations of motion of n coordinates over w wheels, with s nonlinear springs, u tyres that
+    cannot pull, and p outputs.
 
-    rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s + u): accelerations by positions, rates, road, bent
-    forces and what tyres that only push have beside linear ones; read (p, 3 n + 2 w + s + u): outputs by positions,
-    rates, road, accelerations and the same forces; by_travel, by_rate: curves of the springs; friction (s,): N;
-    turning (s,): rate (m/s) over which friction turns; tyres: the u that only push.
-    """
+    travel_rows (s, n): travel of each spring; acceleration_rows (n, 2 n + 2 w + s + u): accelerations by positions,
+    rates, road, bent forces and the missing forces of tyres that cannot pull; output_rows (p, 3 n + 2 w + s + u):
+    outputs by positions, rates, road, accelerations and the same forces; by_travel, by_rate: curves of the springs;
+    friction (s,): N; friction_rate (s,): rate (m/s) over which friction changes its sign; tyres: the u that cannot
+    pull."""
 
-    rows: np.ndarray
-    motion: np.ndarray
-    read: np.ndarray
+    travel_rows: np.ndarray
+    acceleration_rows: np.ndarray
+    output_rows: np.ndarray
     by_travel: Curves
     by_rate: Curves
     friction: np.ndarray
-    turning: np.ndarray
+    friction_rate: np.ndarray
     tyres: PushingTyres
 
 
 @lean
-def add(total, factor, values):
-    """Add ``factor`` times a row (copies,) to another row; nothing is done where the factor is 0."""
+def add_scaled(total, factor, row):
+    """Add ``factor`` times a row (copies,) to another row ``total``; nothing is done where the factor is 0."""
     if factor != 0.0:
         for c in range(total.size):
-            total[c] += factor * values[c]
+            total[c] += factor * row[c]
 
 
 @lean
-def on_curve(curves, spring, argument, force):
-    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel or rate, ``argument`` (copies,)."""
+def add_curve_force(curves, spring, argument, force):
+    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel (m) or rate (m/s), ``argument``
+    (copies,)."""
     offset, slope = curves.offset[spring], curves.slope[spring]
     for c in range(force.size):
         force[c] += offset + slope * argument[c]
@@ -78,20 +78,20 @@ def on_curve(curves, spring, argument, force):
 
 
 @lean
-def off_road(u, x, road, tyres, pressed, rate, missing_force):
-    """Fill ``missing_force`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0
+def fill_missing_tyre_force(tyre_index, x, road, tyres, pressed, rate, missing_force):
+    """Fill ``missing_force`` (copies,) in N: the force of a tyre that cannot pull, minus that of a linear tyre. It is 0
     on the road, and cancels the pull of a lifted tyre.
 
     pressed, rate (copies,) are overwritten.
     """
-    n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, tyres.wheel[u]
-    load, stiffness, damping = tyres.load[u], tyres.stiffness[u], tyres.damping[u]
+    n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, tyres.wheel[tyre_index]
+    load, stiffness, damping = tyres.load[tyre_index], tyres.stiffness[tyre_index], tyres.damping[tyre_index]
     pressed[:], rate[:] = 0.0, 0.0
-    add(pressed, 1.0, road[wheel])
-    add(rate, 1.0, road[wheels + wheel])
+    add_scaled(pressed, 1.0, road[wheel])
+    add_scaled(rate, 1.0, road[wheels + wheel])
     for j in range(n):
-        add(pressed, -tyres.heights[u, j], x[j])
-        add(rate, -tyres.heights[u, j], x[n + j])
+        add_scaled(pressed, -tyres.heights[tyre_index, j], x[j])
+        add_scaled(rate, -tyres.heights[tyre_index, j], x[n + j])
     for c in range(missing_force.size):
         elastic = load + stiffness * pressed[c]
         total_force = elastic + damping * rate[c]
@@ -100,61 +100,61 @@ def off_road(u, x, road, tyres, pressed, rate, missing_force):
 
 @lean
 def fill_rates(x, road, laws, force, state_rate, workspace):
-    """Fill the time derivatives (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the
-    nonlinear forces (s + u, copies) in N; room (2, copies) is overwritten."""
-    n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
+    """Fill the time derivatives (2 n, copies) of the states (positions, then rates) on roads (2 w, copies), and the
+    nonlinear forces (s + u, copies) in N."""
+    n, w, springs = x.shape[0] // 2, road.shape[0], laws.travel_rows.shape[0]
     for s in range(springs):
         travel, slip, bent = workspace[0], workspace[1], force[s]
         travel[:], slip[:], bent[:] = 0.0, 0.0, 0.0
         for j in range(n):
-            add(travel, laws.rows[s, j], x[j])
-            add(slip, laws.rows[s, j], x[n + j])
-        on_curve(laws.by_travel, s, travel, bent)
-        on_curve(laws.by_rate, s, slip, bent)
+            add_scaled(travel, laws.travel_rows[s, j], x[j])
+            add_scaled(slip, laws.travel_rows[s, j], x[n + j])
+        add_curve_force(laws.by_travel, s, travel, bent)
+        add_curve_force(laws.by_rate, s, slip, bent)
         if laws.friction[s] != 0.0:
             for c in range(bent.size):
-                bent[c] += laws.friction[s] * math.tanh(slip[c] / laws.turning[s])
+                bent[c] += laws.friction[s] * math.tanh(slip[c] / laws.friction_rate[s])
     for u in range(laws.tyres.wheel.size):
-        off_road(u, x, road, laws.tyres, workspace[0], workspace[1], force[springs + u])
+        fill_missing_tyre_force(u, x, road, laws.tyres, workspace[0], workspace[1], force[springs + u])
     for i in range(n):
         state_rate[i], state_rate[n + i] = 0.0, 0.0
-        add(state_rate[i], 1.0, x[n + i])
+        add_scaled(state_rate[i], 1.0, x[n + i])
         for j in range(2 * n):
-            add(state_rate[n + i], laws.motion[i, j], x[j])
+            add_scaled(state_rate[n + i], laws.acceleration_rows[i, j], x[j])
         for j in range(w):
-            add(state_rate[n + i], laws.motion[i, 2 * n + j], road[j])
+            add_scaled(state_rate[n + i], laws.acceleration_rows[i, 2 * n + j], road[j])
         for s in range(force.shape[0]):
-            add(state_rate[n + i], laws.motion[i, 2 * n + w + s], force[s])
+            add_scaled(state_rate[n + i], laws.acceleration_rows[i, 2 * n + w + s], force[s])
 
 
 @lean
-def fill_output(p, x, road, rate, force, laws, output):
-    """Fill one output (copies,) from the states and their time derivatives."""
+def fill_output(output_index, x, road, rate, force, laws, output):
+    """Fill an output (copies,) from the states and their time derivatives."""
     n, w = x.shape[0] // 2, road.shape[0]
     output[:] = 0.0
     for j in range(2 * n):
-        add(output, laws.read[p, j], x[j])
+        add_scaled(output, laws.output_rows[output_index, j], x[j])
     for j in range(w):
-        add(output, laws.read[p, 2 * n + j], road[j])
+        add_scaled(output, laws.output_rows[output_index, 2 * n + j], road[j])
     for j in range(n):
-        add(output, laws.read[p, 2 * n + w + j], rate[n + j])
+        add_scaled(output, laws.output_rows[output_index, 2 * n + w + j], rate[n + j])
     for s in range(force.shape[0]):
-        add(output, laws.read[p, 3 * n + w + s], force[s])
+        add_scaled(output, laws.output_rows[output_index, 3 * n + w + s], force[s])
 
 
 @lean
-def sum_up(output_values, power_sums, p, first):
-    """Add the first four powers of output p (copies,) to their sums, in columns from copy ``first`` on."""
+def add_powers(output_values, power_sums, output_index, first_copy):
+    """Add the first four powers of an output (copies,) to their sums, in columns from copy ``first_copy`` on."""
     for c in range(output_values.size):
         square = output_values[c] * output_values[c]
-        power_sums[0, p, first + c] += output_values[c]
-        power_sums[1, p, first + c] += square
-        power_sums[2, p, first + c] += square * output_values[c]
-        power_sums[3, p, first + c] += square * square
+        power_sums[0, output_index, first_copy + c] += output_values[c]
+        power_sums[1, output_index, first_copy + c] += square
+        power_sums[2, output_index, first_copy + c] += square * output_values[c]
+        power_sums[3, output_index, first_copy + c] += square * square
 
 
 @lean
-def states_ahead(x, time, rate, next_states):
+def advance_states(x, time, rate, next_states):
     """Fill ``next_states`` with the states (2 n, copies) after a time (s) at constant rates."""
     for j in range(x.shape[0]):
         for c in range(x.shape[1]):
@@ -162,13 +162,13 @@ def states_ahead(x, time, rate, next_states):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def march(states, roads, step, first, every, laws, power_sums):
-    """Advance the copies by steps (s) of the classical Runge-Kutta method, and sum up powers of their outputs on the
-    way.
+def march(states, roads, step, first_counted, stride, laws, power_sums):
+    """Integrate all copies by the classical Runge-Kutta method with a fixed step (s), and sum up powers of their
+    outputs.
 
-    states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; sums (4, p, copies) gain
-    the outputs, their squares, cubes and fourth powers before step ``first`` and each ``every``-th after it.
-    """
+    states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; power_sums (4, p,
+    copies) gain the outputs, their squares, cubes and fourth powers before step ``first_counted`` and each
+    ``stride``-th after it."""
     for copy in range(0, states.shape[1], COPIES_SIDE_BY_SIDE):
         columns = slice(copy, min(copy + COPIES_SIDE_BY_SIDE, states.shape[1]))
         x, road = states[:, columns].copy(), roads[:, :, columns].copy()
@@ -179,19 +179,19 @@ def march(states, roads, step, first, every, laws, power_sums):
             np.empty_like(x),
             np.empty_like(x),
         )
-        forces = laws.rows.shape[0] + laws.tyres.wheel.size
+        forces = laws.travel_rows.shape[0] + laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
             fill_rates(x, road[2 * i], laws, force, k1, room)
-            if i >= first and (i - first) % every == 0:
-                for p in range(laws.read.shape[0]):
+            if i >= first_counted and (i - first_counted) % stride == 0:
+                for p in range(laws.output_rows.shape[0]):
                     fill_output(p, x, road[2 * i], k1, force, laws, room[0])
-                    sum_up(room[0], power_sums, p, copy)
-            states_ahead(x, 0.5 * step, k1, moved_states)
+                    add_powers(room[0], power_sums, p, copy)
+            advance_states(x, 0.5 * step, k1, moved_states)
             fill_rates(moved_states, road[2 * i + 1], laws, force, k2, room)
-            states_ahead(x, 0.5 * step, k2, moved_states)
+            advance_states(x, 0.5 * step, k2, moved_states)
             fill_rates(moved_states, road[2 * i + 1], laws, force, k3, room)
-            states_ahead(x, step, k3, moved_states)
+            advance_states(x, step, k3, moved_states)
             fill_rates(moved_states, road[2 * i + 2], laws, force, k4, room)
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):

@@ -1,4 +1,5 @@
-"""Stationary covariance of a vehicle on a random road, delays exact, and for every output whether it has one.
+"""Stationary covariance of a vehicle on a random road with exact axle delays, and the verdict whether each output has a
+finite variance.
 
 The response of the state to a unit of noise that the first axle meets now is e^(A s) R_j between the hits of the
 axles j and j + 1: R_1 = B_1, F_j = e^(A (tau_j - tau_(j-1))) R_(j-1), R_j = F_j + B_j. The covariance, the integral
@@ -21,12 +22,12 @@ from models.ride.excited import DelayedSystem
 from models.ride.marginal import MATRIX_ACCURACY, ZERO_MARGIN, Growth, MarginalParts, split_marginal, variance_growth
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
-"""What an output can be."""
+"""Status of an output's variance: finite; infinite; growing without bound over time (diffusing)."""
 
 
 @dataclass(frozen=True)
 class StationaryCovariance:
-    """Stationary covariance of the state and variances of the outputs.
+    """Stationary covariance of the states of a vehicle on its road, and variances of its outputs.
 
     P (n, n): covariance of the state, without motions that diffuse. Per output (p,): ``variance`` (unit^2), inf where
     there is none; ``status`` and a sentence on its ``reason``; ``rate`` and ``power`` of a variance that grows as
@@ -64,7 +65,7 @@ def stationary_covariance(system: DelayedSystem, accuracy: float = MATRIX_ACCURA
     P, correction, residual = lyapunov_solution(split.S, noise_intensity(split.S, onto_stable))
     V = split.V
     if split.count_of_marginal_states:
-        P, correction, V = _with_marginal(split, met, onto_stable, P, correction)
+        P, correction, V = _with_marginal_motions(split, met, onto_stable, P, correction)
     C = system.C @ V
     floor, change = rounding_thresholds(C, P), _output_variances(C, correction)
     variance = _output_variances(C, P)
@@ -91,8 +92,7 @@ def stationary_covariance(system: DelayedSystem, accuracy: float = MATRIX_ACCURA
 
 
 def rounding_thresholds(C: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Thresholds (p,) of the variance of y = C x below which it is mere rounding, so that the output counts as
-    silent."""
+    """Variances (p,) of the outputs y = C x below which there is only rounding, so that an output counts as zero."""
     terms = abs(C) @ np.sqrt(abs(np.diagonal(P)))
     largest_output = abs(C).max(axis=1) * np.sqrt(abs(P).max(initial=0.0))
     return np.asarray(np.maximum(CANCELLATION_SHARE * terms, SILENCE_SHARE * largest_output) ** 2, float)
@@ -109,7 +109,7 @@ class NoiseArrivals(NamedTuple):
 
 
 def noise_arrivals(system: DelayedSystem) -> NoiseArrivals:
-    """The ``NoiseArrivals`` of a system; axles that meet the same noise at the same instant are combined."""
+    """``NoiseArrivals`` of a system; axles that meet the same noise at the same instant are combined."""
     if system.independent:
         return NoiseArrivals([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
@@ -126,13 +126,14 @@ def noise_arrivals(system: DelayedSystem) -> NoiseArrivals:
 
 
 Propagator = Callable[[float, np.ndarray], np.ndarray]
-"""e^(A t) B of a time (s) and B (n, k)."""
+"""Function that returns e^(A t) B of a time t (s) and B (n, k)."""
 
 
 def _responses_before_arrival(
     A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagator | None = None
 ) -> list[np.ndarray]:
-    """State responses F_j to earlier noise just before each hit; zero where no axle has met this noise before."""
+    """State responses F_j to noise that earlier axles have met, just before axle j meets the same noise; zero where no
+    axle has met it before."""
     if propagator is None:
 
         def propagator(time: float, B: np.ndarray) -> np.ndarray:
@@ -148,14 +149,14 @@ def _responses_before_arrival(
     return responses
 
 
-def noise_of(system: DelayedSystem, propagator: Propagator | None = None) -> np.ndarray:
-    """``noise_intensity`` of the noise in a given system, in double precision."""
+def noise_intensity_of_system(system: DelayedSystem, propagator: Propagator | None = None) -> np.ndarray:
+    """Noise intensity matrix Q of a system (see ``noise_intensity``), in double precision."""
     return noise_intensity(system.A, noise_arrivals(system), propagator).astype(float)
 
 
 def noise_intensity(A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagator | None = None) -> np.ndarray:
-    """Matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise of all hits, with exact
-    delays.
+    """Noise intensity matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise at all
+    axles, with exact delays.
 
     ``propagator`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
     noises cancel in an output, so do the squares of their rounding.
@@ -168,8 +169,8 @@ def noise_intensity(A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagat
 
 
 def lyapunov_solution(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Solution P of A P + P A' + Q = 0 in extended precision, the last correction, and the ratio of the residual to its
-    largest term.
+    """Solution P of the Lyapunov equation A P + P A' + Q = 0 in extended precision, the last correction, and the ratio
+    of the residual to its largest term.
 
     python-control with its method named (left alone it takes another where slycot is installed), then refined: the
     residual, in extended precision, is solved for what is missing. Q may be indefinite. Raises InputError for a Q that
@@ -200,9 +201,9 @@ def lyapunov_solution(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 ASYMMETRY_LIMIT = 1e-9
-"""Of a right side by its largest element: rounding."""
+"""Largest asymmetry of Q, relative to its largest element, that counts as rounding."""
 UNCERTAINTY_LIMIT = 1e-6
-"""Relative error of a variance beyond which none is given."""
+"""Relative error of a variance above which no variance is given."""
 
 
 def _refuse(name: str, error: float) -> None:
@@ -217,14 +218,15 @@ def _refuse(name: str, error: float) -> None:
 
 
 MOST_REFINEMENTS, REFINED_SHARE = 6, 1e-11
-"""Corrections of the first solution at most, and the size of the last divided by that of P: what is left is its square.
-One is enough but where a motion hardly dies out; each takes as many digits off the error as the first solution had."""
+"""Largest count of corrections of the first solution, and the size of the last one relative to P below which refinement
+ends: what remains is its square. A single correction is enough unless a motion hardly dies out; each takes as many
+digits off the error as the first solution had."""
 
 
-def _with_marginal(
+def _with_marginal_motions(
     split: MarginalParts, arrivals: NoiseArrivals, onto_stable: NoiseArrivals, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Covariance of the whole state (marginal motions first), its last correction and basis; motions with unbounded
+    """Covariance of the whole state (marginal motions first), its last correction and its basis; motions with unbounded
     variance are left out.
 
     A motion that does not diffuse responds only between the first and the last hit: its covariances are integrals over
@@ -256,7 +258,8 @@ def _with_marginal(
 
 
 def _integral_over_delay(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
-    """Integral of e^(M s) R R' e^(M' s) from 0 to ``length`` by van Loan's block; M neither grows nor decays."""
+    """Integral of e^(M s) R R' e^(M' s) from s = 0 to ``length``, by van Loan's block matrix; M neither grows nor
+    decays."""
     k = len(M)
     block = expm(np.block([[-M, R @ R.T], [np.zeros((k, k)), M.T]]) * length)
     integral = block[k:, k:].T @ block[:k, k:]
@@ -269,32 +272,32 @@ def _output_variances(C: np.ndarray, P: np.ndarray) -> np.ndarray:
 
 
 CANCELLATION_SHARE, SILENCE_SHARE = 1e-9, 1e-12
-"""Deviations this much smaller than their terms together, or than the largest state could make them, are zero by
-symmetry, and all of them rounding: motions are told to about ten digits, and states at rest to those of P."""
+"""Ratios of a standard deviation to the sum of its terms, and to the largest that the states could give, below which it
+is zero by symmetry: motions are known to about ten digits, and states at rest to those of P."""
 
 
 def variance_verdicts(
     D: Sequence[np.ndarray],
     variance: np.ndarray,
-    floor: np.ndarray,
-    grown: Growth,
-    fastest: float,
+    rounding_floor: np.ndarray,
+    growth: Growth,
+    fastest_rate: float,
     accuracy: float,
     split: MarginalParts | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Status of every output's variance, and the reason for it.
+    """Status of every output's variance (finite, infinite or diffusing), and the reason for it.
 
-    White noise that comes through D counts if, up to the ``fastest`` rate of the system (1/s), it carries more than
-    rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.
-    """
-    direct = sum((d**2).sum(axis=1) for d in D) * fastest
-    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + floor
-    verdicts = [_variance_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
+    White noise that comes through D counts if, up to the ``fastest_rate`` rate of the system (1/s), it carries more
+    than rounding could of the output's variance without it; ``rounding_floor`` (p,) is what rounding makes of a
+    variance of zero."""
+    direct = sum((d**2).sum(axis=1) for d in D) * fastest_rate
+    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + rounding_floor
+    verdicts = [_variance_verdict(*output, split) for output in zip(white, growth.rate, growth.power, strict=True)]
     return tuple(status for status, _ in verdicts), tuple(reason for _, reason in verdicts)
 
 
-def _variance_verdict(white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
-    if white:
+def _variance_verdict(is_white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
+    if is_white:
         return INFINITE, WHITE_NOISE_REASON
     if power:
         deviation_after = np.sqrt(rate * 100.0**power)

@@ -1,4 +1,5 @@
-"""A linear vehicle behind its road filters at a constant speed: x' = A x + sum_i B_i w(t - tau_i), of first order.
+"""State-space model of a linear vehicle behind its road filters at a constant speed: x' = A x + sum_i B_i w(t - tau_i),
+excited by delayed white noise w.
 
 The axles meet the same white noise w one after the other. Some of the bodies may have no mass: with r the coordinates,
 a combinations of them that are inert, b that only dampers hold back (a state each) and e that only springs hold (no
@@ -20,8 +21,8 @@ from models.vehicles.linear_vehicle import LinearVehicle, OutputRows
 
 @dataclass(frozen=True)
 class DelayedSystem:
-    """Linear system excited by delayed white noise, with outputs y = C x + sum_i D_i w(t - tau_i); w has unit intensity
-    and k channels.
+    """Linear system excited by delayed white noise w of unit intensity with k channels; its outputs are y = C x + sum_i
+    D_i w(t - tau_i).
 
     A (n, n); B, one (n, k) per axle; delays tau_i in s, the first 0, none falling; C (p, n); D, one (p, k) per axle.
     ``independent`` axles meet noises that know nothing of one another; the delays then have no meaning.
@@ -37,7 +38,7 @@ class DelayedSystem:
 
 
 def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> DelayedSystem:
-    """The vehicle with its road filters, at a constant speed (m/s, above 0).
+    """State-space model of a vehicle with its road filters, at a constant speed (m/s, above 0).
 
     State (q, q', f of each axle). In time a filter reads f' = v F f + sqrt(v) G w; the height's rate is
     z' = H f', white noise in part where the filter is of first order: it reaches the wheels through tyre damping.
@@ -46,7 +47,7 @@ def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: flo
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
     if has_singular_mass(vehicle.mass):
-        return first_order(vehicle, vehicle_states(vehicle), excitation, speed)[0]
+        return first_order_system(vehicle, vehicle_states(vehicle), excitation, speed)[0]
     n, (m, k), axles = len(vehicle.mass), excitation.G.shape, len(excitation.heights)
     by_motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
     by_road = np.linalg.solve(vehicle.mass, np.hstack([vehicle.road_stiffness, vehicle.road_damping]))
@@ -86,7 +87,7 @@ def _system(
 
 
 NEGLIGIBLE_SHARE = 1e-10
-"""Share of the largest inertia, damping or stiffness, scaled to a unit diagonal, below which there is none."""
+"""Share of the largest inertia, damping or stiffness, scaled to a unit diagonal, below which a motion has none."""
 
 
 def has_singular_mass(mass: np.ndarray) -> bool:
@@ -96,7 +97,7 @@ def has_singular_mass(mass: np.ndarray) -> bool:
 
 @dataclass(frozen=True)
 class VehicleStates:
-    """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, q = Q x + direct g.
+    """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, coordinates q = Q x + direct g.
 
     The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
     massless_part, integrated_part: a and b by q.
@@ -111,8 +112,8 @@ class VehicleStates:
 
 
 def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
-    """``VehicleStates`` of a vehicle whose mass matrix may be singular; InputError where no spring or damper holds a
-    massless body."""
+    """``VehicleStates`` of a vehicle whose mass matrix may be singular. Raises InputError where a massless body has
+    neither spring nor damper."""
     Y, Z = _range_and_kernel(vehicle.mass)
     V, E = (Z @ basis for basis in _range_and_kernel(Z.T @ vehicle.damping @ Z))
     n, a, b = len(vehicle.mass), Y.shape[1], V.shape[1]
@@ -131,11 +132,11 @@ def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
     return VehicleStates(A, B, q, direct, back[:a], back[a : a + b])
 
 
-def first_order(
+def first_order_system(
     vehicle: LinearVehicle, states: VehicleStates, excitation: Excitation, speed: float
 ) -> tuple[DelayedSystem, np.ndarray]:
-    """The system with state (a, a', b, f) for a vehicle whose mass matrix may be singular, and the vehicle's
-    coordinates as a function of that state (n, x).
+    """State-space model with the state (a, a', b, f) of a vehicle whose mass matrix may be singular, and the matrix (n,
+    x) from this state to the vehicle's coordinates.
 
     C and D are without rounding; what would see the derivative of white noise has infinite D.
     """
@@ -165,8 +166,8 @@ def first_order(
 def _direct_transmission(
     output_rows: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray
 ) -> np.ndarray:
-    """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, B, and noise in
-    the rates of the road's heights."""
+    """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, through B, and
+    through noise in the rates of the road's heights."""
     transmission = (
         output_rows.rate_factors @ q @ B
         + output_rows.acceleration_factors @ v @ B
@@ -181,7 +182,7 @@ def _direct_transmission(
 
 
 def _solved_for(matrix: np.ndarray, right_side: np.ndarray) -> np.ndarray:
-    """Solution of matrix X = right; InputError where no spring or damper holds a massless body."""
+    """Solution X of matrix X = right_side. Raises InputError where a massless body has neither spring nor damper."""
     if not len(matrix):
         return right_side
     if np.linalg.cond(matrix) > 1 / NEGLIGIBLE_SHARE:

@@ -1,4 +1,5 @@
-"""The linear vehicle on its road for other programs: matrices as npz and mat, and as python-control's StateSpace."""
+"""Export of the linear vehicle on its road for other programs: matrices as npz and mat, and as python-control's
+StateSpace."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
 
 
 def exported_arrays(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
-    """Arrays for export by name: A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and
-    standard deviations."""
+    """Arrays for export by name: A, C, B and D of every axle (B1, D1, ...), delays (s), names, state covariance P and
+    standard deviations of the outputs."""
     named: dict[str, Any] = {"A": system.A, "C": system.C}
     for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
         named |= {f"B{i}": B, f"D{i}": D}
@@ -28,8 +29,8 @@ def exported_arrays(system: DelayedSystem, covariance: StationaryCovariance) -> 
     }
 
 
-def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) -> list[Path]:
-    """Write ``stem``.npz and ``stem``.mat; returns their paths."""
+def write_exports(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) -> list[Path]:
+    """Write the exported arrays to ``stem``.npz and ``stem``.mat; returns the paths of both files."""
     from scipy.io import savemat
 
     content = exported_arrays(system, covariance)
@@ -42,8 +43,8 @@ def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) ->
 
 
 def state_space(system: DelayedSystem) -> "control.StateSpace":
-    """State-space model in which each axle's noise is a separate input, axle after axle; the user must apply the
-    delays.
+    """State-space model of python-control in which each axle's noise is a separate input, axle after axle; the user
+    must apply the delays.
 
     Inputs are named w1_1, w1_2, ... (axle, channel); the noise of axle i is that of the first, ``delays[i]`` later.
     """

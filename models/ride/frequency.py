@@ -1,4 +1,5 @@
-"""Spectra of a vehicle's outputs, and variances as integrals over them: independent of the covariance equation.
+"""Spectra of a vehicle's outputs on a random road, and variances as integrals over them: independent of the covariance
+equation.
 
 Transfer functions come from the dynamic stiffness K + i w D - w^2 M, frequency by frequency; the road is put in front
 as a factor. The integrand of a delay, f(w) e^(i w tau), is smooth but for its oscillation: f is interpolated by
@@ -26,24 +27,27 @@ from scipy.special import eval_legendre, spherical_jn
 
 from models.ride.marginal import Unstable
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle, poles
+from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 
 GAUSS_POINTS = 16
-"""Gauss points of a panel."""
+"""Count of Gauss points of a panel."""
 LOWEST_RATIO, HIGHEST_RATIO = 0.02, 1e12
-"""Ends of the first and of the last panel, by the lowest and the highest frequency of vehicle and road. Not lower: near
-zero the stiffness of a free vehicle is all rounding, so that the first panel is not halved for ever either."""
+"""Ratios of the ends of the first and of the last panel to the lowest and the highest frequency of vehicle and road.
+Not lower: near zero the stiffness of a free vehicle is only rounding, so that the first panel is not halved for ever
+either."""
 PANEL_TOLERANCE = 1e-11
-"""A panel is halved while that changes any variance by more than this share; MOST_PANELS at most in all."""
+"""Relative change of a variance by halving a panel above which the panel is halved again; MOST_PANELS panels at
+most."""
 MOST_PANELS = 1500
-EPS = float(np.finfo(float).eps)
+MACHINE_EPSILON = float(np.finfo(float).eps)
 GROWTH_SHARE = 1e-6
-"""Share of the fastest rate: a Jordan pair of zeros comes out at the root of rounding."""
+"""Share of the fastest rate below which a growth rate counts as rounding: a Jordan pair of zeros comes out at the root
+of rounding."""
 SILENCE_SHARE = 1e-24
-"""Share of its terms' squares below which an output is zero by symmetry, and rounding is all of it."""
+"""Share of its terms' squares below which an output is zero by symmetry, so that its value is only rounding."""
 
 Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
-"""By output, the complex factor of a weighting as a function of the frequency in Hz."""
+"""Weighting of each output by name: its complex factor as a function of the frequency in Hz."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +71,9 @@ def transfer_functions(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
     return rows @ motion + read.road_factors + s * read.road_rate_factors
 
 
-def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
-    """Transfer functions (a, n, w, k) from the noise to heights under the wheels, one axle after the other, without
-    delays; m / sqrt(1/s)."""
+def road_transfer(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
+    """Transfer functions (a, n, w, k), in m / sqrt(1/s), from the road's noise to the heights under the wheels, one
+    axle after the other, without delays."""
     s = 1j * np.asarray(omega, float)[:, None, None]
     shape = s * np.eye(len(excitation.F)) - speed * excitation.F
     filtered = np.linalg.solve(shape, speed**0.5 * excitation.G.astype(complex)[None])
@@ -81,7 +85,7 @@ def spectral_densities(
 ) -> np.ndarray:
     """Two-sided spectral densities (n, p) of the outputs over the angular frequency (rad/s); their integral over
     positive and negative frequencies is the variance."""
-    parts = _weighted_transfer(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
+    parts = _weighted_transfer(vehicle, omega, weights or {}) @ road_transfer(excitation, speed, omega)
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
     delays = np.array(excitation.lengths) / speed
@@ -89,13 +93,16 @@ def spectral_densities(
     return (abs(delayed_parts.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
 
 
-def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
+def one_sided_densities(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray
+) -> np.ndarray:
     """One-sided spectral densities (n, p) of the outputs over the frequency (Hz)."""
     return 4 * np.pi * spectral_densities(vehicle, excitation, speed, 2 * np.pi * frequency)
 
 
 def _weighted_transfer(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
-    """Transfer functions (n, p, w) from heights to outputs, in which weighted outputs replace the unweighted ones."""
+    """Transfer functions (n, p, w) from road heights to outputs, in which weighted outputs replace the unweighted
+    ones."""
     transfer = transfer_functions(vehicle, omega)
     for i, output in enumerate(vehicle.outputs):
         if output.name in weights:
@@ -106,7 +113,7 @@ def _weighted_transfer(vehicle: LinearVehicle, omega: np.ndarray, weights: Weigh
 def variances_by_quadrature(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weights: Weights | None = None
 ) -> Quadrature:
-    """Variances of the outputs as integrals over all frequencies; inf where an integral diverges.
+    """Variances of the outputs as integrals of their spectra over all frequencies; inf where an integral diverges.
 
     Outputs with a weighting are replaced by their weighted ones.
 
@@ -120,7 +127,7 @@ def variances_by_quadrature(
         """Contributions (panels, p) to the variances from the frequency interval in each row of ``edges``."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
         omega = (centre[:, None] + half[:, None] * LEGENDRE_NODES).ravel()
-        parts = _weighted_transfer(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
+        parts = _weighted_transfer(vehicle, omega, weights or {}) @ road_transfer(excitation, speed, omega)
         parts = parts.reshape(len(parts), len(centre), GAUSS_POINTS, *parts.shape[2:])
         return _panel_integrals(parts, centre, half, excitation, speed)
 
@@ -129,11 +136,11 @@ def variances_by_quadrature(
     first = panel_integrals(edges)
     stiffness = vehicle.stiffness
     largest = np.sqrt(abs(stiffness).max(axis=1, initial=0.0))
-    digit = EPS * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
+    digit = MACHINE_EPSILON * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
     nudged = panel_integrals(edges, replace(vehicle, stiffness=stiffness + digit))
     rounding = 10 * abs((nudged - first).sum(axis=0))  # one draw of many
     weighted_gains = abs(_weighted_transfer(vehicle, frequencies[1:], weights or {})) @ abs(
-        road(excitation, speed, frequencies[1:])
+        road_transfer(excitation, speed, frequencies[1:])
     )
     terms = np.einsum("ambk,ambk,m->b", weighted_gains, weighted_gains, frequencies[1:])
     total = abs(first).sum(axis=0)
@@ -147,30 +154,32 @@ def variances_by_quadrature(
 
 def _check_stable(vehicle: LinearVehicle) -> None:
     """Raise Unstable if a motion grows faster than rounding alone can make a free motion grow."""
-    rates = poles(vehicle)
+    rates = eigenvalues(vehicle)
     worst = rates[rates.real.argmax()]
     if worst.real > GROWTH_SHARE * abs(rates).max():
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
 def _halve_panels(
-    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, largest_change: np.ndarray
+    integrals_over: Callable[[np.ndarray], np.ndarray],
+    edges: np.ndarray,
+    panel_integrals: np.ndarray,
+    largest_change: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most
-    ``largest_change`` (p,).
-    """
+    """Sums (p,) of the integral over all panels, and the changes by the last halving; panels are halved until that
+    changes each sum by at most ``largest_change`` (p,)."""
     variance, error = np.zeros_like(largest_change), np.zeros_like(largest_change)
     panels_used, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
         finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
-        parts = over(finer)
+        parts = integrals_over(finer)
         panels_used += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
-        change = abs(halves - panels)
+        change = abs(halves - panel_integrals)
         rough = (change > largest_change).any(axis=1) & (edges[:, 1] > lowest) & (panels_used < MOST_PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
-        edges, panels = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
+        edges, panel_integrals = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
     return variance, error, panels_used
 
 
@@ -179,7 +188,7 @@ LEGENDRE_DEGREES = np.arange(GAUSS_POINTS)
 TO_LEGENDRE = (
     (LEGENDRE_DEGREES[:, None] + 0.5) * eval_legendre(LEGENDRE_DEGREES[:, None], LEGENDRE_NODES) * LEGENDRE_WEIGHTS
 )
-"""Coefficients of the Legendre polynomials (degree, node) by the values at the nodes."""
+"""Matrix (degree, node) from values at the Gauss nodes to coefficients of the Legendre polynomials."""
 
 
 def _panel_integrals(
@@ -210,53 +219,59 @@ def _panel_edges(vehicle: LinearVehicle, excitation: Excitation, speed: float) -
 
 
 Densities = Callable[[np.ndarray], np.ndarray]
-"""From wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of heights, see models/road/isotropic.py."""
-PER_PANEL = 10
-"""Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest delay."""
+"""Function from wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of the heights under the wheels, see
+models/road/isotropic.py."""
+GAUSS_POINTS_PER_PANEL = 10
+"""Count of Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest
+delay."""
 
 
 def output_densities(vehicle: LinearVehicle, heights: Densities, speed: float, wavenumber: np.ndarray) -> np.ndarray:
-    """Two-sided densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in m/s."""
+    """Two-sided spectral densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in
+    m/s."""
     H = transfer_functions(vehicle, speed * wavenumber)
     return np.einsum("kpi,kij,kpj->kp", H.conj(), heights(wavenumber), H, optimize=True).real
 
 
-def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float) -> np.ndarray:
-    """Variances (p,) in unit^2 of the outputs, from wavenumbers between ``low`` and ``high`` (rad/m), positive and
+def variances_over_wavenumbers(
+    vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float
+) -> np.ndarray:
+    """Variances (p,) of the outputs in unit^2, from wavenumbers between ``low`` and ``high`` (rad/m), positive and
     negative.
 
     What lies outside is left out: a band limit where that is wanted, an error where it is not.
     """
-    wavenumber, weight = both_sides(vehicle, low, high)
+    wavenumber, weight = signed_wavenumbers(vehicle, low, high)
     return weight @ output_densities(vehicle, heights, speed, wavenumber)
 
 
-def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positive and negative wavenumbers (k,) in rad/m between ``low`` and ``high``, and their weights for
-    integration."""
+def signed_wavenumbers(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """Positive and negative wavenumbers (k,) in rad/m with absolute values between ``low`` and ``high``, and their
+    weights for integration."""
     behind = vehicle.axles[0] - vehicle.axles[-1]
     longest = np.pi / behind if behind else np.inf
     edges = [low]
     while edges[-1] < high:
         edges.append(min(edges[-1] + min(0.19 * edges[-1], longest), high))
-    nodes, weights = leggauss(PER_PANEL)
+    nodes, weights = leggauss(GAUSS_POINTS_PER_PANEL)
     start, half = np.array(edges[:-1]), np.diff(edges) / 2.0
     return ((start + half)[:, None] + half[:, None] * nodes).ravel(), (2.0 * half[:, None] * weights).ravel()
 
 
 HIGHEST_FREQUENCY = 60.0
-"""Hz up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
-PER_LOBE = 8
-"""Frequencies for each lobe, 1 / T, of the first integral."""
+"""Frequency (Hz) up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
+FREQUENCIES_PER_LOBE = 8
+"""Count of frequencies in each lobe, 1 / T wide, of the integrand of the mean's variance."""
 FREQUENCIES_AT_ONCE = 2000
-"""Frequencies whose densities are made at once."""
+"""Count of frequencies whose densities are computed at once."""
 
 
 def standard_errors(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Standard errors (p,) of an output's mean, and of its mean square, over a time of ``duration`` (s)."""
-    step = 2.0 * np.pi / duration / PER_LOBE
+    """Standard errors (p,) of an output's mean, and of its mean square, when averaged over a time of ``duration``
+    (s)."""
+    step = 2.0 * np.pi / duration / FREQUENCIES_PER_LOBE
     omega = step * (np.arange(int(2.0 * np.pi * HIGHEST_FREQUENCY / step)) + 0.5)
     parts = np.array_split(omega, -(-len(omega) // FREQUENCIES_AT_ONCE))
     density = np.concatenate([spectral_densities(vehicle, excitation, speed, omega_part) for omega_part in parts])

@@ -1,4 +1,5 @@
-"""Mean force and best linear gain of a bent law whose argument is a Gaussian process.
+"""Mean force and best linear gain of a nonlinear force law whose argument is a Gaussian process (statistical
+linearisation).
 
 Of all lines through the mean, F = E[f(x)] + g (x - E[x]) misses f(x) least in the mean square if
 
@@ -14,14 +15,14 @@ from scipy.special import ndtr
 from models.vehicles.spatial import Curve, SpringDamper
 
 TRAPEZOID_NODES = np.linspace(-1.0, 1.0, 801)
-"""Of the trapezoidal rule, which converges geometrically for smooth integrands that vanish at both ends."""
+"""Nodes of the trapezoidal rule, which converges geometrically for smooth integrands that vanish at both ends."""
 SECH_LIMIT, NORMAL_LIMIT = 20.0, 9.0
-"""Where it ends: sech^2 is 4 e^-40 there, the normal density e^-40."""
+"""Ends of the integration range: sech^2 is 4 e^-40 there, the normal density e^-40."""
 
 
-def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
-    """Expected values E[f(x)] (N) and E[f'(x)] (N per unit of x) of a curve f for normally distributed x; zeros without
-    a curve."""
+def mean_force_and_slope(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
+    """Expected values E[f(x)] (N) and E[f'(x)] (N per unit of x) of a force curve f for normally distributed x; zeros
+    without a curve."""
     if curve is None:
         return 0.0, 0.0
     if deviation == 0.0:
@@ -39,9 +40,9 @@ def _slope_of_curve(curve: Curve, x: float) -> float:
     return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if x >= corner)
 
 
-def of_friction(friction: float, friction_rate: float, deviation: float) -> float:
-    """Expected slope E[f'(v)] (N s/m) of f(v) = friction tanh(v / friction_rate), for v normal with mean 0 and a
-    standard deviation (m/s).
+def mean_friction_slope(friction: float, friction_rate: float, deviation: float) -> float:
+    """Expected slope E[f'(v)] (N s/m) of the friction force f(v) = friction tanh(v / friction_rate), for v normal with
+    mean 0 and a standard deviation (m/s).
 
     With t = v / friction_rate the integrand sech^2(t) times the density of t is smooth at any ratio of the two.
     """
@@ -53,20 +54,20 @@ def of_friction(friction: float, friction_rate: float, deviation: float) -> floa
     return friction / friction_rate * float((density / np.cosh(t) ** 2).sum() * (t[1] - t[0]))
 
 
-def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
-    """Statistical linearisation of the curve over travel (m): mean force (N), gain (N/m), and variance (N^2) of the
-    remaining force."""
-    force, gain = of_curve(spring.travel_force, mean, deviation)
+def linearised_travel_law(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
+    """Statistical linearisation of a spring's force curve over travel (m): mean force (N), gain (N/m), and variance
+    (N^2) of the remaining force."""
+    force, gain = mean_force_and_slope(spring.travel_force, mean, deviation)
     x = deviation * EXPECTATION_POINTS
     law = _curve_at(spring.travel_force, mean + x)
     return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
 
 
-def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
-    """Statistical linearisation of curve and friction over the rate (m/s): mean force (N), gain (N s/m), and variance
-    (N^2) of the remaining force."""
-    force, gain = of_curve(spring.rate_force, 0.0, deviation)
-    gain += of_friction(spring.friction, spring.friction_rate, deviation)
+def linearised_rate_law(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
+    """Statistical linearisation of a spring's force curve and friction over the rate (m/s): mean force (N), gain (N
+    s/m), and variance (N^2) of the remaining force."""
+    force, gain = mean_force_and_slope(spring.rate_force, 0.0, deviation)
+    gain += mean_friction_slope(spring.friction, spring.friction_rate, deviation)
     x = deviation * EXPECTATION_POINTS
     law = _curve_at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
     return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
@@ -74,11 +75,12 @@ def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float
 
 EXPECTATION_POINTS = np.linspace(-8.0, 8.0, 2001)
 EXPECTATION_WEIGHTS = np.exp(-(EXPECTATION_POINTS**2) / 2.0) / np.exp(-(EXPECTATION_POINTS**2) / 2.0).sum()
-"""Of expectations over the normal distribution: good to 1e-4 for laws with corners, enough for what is left out."""
+"""Weights of expectations over the normal distribution: good to 1e-4 for force laws with corners, enough for the
+remaining force."""
 
 
 def _curve_at(curve: Curve | None, x: np.ndarray) -> np.ndarray:
-    """Forces of the curve at many arguments."""
+    """Forces (N) of a spring's curve at many arguments."""
     if curve is None:
         return np.zeros_like(x)
     offset, slope, corners, bends = curve.hinges()

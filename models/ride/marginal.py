@@ -1,4 +1,5 @@
-"""Motions that nothing pulls back: found in the system matrix, taken out of it, and what the road makes of them.
+"""Motions of a linear system without restoring force: found in the system matrix, separated from it, and their growth
+on a random road.
 
 A vehicle that is free to drive away has eigenvalues at zero (its place, its heading, the two coupled as a Jordan
 pair); an undamped spring has a pair on the imaginary axis. A Lyapunov equation has no solution then, although most
@@ -21,15 +22,17 @@ MATRIX_ACCURACY = 1e-10
 """Relative accuracy of a system matrix where nothing else is known: formulas reach 1e-15, engines that differentiate
 curves with corners 1e-11. A motion with a rate below this share of the fastest one (some 1e-8 1/s) counts as free."""
 ZERO_MARGIN = 1e3
-"""What should vanish is told from zero if it is this many times larger than the accuracy allows."""
+"""Factor by which a number must exceed its accuracy to count as different from zero."""
 
 
 ZERO_PRODUCT_SHARE = 10 * float(np.finfo(float).eps)
-"""A product of rows and columns no larger than this share of its terms is zero by symmetry, and all of it rounding."""
+"""Share of its terms below which a product of rows and columns is zero by symmetry, so that its value is only
+rounding."""
 
 
 class Unstable(InputError):
-    """The system leaves its equilibrium without excitation: ``variance_growth`` in 1/s, ``frequency`` in Hz."""
+    """Error of a system that leaves its equilibrium without excitation: its ``growth`` rate in 1/s and ``frequency`` in
+    Hz."""
 
     def __init__(self, growth: float, frequency: float, speed: float | None = None) -> None:
         self.growth, self.frequency = growth, frequency
@@ -46,9 +49,10 @@ class Unstable(InputError):
 
 @dataclass(frozen=True)
 class MarginalParts:
-    """Decoupling of x' = A x + u into a marginal and a stable part: x = V0 a + V b, a' = M a + W0 u, b' = S b + W u.
+    """Decoupling of x' = A x + u into a marginal part (eigenvalues on the imaginary axis) and a stable part: x = V0 a +
+    V b, a' = M a + W0 u, b' = S b + W u.
 
-    M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
+    M (k, k) has its eigenvalues on the imaginary axis, the first ``zero_count`` of its rows those at 0 (nilpotent), the
     others undamped oscillations; S is stable. V and W are in extended precision.
     scale (n,): sizes of the states that balance A; rounding is relative to them. norm_of_rates: norm of A, 1/s.
     neglected_rate_ratio: largest rate that was taken for 0, by the slowest of the stable part.
@@ -60,7 +64,7 @@ class MarginalParts:
     S: np.ndarray
     V: np.ndarray
     W: np.ndarray
-    zeros: int
+    zero_count: int
     scale: np.ndarray
     norm_of_rates: float
     neglected_rate_ratio: float
@@ -72,7 +76,7 @@ class MarginalParts:
 
 
 def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> MarginalParts:
-    """Marginal and stable part of x' = A x + u, with A (n, n); raises Unstable, or InputError where they cannot be
+    """Marginal and stable part of x' = A x + u, with A (n, n). Raises Unstable, or InputError where they cannot be
     separated.
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
@@ -89,7 +93,7 @@ def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> Marginal
     W = V.T.copy()
     for size in {k, zeros}:
         _decouple(form, V, W, size)
-    S, T, back = _by_motions(form[k:, k:])
+    S, T, back = _modal_form(form[k:, k:])
     stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
     return MarginalParts(
         form[:k, :k],
@@ -101,13 +105,13 @@ def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> Marginal
         zeros,
         scale,
         norm,
-        _by_slowest(left, stable_part[undamped:, undamped:]),
+        _ratio_to_slowest_decay(left, stable_part[undamped:, undamped:]),
     )
 
 
 FREE_ROUNDING = 1e-3
-"""A motion is not called free because of rounding where rounding comes to more than this (1/s): in a thousand seconds
-a vehicle comes to rest."""
+"""Rounding of a rate (1/s) above which a motion is not called free because of rounding: in a thousand seconds a vehicle
+comes to rest."""
 
 
 def _refuse(fastest: float) -> None:
@@ -121,7 +125,8 @@ def _refuse(fastest: float) -> None:
 
 
 def _balanced_matrix(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """A after scaling the states to similar size, these scales (n,), and the norm of A as LAPACK balances it (1/s).
+    """System matrix A after scaling the states to similar size, these scales (n,), and the norm of A as LAPACK balances
+    it (1/s).
 
     LAPACK counts diagonals in: a road filter whose corner is almost 0 would get a size of almost 0, and beside its
     noise, which does not shrink, nothing could be told from rounding. The fastest rate on all diagonals prevents it.
@@ -131,13 +136,13 @@ def _balanced_matrix(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     return A * scale / scale[:, None], scale, fastest
 
 
-def _by_slowest(rate: float, S: np.ndarray) -> float:
+def _ratio_to_slowest_decay(rate: float, S: np.ndarray) -> float:
     return rate / float(-np.linalg.eigvals(S).real.max()) if len(S) else 0.0
 
 
 def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int, float]:
-    """Orthogonal Q, the form Q' A Q with its zero eigenvalues first, those strictly upper triangular, their number,
-    and the largest singular value that was taken for 0.
+    """Orthogonal matrix Q, the form Q' A Q with its zero eigenvalues first, the block of these strictly upper
+    triangular; their number; and the largest singular value that was taken for 0.
 
     Null space, then null space of what remains, until nothing remains to be found: the staircase of Jordan chains.
     """
@@ -158,7 +163,7 @@ def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarra
 
 
 def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Orthogonal U, the ordered real Schur form U' A U with its undamped pairs first, and the number of their
+    """Orthogonal matrix U, the ordered real Schur form U' A U with its undamped pairs first, and the number of their
     eigenvalues.
 
     Raises Unstable if any eigenvalue lies beyond them, on the right.
@@ -190,8 +195,9 @@ def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
         form[:k, k:] = 0.0
 
 
-def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A transformed almost to its own modes, T^-1 A T, with T and its inverse: real, in extended precision.
+def _modal_form(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """System matrix A transformed almost to its own modes, T^-1 A T, with T and its inverse: real, in extended
+    precision.
 
     In positions and velocities an acceleration is a small difference of large forces, and a rounding of the state
     is multiplied by stiffnesses; in these coordinates each motion has its own size. They need not be exact, and
@@ -209,7 +215,7 @@ def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 LARGEST_CONDITION = 1e8
-"""Condition beyond which eigenvectors are of no use as coordinates."""
+"""Condition number of the eigenvectors beyond which they are of no use as coordinates."""
 
 
 @dataclass(frozen=True)
@@ -229,8 +235,8 @@ def variance_growth(
     variance: np.ndarray,
     accuracy: float = MATRIX_ACCURACY,
 ) -> Growth:
-    """Long-run growth of the variances of y = C x along the marginal motions, under noise through B_i (n, k) with
-    delays tau_i (s).
+    """Long-run growth of the variances of the outputs y = C x along the marginal motions, under noise through B_i (n,
+    k) with delays tau_i (s).
 
     Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
     last one may stop. C (p, n). Products no larger than ZERO_MARGIN times their accuracy are zero, unless the motion,
@@ -245,19 +251,19 @@ def variance_growth(
     )
     outputs_of_marginal = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.count_of_marginal_states)
-    z, least_rate = split.zeros, ZERO_MARGIN * accuracy
+    z, least_rate = split.zero_count, ZERO_MARGIN * accuracy
     largest_rounding = least_rate * variance * 2 * accuracy * split.norm_of_rates
-    rate, power = _of_zeros(
+    rate, power = _growth_by_zeros(
         split.M[:z, :z], G[:z], G_size[:z], outputs_of_marginal[:, :z], seen_size[:, :z], least_rate, largest_rounding
     )
-    swung = _of_undamped(
+    swung = _growth_by_undamped(
         split.M[z:, z:], G[z:], G_size[z:], outputs_of_marginal[:, z:], seen_size[:, z:], least_rate, largest_rounding
     )
     rate = np.where(power <= 1, rate + swung, rate)
     return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
 
 
-def _of_zeros(
+def _growth_by_zeros(
     N: np.ndarray,
     G: np.ndarray,
     G_size: np.ndarray,
@@ -266,8 +272,8 @@ def _of_zeros(
     lower_bound: float,
     upper_bound: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Growth rates and powers (p,) from h(t) = sum of C N^l G t^l / l!, whose highest power dominates; only rates above
-    ``upper_bound`` count."""
+    """Growth rates and powers (p,) of the variances due to zero eigenvalues, from the response sum of C N^l G t^l / l!,
+    whose highest power dominates; only rates above ``upper_bound`` count."""
     rate, power = np.zeros(len(C)), np.zeros(len(C), int)
     step, step_size = G, G_size
     for level in range(len(N)):
@@ -281,7 +287,7 @@ def _of_zeros(
     return rate, power
 
 
-def _of_undamped(
+def _growth_by_undamped(
     T: np.ndarray,
     G: np.ndarray,
     G_size: np.ndarray,
@@ -290,8 +296,8 @@ def _of_undamped(
     lower_bound: float,
     upper_bound: np.ndarray,
 ) -> np.ndarray:
-    """Growth rates (p,): the mean square of the response C e^(T t) G, summed over the frequencies; only those above
-    ``upper_bound`` count."""
+    """Growth rates (p,) of the variances due to undamped oscillations: the mean square of the response C e^(T t) G,
+    summed over the frequencies; only those above ``upper_bound`` count."""
     rate = np.zeros(len(C))
     values, vectors = np.linalg.eig(T)
     right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G

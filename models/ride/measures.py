@@ -1,4 +1,5 @@
-"""Figures that engineers read from variances: how often a travel runs out, how much a wheel load moves about its mean.
+"""Measures of ride from standard deviations: how often a travel exceeds its limit, how much a wheel load varies about
+its mean.
 
 All for Gaussian processes of zero mean, which the linear vehicle makes of a Gaussian road. Deviations and limits below
 0, and what is not finite, are refused (InputError).
@@ -9,15 +10,16 @@ import math
 from models.core.errors import InputError
 
 
-def share_beyond(deviation: float, threshold: float) -> float:
-    """Share of time for which abs(x) > limit, from the standard deviation of x; the unit of both is that of x."""
+def time_share_beyond(deviation: float, threshold: float) -> float:
+    """Share of time for which abs(x) exceeds a threshold, from the standard deviation of a Gaussian x; both in the unit
+    of x."""
     _check_value(deviation=deviation, limit=threshold)
     return 0.0 if deviation == 0.0 else math.erfc(threshold / (math.sqrt(2.0) * deviation))
 
 
-def exceedances(deviation: float, rate_deviation: float, threshold: float) -> float:
-    """Number of times per second that abs(x) exceeds the limit, from the standard deviations of x and of its rate x'
-    (1/s).
+def exceedance_rate(deviation: float, rate_deviation: float, threshold: float) -> float:
+    """Number of times per second that abs(x) exceeds a threshold, from the standard deviations of x and of its rate x'
+    (per s).
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
     """
@@ -27,15 +29,16 @@ def exceedances(deviation: float, rate_deviation: float, threshold: float) -> fl
     return rate_deviation / (math.pi * deviation) * math.exp(-((threshold / deviation) ** 2) / 2.0)
 
 
-def dynamic_load_factor(deviation: float, static: float) -> float:
-    """Ratio of the standard deviation of a wheel's load to its static load (both N): at 0.33 a tyre begins to lift off.
+def dynamic_load_factor(deviation: float, static_load: float) -> float:
+    """Ratio of the standard deviation of a wheel's load to its static load (both N): at 0.33 the tyre begins to lift
+    off.
 
     At three standard deviations the load is then gone, which a linear vehicle does not notice.
     """
     _check_value(deviation=deviation)
-    if not 0.0 < static < math.inf:
-        raise InputError("", "static", static, "must be a wheel's load above 0, in N")
-    return deviation / static
+    if not 0.0 < static_load < math.inf:
+        raise InputError("", "static", static_load, "must be a wheel's load above 0, in N")
+    return deviation / static_load
 
 
 def _check_value(**named_values: float) -> None:

@@ -1,4 +1,5 @@
-"""Many copies of a vehicle on random roads of their own, stepped exactly from one cell of the road to the next.
+"""Monte Carlo simulation of a linear vehicle: many copies on independent random roads, integrated exactly from cell to
+cell of the road.
 
 Within a cell the road's white noise is what its Legendre series says: coefficients of unit variance, independent, the
 same for every axle that crosses the cell, however much later and at whatever speed. The response to each coefficient
@@ -20,29 +21,31 @@ from models.core.errors import InputError
 from models.core.noise import ROAD, SAMPLES_PER_BLOCK, normal_samples
 from models.ride.covariance import FINITE, stationary_covariance
 from models.ride.excited import DelayedSystem
-from models.ride.road_in_path import at_speed, power_terms
+from models.ride.road_in_path import system_at_speed, taylor_terms
 from models.ride.speed_profile import SpeedProfile
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LEGENDRE_MODES = 8
-"""Legendre coefficients of noise in a cell: the next one adds 1e-9 of a cell's variance where LARGEST_RATE_TIMES_CELL
-is full."""
+"""Count of Legendre coefficients of the noise in a cell: a further coefficient adds 1e-9 of a cell's variance where
+LARGEST_RATE_TIMES_CELL is reached."""
 LARGEST_RATE_TIMES_CELL = 2.0
-"""Fastest rate of vehicle or road times the cell, at most."""
+"""Largest product of the fastest rate of vehicle or road (1/m) and the cell's length (m)."""
 SERIES_TERMS = 30
-"""Of the series in powers of a cell's matrix: 2^30 / 30! = 4e-24."""
+"""Count of terms of the series in powers of a cell's matrix: 2^30 / 30! = 4e-24."""
 SLOWEST_DECAY = 1e-6
-"""Rate (1/s) below which a motion does not die out in any run."""
+"""Decay rate (1/s) below which a motion does not die out in any run."""
 FORGETTING_EXPONENT = 9.0
-"""Slowest rate times the time that copies, begun at zero, run before they count: e^-18 of a variance is missing."""
+"""Product of the slowest decay rate and the time that copies, begun at zero, run before they count: e^-18 of a variance
+is missing."""
 AXLE_SHIFT_TOLERANCE = 1e-3
-"""How far (m) an axle may be moved so that all distances are whole numbers of cells: 0.1 ms at 10 m/s."""
+"""Distance (m) by which an axle may be moved so that all axle distances are whole numbers of cells: 0.1 ms at 10
+m/s."""
 
 
 @dataclass(frozen=True)
 class VarianceEstimate:
-    """Variances of outputs estimated from the copies: time (N,), s; variance, error (N, p), unit^2, inf where a
+    """Variances of the outputs estimated from the copies: time (N,), s; variance, error (N, p), unit^2, inf where a
     variance is infinite.
 
     ``error`` is the standard error. The mean is known to be zero.
@@ -55,8 +58,8 @@ class VarianceEstimate:
     copies: int
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """Standard scores (N, p): the estimate less the variances of the given standard deviations (N, p), divided by
-        the standard errors."""
+        """Standard scores (N, p): estimated variance minus the square of the given standard deviations (N, p), divided
+        by the standard errors."""
         known = np.isfinite(self.variance)
         variance_error = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
         return np.divide(variance_error, self.error, out=np.full_like(variance_error, np.nan), where=known)
@@ -72,7 +75,8 @@ def variances_along_drive(
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
-    """Variances over the copies along a drive, at ends of cells next to each of the instants (s).
+    """Variances of the outputs over the copies along a drive with varying speed, at the ends of cells next to each of
+    the instants (s).
 
     The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
     ``weighting.weighted``. Raises InputError for a standstill: a cell would take for ever.
@@ -84,7 +88,7 @@ def variances_along_drive(
     ends = profile.time(cells.length * np.arange(1, int(profile.paths[-1] / cells.length) + 1))
     wanted = np.unique(np.abs(ends[:, None] - np.asarray(instants)).argmin(axis=0))
     first = float(profile.speeds[0])
-    lead = np.full(cells.to_forget(first), cells.length / first)
+    lead = np.full(cells.cells_to_forget(first), cells.length / first)
     rows = []
     durations = np.append(lead, np.diff(ends[: wanted[-1] + 1], prepend=profile.times[0]))
     for number, x in enumerate(cells.states(durations, copies, seed)):
@@ -94,7 +98,7 @@ def variances_along_drive(
     return cells.estimate(ends[wanted], np.array(rows), copies)
 
 
-def at_constant_speed(
+def variances_at_constant_speed(
     vehicle: LinearVehicle,
     excitation: Excitation,
     speed: float,
@@ -104,10 +108,10 @@ def at_constant_speed(
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
-    """Stationary variances (1, p) at a constant speed, averaged over the copies and, in each of them, over ``duration``
-    (s)."""
+    """Stationary variances (1, p) of the outputs at a constant speed (m/s), averaged over the copies and, in each of
+    them, over ``duration`` (s)."""
     cells = _Cells(vehicle, excitation, weightings, speed)
-    skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
+    skipped, counted = cells.cells_to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
     for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copies, seed)):
         if number >= skipped:
@@ -136,13 +140,13 @@ def path_cell(
 
 
 class _Cells:
-    """A system whose path is divided into cells that fit its axle distances and its slowest speed (m/s)."""
+    """Vehicle on a path that is divided into cells, which fit its axle distances and its slowest speed (m/s)."""
 
     def __init__(
         self, vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None, slowest: float
     ) -> None:
         def system(speed: float) -> DelayedSystem:
-            return at_speed(vehicle, excitation, speed, weightings)
+            return system_at_speed(vehicle, excitation, speed, weightings)
 
         self.at_unit_speed, self.at_double_speed = system(1.0), system(2.0)
         self.finite = np.array([status == FINITE for status in stationary_covariance(system(slowest)).status])
@@ -153,7 +157,7 @@ class _Cells:
             self.at_double_speed.A - self.at_unit_speed.A,
         )
 
-    def to_forget(self, speed: float) -> int:
+    def cells_to_forget(self, speed: float) -> int:
         """Number of cells at a constant speed after which a copy no longer depends on its initial state."""
         slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
         if slowest < SLOWEST_DECAY:
@@ -180,9 +184,8 @@ class _Cells:
             yield x
 
     def _cell_transition(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """Transition matrix (n, n) over a cell, and responses (n, a k LEGENDRE_MODES) to the noise in it, axle by
-        axle.
-        """
+        """Transition matrix (n, n) of the state over a cell, and responses (n, a k LEGENDRE_MODES) to the noise in it,
+        axle by axle."""
         matrix = duration * self.at_rest + self.length * self.per_speed
         rows = [np.stack(self.at_unit_speed.B, axis=1) * self.length**0.5]
         for _ in range(SERIES_TERMS - 1):
@@ -191,7 +194,7 @@ class _Cells:
         return expm(matrix), responses.reshape(len(matrix), -1)
 
     def outputs(self, x: np.ndarray, speed: float) -> np.ndarray:
-        """Outputs (p, copies), without their white-noise part."""
+        """Outputs (p, copies) at states x (n, copies), without their white-noise part."""
         return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ x
 
     def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> VarianceEstimate:
@@ -202,13 +205,12 @@ class _Cells:
 
 
 def _legendre_integrals() -> np.ndarray:
-    """Integrals (SERIES_TERMS, LEGENDRE_MODES) of (1 - u)^j / j! times the orthonormal Legendre polynomials over 0 to
-    1.
-    """
+    """Integrals (SERIES_TERMS, LEGENDRE_MODES) of (1 - u)^j / j! times the orthonormal Legendre polynomials over u from
+    0 to 1."""
     points, weights = np.polynomial.legendre.leggauss(SERIES_TERMS)
     degree = np.sqrt(2.0 * np.arange(LEGENDRE_MODES) + 1.0)
     basis = np.polynomial.legendre.legvander(points, LEGENDRE_MODES - 1) * degree
-    return np.einsum("u,uj,ul->jl", weights / 2.0, power_terms((1.0 - points) / 2.0, SERIES_TERMS), basis)
+    return np.einsum("u,uj,ul->jl", weights / 2.0, taylor_terms((1.0 - points) / 2.0, SERIES_TERMS), basis)
 
 
 def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:

@@ -1,5 +1,5 @@
-"""Monte Carlo of a vehicle whose springs are bent or whose tyres may lift: many copies, each on a random road of its
-own, stepped in time.
+"""Monte Carlo simulation of a vehicle with nonlinear springs, or with tyres that may lift off: many copies on
+independent random roads, integrated in time.
 
 Motion is small, as in ``spatial_linear``, but for these springs and tyres, whose forces are taken as they are. The
 classical Runge-Kutta method reads the road at half steps; these laws have corners, so its error falls with the square
@@ -12,31 +12,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.ride.copies_kernel import POWERS_SUMMED, Curves, Laws, PushingTyres, march
+from models.ride.copies_kernel import POWERS_SUMMED, Curves, ForceLaws, PushingTyres, march
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
 from models.road.excitation import Excitation
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.linear_vehicle import LinearVehicle, poles
+from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
 from models.vehicles.spatial_linear import Gains, linearise, preloads
 
-LARGEST_RATE_TIMES_STEP, STEEPEST = 0.25, 0.5
-"""Step times the fastest rate, at most: of the replaced vehicle, and of the one with its springs as steep as they get.
-Deviations of a quarter car are then too large by 0.05 to 0.1 %, by the covariance of the steps themselves."""
+LARGEST_RATE_TIMES_STEP, LARGEST_STIFF_RATE_TIMES_STEP = 0.25, 0.5
+"""Largest products of step and fastest rate: of the statistically linearised vehicle, and of the vehicle with its
+springs as stiff as they can become. Deviations of a quarter car are then too large by 0.05 to 0.1 %, by the covariance
+of the steps themselves."""
 STEPS_PER_BLOCK = 200
-"""Steps between two portions of road."""
+"""Count of steps in a block, for which the road is generated at once."""
 STEPS_PER_READING = 4
-"""Steps from one reading of the outputs to the next, which know of each other anyway."""
+"""Count of steps from one reading of the outputs to the next, whose values are correlated anyway."""
 SETTLING_EXPONENT = 9.0
-"""Slowest rate times the time that copies, begun at rest, run before they count."""
+"""Product of the slowest decay rate and the time that copies, begun at rest, run before they count."""
 SLOWEST_DECAY_SHARE = 1e-6
-"""Share of the largest decay rate below which a motion counts as one that nothing pulls back."""
+"""Share of the largest decay rate below which a motion counts as having no restoring force."""
 
 
 @dataclass(frozen=True)
 class Copies:
-    """Outputs of the copies in time: per copy (copies, p) the means of y, y^2, y^3 and y^4 over the counted time.
+    """Statistics of the outputs of the copies: for each copy (copies, p) the means of y, y^2, y^3 and y^4 over the
+    counted time.
 
     step (s) of the runs, ``duration`` (s) that counts after ``settling_steps`` steps.
     """
@@ -80,12 +82,12 @@ class Copies:
         return central / self.variance**2
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """Standard scores (p,): the variances less those of the given standard deviations (p,), divided by the standard
-        errors."""
+        """Standard scores (p,): the variances minus the squares of the given standard deviations (p,), divided by the
+        standard errors."""
         return (self.variance - deviation**2) / self.error
 
     def about_mean(self) -> np.ndarray:
-        """Mean square of each copy about the mean of all copies, (copies, p)."""
+        """Mean square (copies, p) of each copy's outputs about the mean of all copies."""
         first, second = self.moments[:2]
         return second - 2 * self.mean * first + self.mean**2
 
@@ -100,7 +102,8 @@ def copies_in_time(
     seed: int = 0,
     longest_step: float | None = None,
 ) -> Copies:
-    """Run the copies for ``duration`` (s), after a settling time in which they lose the memory of their initial state.
+    """Simulate the copies for ``duration`` (s), after a settling time in which they lose the memory of their initial
+    state.
 
     longest_step : largest step (s); by itself it comes from the fastest rates.
     Raises InputError for damped tyres on a road whose heights have no rates.
@@ -120,15 +123,14 @@ def copies_in_time(
 
 
 RERUN_SHARE = 0.5
-"""Share of the copies that run again in longer steps."""
+"""Share of the copies that are simulated again with longer steps, to estimate the error of the step."""
 
 
 def coarser_variances(
     vehicle: SpatialVehicle, excitation: Excitation, speed: float, fine_copies: Copies, step_factor: int, seed: int
 ) -> np.ndarray:
-    """Variances (k, p) about the means for the first copies, rerun on the same roads with steps 2 or 4 ``step_factor``
-    as long.
-    """
+    """Variances (k, p) of the outputs about their means for the first k copies, simulated again on the same roads with
+    steps that are ``step_factor`` (2 or 4) times as long."""
     copies = len(fine_copies.moments[0])
     rerun_copies, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine_copies.step / 2.0)
     settling, counted = (
@@ -151,52 +153,54 @@ def coarser_variances(
 
 
 class CopiesMarch:
-    """Time integration of copies of a vehicle, from rest, over roads; ``sums`` (4, p, copies): sums of the powers of
-    its outputs so far."""
+    """Time integration of copies of a vehicle, from rest, over random roads; ``sums`` (4, p, copies): sums of the
+    powers of its outputs so far."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:
         springs = nonlinear_springs(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
-        self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
+        self.laws, self.step = force_laws(vehicle, self.plain, springs, speed), step
         self.sums = np.zeros((POWERS_SUMMED, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
-    def march_over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
+    def march_over(self, roads: np.ndarray, first_counted: int, stride: int = STEPS_PER_READING) -> None:
         """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
-        ``first``."""
+        ``first_counted`` on."""
         if self.states is None:
             self.states = np.vstack([_static_positions(self.plain, roads[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
-        march(self.states, roads, self.step, first, stride, self.laws, self.sums)
+        march(self.states, roads, self.step, first_counted, stride, self.laws, self.sums)
 
 
 def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
-    """Step (s) for a nonlinear vehicle, from its statistically linearised ``equivalent``."""
-    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(equivalent)).max()), longest_resolving_step(vehicle, speed))
+    """Step (s) for a nonlinear vehicle, from the rates of its statistically linearised ``equivalent``."""
+    return min(
+        LARGEST_RATE_TIMES_STEP / float(abs(eigenvalues(equivalent)).max()), longest_resolving_step(vehicle, speed)
+    )
 
 
 def settling_time(equivalent: LinearVehicle) -> float:
     """Time (s) after which copies no longer depend on their initial state."""
-    decay = abs(poles(equivalent).real)
+    decay = abs(eigenvalues(equivalent).real)
     return SETTLING_EXPONENT / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
 def longest_resolving_step(vehicle: SpatialVehicle, speed: float) -> float:
     """Longest step (s) that resolves the vehicle's motion when its springs are as stiff as they can become."""
     steepest = linearise(vehicle, speed, {s.name: _steepest_gains(s) for s in nonlinear_springs(vehicle)})
-    return STEEPEST / float(abs(poles(steepest)).max())
+    return LARGEST_STIFF_RATE_TIMES_STEP / float(abs(eigenvalues(steepest)).max())
 
 
 def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PER_READING) -> int:
-    """Number of steps, after the ``completed`` ones, to the first step at which outputs count."""
+    """Number of steps from the ``completed`` ones to the next step at which outputs count."""
     return settling - completed if completed <= settling else (settling - completed) % stride
 
 
-def _static_positions(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
+def _static_positions(linear: LinearVehicle, road: np.ndarray) -> np.ndarray:
     """Positions (n, copies) of static equilibrium on a road (2 w, copies). Vehicles that start far above the road would
     oscillate for long."""
-    heights = road[: plain.road_stiffness.shape[1]]
-    return np.linalg.lstsq(plain.stiffness, plain.road_stiffness @ heights, rcond=1e-12)[0]
+    heights = road[: linear.road_stiffness.shape[1]]
+    return np.linalg.lstsq(linear.stiffness, linear.road_stiffness @ heights, rcond=1e-12)[0]
 
 
 def _steepest_gains(spring: SpringDamper) -> Gains:
@@ -212,17 +216,19 @@ def _slopes_of_pieces(curve: Curve | None) -> np.ndarray:
     return slope + np.cumsum([0.0, *bends])
 
 
-def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float) -> Laws:
-    """``Laws`` of the vehicle for compiled loops; ``plain`` is the vehicle without the nonlinear parts of these
+def force_laws(
+    vehicle: SpatialVehicle, linear: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float
+) -> ForceLaws:
+    """``Laws`` of the vehicle for compiled loops; ``linear`` is the vehicle without the nonlinear parts of these
     springs."""
-    n = len(plain.mass)
+    n = len(linear.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
     rows = np.array([o.displacement_factors for o in linearise(watched, speed).outputs]).reshape(-1, n)
     pushing = [tyre for tyre in vehicle.tyres if tyre.pushes_only]
     kinematics = Kinematics(vehicle)
     heights = np.array([kinematics.shift(tyre.body, tyre.point)[2] for tyre in pushing]).reshape(-1, n)
-    forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T, heights.T)
-    motion = np.linalg.solve(plain.mass, np.hstack(forced))
+    forced = (-linear.stiffness, -linear.damping, linear.road_stiffness, linear.road_damping, -rows.T, heights.T)
+    motion = np.linalg.solve(linear.mass, np.hstack(forced))
     named_forces = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
     read = np.array([[float((o.kind, _part_of_output(o)) == force) for force in named_forces] for o in vehicle.outputs])
     read = np.hstack(
@@ -237,12 +243,12 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
                         o.acceleration_factors,
                     ]
                 )
-                for o in plain.outputs
+                for o in linear.outputs
             ],
-            read.reshape(len(plain.outputs), -1),
+            read.reshape(len(linear.outputs), -1),
         ]
     )
-    return Laws(
+    return ForceLaws(
         rows,
         motion,
         read,
@@ -272,7 +278,7 @@ def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.n
 
 
 def _padded_curves(curves: Sequence[Curve | None]) -> Curves:
-    """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets one that is 0 everywhere."""
+    """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets a curve that is 0 everywhere."""
     known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
     most_corners = max((len(corners) for _, _, corners, _ in known), default=0)
     offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()

@@ -1,4 +1,5 @@
-"""The vehicle in time, the road in path: the form of a ride system in which nothing depends on the speed.
+"""Equations of a vehicle in time on a road described over the path: the form of a ride system in which nothing depends
+on the speed.
 
 At speed v a road filter reads f' = v F f + sqrt(v) G w, and tyre damping lets the vehicle x see its rate as well:
 
@@ -28,8 +29,8 @@ from models.vehicles.linear_vehicle import LinearVehicle
 
 @dataclass(frozen=True)
 class RoadInPath:
-    """Equations of a vehicle on a road: y' = A y + sum_i inputs_i f_i, and outputs (C + v rate) (y, f), plus possibly
-    white noise from the road.
+    """Equations of a vehicle on a road, with vehicle states y and road filter states f of each axle: y' = A y + sum_i
+    inputs_i f_i, and outputs (C + v rate) (y, f) at speed v, plus possibly white noise from the road.
 
     A (n, n); inputs (n, a, m) over axles and filter states; ``basis`` turns (y, f) into the states of
     ``vehicle_with_road``, weightings included; C, rate (p, n + a m).
@@ -39,7 +40,7 @@ class RoadInPath:
     noise_inputs: np.ndarray
     basis: np.ndarray
     C: np.ndarray
-    rate: np.ndarray
+    C_per_speed: np.ndarray
     names: tuple[str, ...]
     excitation: Excitation
 
@@ -47,12 +48,12 @@ class RoadInPath:
 def road_in_path(
     vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None = None
 ) -> RoadInPath:
-    """``RoadInPath`` of a vehicle on a road, with weighted outputs as in ``weighted``; raises the errors of that
-    function.
+    """``RoadInPath`` of a vehicle on a road, with weighted outputs as in ``system_with_weightings``; raises the errors
+    of that function.
 
     A system is linear in v (its noise in sqrt(v)), so two speeds tell all.
     """
-    at_1, at_2 = (at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
+    at_1, at_2 = (system_at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
     first, (m, axles) = 2 * len(vehicle.mass), (len(excitation.F), len(excitation.heights))
     road = np.arange(first, first + axles * m)
     other_states = np.setdiff1d(np.arange(len(at_1.A)), road)
@@ -83,19 +84,19 @@ def road_in_path(
     )
 
 
-def at_speed(
+def system_at_speed(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weightings: Mapping[str, str] | None = None
 ) -> DelayedSystem:
-    """The system at a constant speed (m/s, above 0)."""
+    """State-space model of the vehicle on its road at a constant speed (m/s, above 0), with weighted outputs."""
     return system_with_weightings(vehicle_with_road(vehicle, excitation, speed), weightings or {})
 
 
 SERIES_TERMS = 24
-"""Of exponential series within a step, where rate times time is about 1: 1.5^24 / 24! = 3e-20."""
+"""Count of terms of exponential series within a step, where rate times time is about 1: 1.5^24 / 24! = 3e-20."""
 
 
 class Responses:
-    """Transition matrices of the state (y, f) along a drive, exact in time and in path.
+    """Transition matrices of the state (y, f) along a drive with varying speed, exact in time and in path.
 
     Between the points of the profile only: on a step the path must be a polynomial of time.
     """
@@ -108,13 +109,13 @@ class Responses:
         self.motion = [
             exponential_series(road_in_path.A, road_in_path.noise_inputs[:, axle]) for axle in range(self.axles)
         ]
-        self.of_length = lru_cache(maxsize=64)(self._of_length)
+        self.of_length = lru_cache(maxsize=64)(self._step_matrices)
 
     def transition(self, start_time: float, end_time: float) -> np.ndarray:
-        """Transition matrix E (n + a m, n + a m) over a step from start to end (s)."""
+        """Transition matrix E (n + a m, n + a m) of the state (y, f) over a step from start to end time (s)."""
         motion, inputs = self.of_length(round(end_time - start_time, 14))
         driven = self.path(start_time + (end_time - start_time) * np.append(UNIT_POINTS, 1.0)) - self.path(start_time)
-        decay = (power_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
+        decay = (taylor_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
         E = np.zeros((self.n + self.axles * self.m,) * 2)
         E[: self.n, : self.n] = motion
         E[: self.n, self.n :] = (inputs @ decay[: -self.m]).reshape(self.n, -1)
@@ -122,44 +123,44 @@ class Responses:
             E[first : first + self.m, first : first + self.m] = decay[-self.m :]
         return E
 
-    def _of_length(self, length: float) -> tuple[np.ndarray, np.ndarray]:
-        """Matrix exponential e^(A h) over a length h, and the effect of inputs at the points of the step through e^(A
-        (h - u)): (n a, g m)."""
+    def _step_matrices(self, length: float) -> tuple[np.ndarray, np.ndarray]:
+        """Matrix exponential e^(A h) over a step of length h (s), and the effect of inputs at the points of the step
+        through e^(A (h - u)): (n a, g m)."""
         left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in UNIT_POINTS])
         inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.noise_inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
 
-    def to_noise(self, axle: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
+    def noise_responses(self, axle: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
         """States (n + a m, L, k) at ``end_time`` (L,) after a unit of noise that the axle has met at ``meeting_times``
-        (L,), s.
+        (L,), in s.
 
         Each pair of times lies in one step.
         """
         left = (end_time - meeting_times)[:, None]
         driven = self.path(meeting_times[:, None] + left * UNIT_POINTS) - self.path(meeting_times)[:, None]
         k = self.noise.shape[1] // self.m
-        road = (power_terms(driven, SERIES_TERMS) @ self.noise) * (left * UNIT_WEIGHTS)[..., None]
-        weighted = np.swapaxes(power_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
+        road = (taylor_terms(driven, SERIES_TERMS) @ self.noise) * (left * UNIT_WEIGHTS)[..., None]
+        weighted = np.swapaxes(taylor_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
         responses = np.zeros((self.n + self.axles * self.m, len(meeting_times), k))
         columns = weighted.reshape(-1, SERIES_TERMS, self.m, k).transpose(1, 2, 0, 3).reshape(SERIES_TERMS * self.m, -1)
         motion = self.motion[axle].reshape(SERIES_TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
         responses[: self.n] = (motion @ columns).reshape(self.n, -1, k)
-        filter_states = power_terms(self.path(end_time) - self.path(meeting_times), SERIES_TERMS) @ self.noise
+        filter_states = taylor_terms(self.path(end_time) - self.path(meeting_times), SERIES_TERMS) @ self.noise
         rows = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
         responses[rows] = filter_states.reshape(-1, self.m, k).transpose(1, 0, 2)
         return responses
 
 
 def exponential_series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """Vectors A^j B, flattened, in row j, such that e^(A t) B = powers(t) @ series."""
+    """Matrices A^j B, flattened, in row j, such that e^(A t) B = powers(t) @ series."""
     rows = [B]
     for _ in range(SERIES_TERMS - 1):
         rows.append(A @ rows[-1])
     return np.stack([row.ravel() for row in rows])
 
 
-def power_terms(t: np.ndarray, term_count: int) -> np.ndarray:
-    """t^j / j! along a new last axis, j = 0 to count - 1."""
+def taylor_terms(t: np.ndarray, term_count: int) -> np.ndarray:
+    """Terms t^j / j! along a new last axis, for j = 0 to ``term_count`` - 1."""
     terms = np.ones((*np.shape(t), term_count))
     terms[..., 1:] = np.asarray(t)[..., None] / np.arange(1, term_count)
     return np.cumprod(terms, axis=-1, out=terms)

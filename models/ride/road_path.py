@@ -1,4 +1,4 @@
-"""The random road under all wheels in time, at equal half steps, for runs in time at a constant speed.
+"""Random road under all wheels over time, at equal half steps, for time integration at a constant speed.
 
 From one half step to the next a shape filter moves by its exact transition and by noise of its exact covariance: the
 heights at the half steps are those of the road itself, whatever the step. An axle behind the first meets what that
@@ -22,16 +22,16 @@ from models.vehicles.spatial import SpatialVehicle
 
 @dataclass(frozen=True)
 class RoadPath:
-    """A road travelled at a constant ``speed`` (m/s) and sampled every ``half`` step (s)."""
+    """Random road travelled at a constant ``speed`` (m/s) and sampled every ``half`` step (s)."""
 
     excitation: Excitation
     speed: float
-    half: float
+    half_step: float
 
     @property
     def step(self) -> float:
-        """Time step (s) of a run on this road path."""
-        return 2.0 * self.half
+        """Time step (s) of a simulation on this road path."""
+        return 2.0 * self.half_step
 
     @property
     def has_rates(self) -> bool:
@@ -39,27 +39,26 @@ class RoadPath:
         heights directly."""
         return not any((H @ self.excitation.G).any() for H in self.excitation.heights)
 
-    def table(self, steps: int, seed: int, path: int = 0) -> np.ndarray:
+    def wheel_heights_and_rates(self, step_count: int, seed: int, first_path: int = 0) -> np.ndarray:
         """Heights (m) under the wheels, then their rates (m/s), at every half step: (2 steps + 1, 2 w).
 
         Rates that are white noise are left 0, which is right for tyres without damping only.
         """
-        return next(self.blocks(steps, 1, seed, path))[:, :, 0]
+        return next(self.blocks(step_count, 1, seed, first_path))[:, :, 0]
 
-    def blocks(self, steps: int, copies: int, seed: int, path: int = 0) -> Iterator[np.ndarray]:
-        """Roads (2 steps + 1, 2 w, copies) under as many copies, without end; each begins where the last one ended.
+    def blocks(self, step_count: int, copies: int, seed: int, first_path: int = 0) -> Iterator[np.ndarray]:
+        """Yield, without end, roads (2 steps + 1, 2 w, copies) under all copies; each begins where the last one ended.
 
-        The first begins in the road's stationary state, or at 0 where it has none; they draw the noise paths ``path``,
-        ``path`` + 1 and so on.
-        """
+        The first begins in the road's stationary state, or at 0 where it has none; they draw the noise paths
+        ``first_path``, ``first_path`` + 1 and so on."""
         F, G, heights = _axles(self.excitation)
-        move, root = _transition_over(F, G, self.speed * self.half)
-        lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half)).astype(int)
+        move, root = _transition_over(F, G, self.speed * self.half_step)
+        lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half_step)).astype(int)
         lags = 0 * lags if self.excitation.independent else lags
         met, buffer = np.empty((0, len(F), copies)), np.empty((len(F), copies))
         while True:
-            fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
-            drawn = normal_samples(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
+            fresh = 2 * step_count + (0 if len(met) else 1 + max(lags))
+            drawn = normal_samples(seed, first_path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
             drawn = np.concatenate(
                 [met[-1:] if len(met) else _stationary_root(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
             )
@@ -68,8 +67,8 @@ class RoadPath:
                     next_states, np.dot(move, last_states, buffer), next_states
                 )  # two thirds of the time of after += move @ before
             met = np.concatenate([met[:-1], drawn])
-            yield self._road_under_wheels(F, heights, met, lags, 2 * steps + 1)
-            met, path = met[2 * steps :], path + 1
+            yield self._road_under_wheels(F, heights, met, lags, 2 * step_count + 1)
+            met, first_path = met[2 * step_count :], first_path + 1
 
     def _road_under_wheels(
         self, F: np.ndarray, heights: Sequence[np.ndarray], met_states: np.ndarray, lags: np.ndarray, row_count: int
@@ -86,7 +85,7 @@ class RoadPath:
 
 
 def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "") -> None:
-    """Raise InputError for damped tyres on a road whose heights have no rates: a run in time cannot read them."""
+    """Raise InputError for damped tyres on a road whose heights have no rates: time integration cannot read them."""
     if any(tyre.damping for tyre in vehicle.tyres) and not RoadPath(excitation, 1.0, 1.0).has_rates:
         raise InputError(
             file,
@@ -98,12 +97,14 @@ def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "")
 
 
 def road_path(excitation: Excitation, speed: float, longest_step: float) -> RoadPath:
-    """Road path for runs with steps (s) of at most ``longest_step``; its half steps divide the axle distances."""
+    """Road path for time integration with steps (s) of at most ``longest_step``; its half steps divide the axle
+    distances."""
     return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest_step / 2.0)[0] / speed)
 
 
 def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-    """F, G and heights of each independent noise source: one filter, or one per axle if the axles are independent."""
+    """Filter matrices F, G and heights of the independent noise sources: one filter, or one per axle if the axles are
+    independent."""
     F, G, heights = excitation.F, excitation.G, excitation.heights
     if not excitation.independent:
         return F, G, heights
@@ -112,8 +113,8 @@ def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.nda
 
 
 def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition matrix of the road filter over a length (m), and a root of the covariance of the noise in it (van
-    Loan).
+    """Transition matrix of the road filter over a length (m), and a square root of the covariance of the noise in it
+    (van Loan).
 
     The result is built by doubling short lengths, because rounding would grow exponentially over many decay lengths at
     once.
@@ -128,13 +129,13 @@ def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.nd
 
 
 def _stationary_root(F: np.ndarray, G: np.ndarray) -> np.ndarray:
-    """Root of the stationary covariance of the filter state; zeros if the road is a random walk."""
+    """Square root of the stationary covariance of the road filter's state; zeros if the road is a random walk."""
     if np.linalg.eigvals(F).real.max() >= 0.0:
         return np.zeros_like(F)
     return _covariance_root(solve_continuous_lyapunov(F, -G @ G.T))
 
 
 def _covariance_root(P: np.ndarray) -> np.ndarray:
-    """Root S of S S' = P for a symmetric P that is positive semidefinite except for rounding."""
+    """Square root S, with S S' = P, of a symmetric P that is positive semidefinite except for rounding."""
     values, vectors = np.linalg.eigh((P + P.T) / 2.0)
     return vectors * np.sqrt(values.clip(0.0))

@@ -1,4 +1,5 @@
-"""A speed that varies along straight lines between the points of a table, and where a drive with it is cut.
+"""Speed of a drive that varies linearly between the points of a table, with its division into steps and integration
+points.
 
 The path driven, its inverse, steps in time for the motion, and on them cells and points that integrate noise in path.
 """
@@ -44,7 +45,7 @@ class SpeedProfile:
         return np.interp(time, self.times, self.speeds)
 
     def path(self, time: np.ndarray | float) -> np.ndarray:
-        """Path (m) driven since the first point, negative before it."""
+        """Distance (m) driven since the first point at times (s), negative before it."""
         time = np.asarray(time, float)
         piece = np.maximum(np.searchsorted(self.times, time, side="right") - 1, 0)
         since = time - self.times[piece]
@@ -52,7 +53,7 @@ class SpeedProfile:
         return self.paths[piece] + since * (self.speeds[piece] + acceleration * since / 2.0)
 
     def time(self, path: np.ndarray | float) -> np.ndarray:
-        """Time (s) at which a position (m) is passed; minus or plus infinity if it never is.
+        """Time (s) at which a distance (m) along the path is passed; minus or plus infinity if it never is.
 
         At a place of standstill: the time of arrival.
         """
@@ -74,54 +75,56 @@ def _check_values(values: np.ndarray, valid: np.ndarray, key_path: str, allowed:
 
 
 GAUSS_NODES = 5
-"""Points of Gauss's integral in a cell, good to the power 2 GAUSS_NODES of its length."""
+"""Count of Gauss points of the integral over a cell, exact up to the power 2 GAUSS_NODES of its length."""
 UNIT_POINTS, UNIT_WEIGHTS = (
     half / 2.0 for half in (np.polynomial.legendre.leggauss(GAUSS_NODES) + np.array([[1.0], [0.0]]))
 )
-"""Points and weights of the integral from 0 to 1."""
+"""Gauss points and weights of the integral from 0 to 1."""
 EQUAL_CUTS = 1e-11
-"""Cuts (s) nearer to one another than this are one: 1e-9 m of road at most."""
+"""Difference (s) below which two ends of cells count as equal: 1e-9 m of road at most."""
 
 STANDSTILL_CUTS = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
-"""Cuts about a place of standstill, over the longest step."""
+"""Ends of cells about an instant of standstill, relative to the longest step."""
 
 
 @dataclass(frozen=True)
-class Nodes:
-    """Integration points (K,) for the integral over the path: time (s), weight (m), and the step in which each lies."""
+class IntegrationPoints:
+    """Integration points (K,) of the integral over the path: time (s), weight (m), and index of the step in which each
+    lies."""
 
     time: np.ndarray
     weight: np.ndarray
     step: np.ndarray
 
 
-def steps(
+def step_ends_of_drive(
     profile: SpeedProfile,
     begin_time: float,
     instants: Sequence[float] | np.ndarray,
-    motion: float,
-    road: float,
+    motion_rate: float,
+    road_rate: float,
     largest_rate_times_step: float,
 ) -> np.ndarray:
-    """Ends (N + 1,) of steps (s) from ``begin_time`` to the profile's end; its points and ``instants`` are among them.
+    """Ends (N + 1,) of the time steps (s) from ``begin_time`` to the profile's end; the profile's points and
+    ``instants`` are among them.
 
-    A step times the fastest rate of the motion (1/s) and of the road met (``road`` in 1/m) is at most
+    A step times the fastest rate of the motion (1/s) and of the road met (``road_rate`` in 1/m) is at most
     ``largest_rate_times_step``.
     """
     within = [t for t in instants if begin_time < t < profile.times[-1]]
     cuts = np.unique(np.concatenate([[begin_time], profile.times, within]))
     ends = [cuts[:1]]
     for start, stop in pairwise(cuts):
-        rate = max(motion, road * float(profile.speed(np.array([start, stop])).max()))
+        rate = max(motion_rate, road_rate * float(profile.speed(np.array([start, stop])).max()))
         ends.append(
             np.linspace(start, stop, max(1, int(np.ceil(rate * (stop - start) / largest_rate_times_step))) + 1)[1:]
         )
     return np.concatenate(ends)
 
 
-def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> Nodes:
-    """Integration points in cells. Cells end at every step's end, and wherever an axle passes a place at which a step
-    ended.
+def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> IntegrationPoints:
+    """Integration points of the integral over the path, in cells. Cells end at every step's end, and wherever an axle
+    passes a position at which a step ended.
 
     ``distances`` (m) of the other axles behind the first: at such a place the speed may change its slope, or the
     vehicle may have stood. Near a standstill, where time depends on the root of the distance, cells become smaller.
@@ -139,7 +142,7 @@ def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: 
     weight = np.diff(cuts)[:, None] * UNIT_WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)
     time, weight = time[moving].ravel(), weight[moving].ravel()
-    return Nodes(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
+    return IntegrationPoints(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
 
 
 def _passing_times(profile: SpeedProfile, positions: np.ndarray, distances: Sequence[float]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The covariance of a vehicle whose springs are bent, on a random road: statistical linearisation.
+"""Covariance of a vehicle with nonlinear springs on a random road, by statistical linearisation.
 
 Every spring-damper with curves or friction is replaced by the stiffness and damping that miss its force least in the
 mean square where travel and rate are Gaussian with the covariance that the replaced vehicle itself has (the gains of
@@ -18,35 +18,38 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.ride.covariance import StationaryCovariance, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
-from models.ride.gaussian_laws import of_rate, of_travel
+from models.ride.gaussian_laws import linearised_rate_law, linearised_travel_law
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 
 GAIN_TOLERANCE = 1e-12
-"""Largest relative change of a gain at which the fixed point is reached."""
-MOST_ROUNDS = 400
+"""Largest relative change of a gain at which the fixed point counts as reached."""
+LARGEST_ITERATION_COUNT = 400
 FIRST_TRAVEL_DEVIATION, FIRST_RATE_DEVIATION = 0.02, 0.3
-"""Deviations (m, m/s) with which the first gains are taken: slopes at rest may leave a vehicle undamped."""
+"""Standard deviations of travel (m) and rate (m/s) at which the first gains are computed: slopes at rest may leave a
+vehicle undamped."""
 GAUSSIAN_REMARK = "it is nearly Gaussian"
 NOT_GAUSSIAN = "it is not Gaussian any more: no shares of time and exceedances from it"
 ERROR_GRADES = ((0.01, 0.02, GAUSSIAN_REMARK), (0.05, 0.06, GAUSSIAN_REMARK), (0.1, 0.06, NOT_GAUSSIAN))
-"""Left-out share of an output's variance, and the relative error of its deviation that was found up to there, beside
-Monte Carlo of quarter cars: dampers of two slopes and more, dry friction, stops, alone and together, on five levels of
-road at two speeds. Kurtosis, 3 for Gaussian ones, was 2.5 to 3.3 in the first two and up to 4 in the
-third."""
+"""Share of an output's variance from forces that linearisation leaves out, largest relative error of its standard
+deviation seen up to there, and remark. The errors are those against Monte Carlo of quarter cars: dampers of two slopes
+and more, dry friction, stops, alone and together, on five levels of road at two speeds. Kurtosis, 3 for Gaussian
+outputs, was 2.5 to 3.3 in the first two and up to 4 in the third."""
 EXTRAPOLATION_ERROR = 0.15
-"""The error found beyond, with stops that are met at every second wave; kurtosis went up to 6."""
+"""Relative error of a standard deviation seen beyond these shares, with stops that are met at every second wave;
+kurtosis went up to 6."""
 MOST_NEWTON_STEPS = 60
 HARMONIC_RATIO = 2.0
-"""Left-out forces change at least twice as fast as what moves the spring: they are harmonics of its motion."""
+"""Ratio of the frequency of left-out forces to that of the spring's motion, at least: they are harmonics of this
+motion."""
 
 
 @dataclass(frozen=True)
 class BentSpring:
-    """A nonlinear spring (curves or friction) in motion: its equivalent gains (N/m, N s/m), mean travel (m) and mean
-    force.
+    """A nonlinear spring (curves or friction) in random motion: its equivalent stiffness and damping (N/m, N s/m), mean
+    travel (m) and mean force (N).
 
     deviation, rate : standard deviations of travel (m) and its rate (m/s). ``force``: mean force less the preload (N).
     ``left_out``: share of the variance of its force that the gains leave out.
@@ -62,7 +65,7 @@ class BentSpring:
 
 @dataclass(frozen=True)
 class StatisticallyLinear:
-    """The statistically linearised vehicle, its covariance and its means.
+    """Statistically linearised vehicle, its covariance and its mean position.
 
     mean, left_out (p,), by output: mean beside the equilibrium on a flat road (0 for accelerations), and the variance
     that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``gain_changes``: largest
@@ -80,7 +83,7 @@ class StatisticallyLinear:
 
     @property
     def contraction(self) -> float:
-        """Largest ratio of a change to the change one iteration before, among changes above rounding."""
+        """Largest ratio of a gain change to that of the iteration before, among changes above rounding."""
         ratios = [
             change_after / change_before
             for change_before, change_after in pairwise(self.gain_changes)
@@ -97,14 +100,14 @@ class StatisticallyLinear:
 
 
 def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
-    """The springs that have curves or friction."""
-    return tuple(spring for spring in vehicle.springs if spring.bent)
+    """Springs of the vehicle that have curves or friction."""
+    return tuple(spring for spring in vehicle.springs if spring.is_nonlinear)
 
 
 def statistically_linear(
     vehicle: SpatialVehicle, excitation: Excitation, speed: float, start_scale: float = 1.0
 ) -> StatisticallyLinear:
-    """Linearise the nonlinear springs of a vehicle statistically, on a road at a constant speed (m/s).
+    """Statistical linearisation of a vehicle with nonlinear springs on a road, at a constant speed (m/s).
 
     start_scale : of the travels and rates that the first gains are taken at. Where different ones lead to different
         fixed points, the vehicle has several ways to move, and no one covariance. InputError for tyres that may lift,
@@ -118,25 +121,27 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
+    return _FixedPointSearch(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
 
 
-Law = tuple[float, float, float]
-"""What ``gaussian_laws`` says of a law."""
+LinearisedLaw = tuple[float, float, float]
+"""Statistical linearisation of a force law by ``gaussian_laws``: mean force, gain, and variance of the remaining
+force."""
 
 
 @dataclass
 class _Moments:
-    """Moments of the nonlinear springs' motion: mean travel, and standard deviations of travel and rate, each
-    (springs,)."""
+    """Moments of the nonlinear springs' motion: mean travel (m), and standard deviations of travel (m) and rate (m/s),
+    each (springs,)."""
 
     mean: np.ndarray
     travel: np.ndarray
     rate: np.ndarray
 
 
-class _Search:
-    """Fixed-point search for one vehicle, road and speed; extra outputs read the motion of the nonlinear springs."""
+class _FixedPointSearch:
+    """Fixed-point search for the equivalent gains of one vehicle, road and speed; extra outputs read the motion of the
+    nonlinear springs."""
 
     def __init__(self, vehicle: SpatialVehicle, excitation: Excitation, speed: float) -> None:
         self.vehicle, self.excitation, self.speed = vehicle, excitation, speed
@@ -163,10 +168,10 @@ class _Search:
             moments, position = self._spring_moments(gains, position)
             wanted = self._equivalent_gains(moments)
             changes.append(_largest_gain_change(wanted, gains))
-            if len(changes) >= MOST_ROUNDS:
+            if len(changes) >= LARGEST_ITERATION_COUNT:
                 raise RunFailed(
                     "statistical linearisation",
-                    f"gains still change by {changes[-1]:.1e} after {MOST_ROUNDS} "
+                    f"gains still change by {changes[-1]:.1e} after {LARGEST_ITERATION_COUNT} "
                     "iterations: the vehicle has no one way to move on this road",
                 )
             if len(changes) > 1 and changes[-1] > 0.9 * changes[-2] and changes[-1] > GAIN_TOLERANCE:
@@ -175,16 +180,19 @@ class _Search:
         return self._result(gains, moments, position, changes)
 
     def _equivalent_gains(self, moments: _Moments) -> np.ndarray:
-        """Equivalent stiffness and damping (springs, 2) of springs with the given moments of motion."""
+        """Equivalent stiffness and damping (springs, 2) of the nonlinear springs at given moments of their motion."""
         laws = zip(self.springs, self._linearised_laws(moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
-    def _linearised_laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
-        """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
-        the force that the gain does not represent."""
+    def _linearised_laws(self, moments: _Moments) -> list[tuple[LinearisedLaw, LinearisedLaw]]:
+        """Statistical linearisation of each spring's force laws over travel and over rate: mean force, gain, and
+        variance of the remaining force."""
         moments_by_spring = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
-        return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moments_by_spring]
+        return [
+            (linearised_travel_law(s, mean, travel), linearised_rate_law(s, rate))
+            for s, mean, travel, rate in moments_by_spring
+        ]
 
     def _linearised_vehicle(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
@@ -205,9 +213,12 @@ class _Search:
     def _mean_position(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
         """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
         stay 0."""
-        damper = np.array([of_rate(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
+        damper = np.array([linearised_rate_law(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
         for _ in range(MOST_NEWTON_STEPS):
-            laws = [of_travel(s, m, d) for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)]
+            laws = [
+                linearised_travel_law(s, m, d)
+                for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)
+            ]
             force, gain = np.array([law[:2] for law in laws]).reshape(-1, 2).T
             left = self.plain.stiffness @ position + self.rows.T @ (force + damper)
             step = np.linalg.lstsq(self.plain.stiffness + self.rows.T * gain @ self.rows, left, rcond=1e-12)[0]
@@ -262,8 +273,8 @@ class _Search:
     def _left_out(
         self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: StationaryCovariance
     ) -> np.ndarray:
-        """Ratios (p,) of the variance that the neglected residual forces would add to each output's own variance; each
-        force law counts separately."""
+        """Ratios (p,) of the variance that the left-out forces would add to each output to the output's own variance;
+        each force law counts separately."""
         if not self.springs:
             return np.zeros(len(linear.outputs))
         n = len(linear.mass)
@@ -273,7 +284,7 @@ class _Search:
             [_corner_frequency(moments.rate, moments.travel), _corner_frequency(change, moments.rate)]
         )
         lost = np.array([[law[2] for law in laws] for laws in self._linearised_laws(moments)]).T.ravel()
-        forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._own_forces())
+        forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._spring_force_outputs())
         noise = np.diag(np.sqrt(2.0 * corners * lost))
         added = stationary_covariance(
             vehicle_with_road(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0)
@@ -281,8 +292,8 @@ class _Search:
         usable = np.isfinite(covariance.variance) & (covariance.variance > 0) & np.isfinite(added.variance)
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
 
-    def _own_forces(self) -> np.ndarray:
-        """Matrix (p, 2 springs) with 1 where an output is the force of a nonlinear spring itself."""
+    def _spring_force_outputs(self) -> np.ndarray:
+        """Matrix (p, 2 springs) with 1 where an output is the force of this nonlinear spring."""
         names = [s.name for s in self.springs] * 2
         return np.array(
             [
@@ -292,19 +303,19 @@ class _Search:
         )
 
 
-def _corner_frequency(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
-    """Corner frequency (1/s) of a residual force's spectrum, from the standard deviations of the spring's motion and of
-    its rate."""
-    return HARMONIC_RATIO * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
+def _corner_frequency(rate_deviation: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """Corner frequency (1/s) of the spectrum of a left-out force, from the standard deviations of the spring's motion
+    and of its rate."""
+    return HARMONIC_RATIO * np.divide(rate_deviation, deviation, out=np.ones_like(rate_deviation), where=deviation > 0)
 
 
-def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
-    """The vehicle excited by forces along rows (f, n) instead of road heights; ``reading`` (p, f): direct effect of the
-    forces on the outputs."""
+def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, direct_effects: np.ndarray) -> LinearVehicle:
+    """The vehicle excited by forces along rows (f, n) instead of road heights; ``direct_effects`` (p, f): direct effect
+    of the forces on the outputs."""
     no_roads = np.zeros(len(rows))
     outputs = tuple(
         Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads)
-        for o, read in zip(linear.outputs, reading, strict=True)
+        for o, read in zip(linear.outputs, direct_effects, strict=True)
     )
     wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
@@ -317,7 +328,7 @@ def _largest_gain_change(wanted_gains: np.ndarray, gains: np.ndarray) -> float:
 
 
 def _left_out_sentence(name: str, share: float, status: str) -> str:
-    """Sentence on how much the neglected share of force may change an output's standard deviation."""
+    """Sentence on how much the left-out share of force may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     opening = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
@@ -330,6 +341,7 @@ def _left_out_sentence(name: str, share: float, status: str) -> str:
     )
 
 
-def promised_error(share: float) -> float:
-    """Relative error of an output's standard deviation that tests found not to be exceeded at this left-out share."""
+def largest_error_seen(share: float) -> float:
+    """Largest relative error of an output's standard deviation that tests have seen at this share of left-out
+    forces."""
     return next((error for largest_share, error, _ in ERROR_GRADES if share <= largest_share), EXTRAPOLATION_ERROR)

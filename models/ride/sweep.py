@@ -1,4 +1,4 @@
-"""Variances of all outputs over cases of correlation and speeds, by the fast route where it is exact enough.
+"""Variances of all outputs over correlation cases and speeds, by fast modal sums where these are accurate enough.
 
 The fast route is the covariance in closed form from eigenvectors. A vehicle behind road filters, with weightings behind
 it, has a block triangular matrix. Each block is diagonalised on its own (the vehicle's and the weightings' once for all
@@ -26,13 +26,13 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_FAST_ERROR = 1e-9
-"""Largest relative error that the fast route may suspect of itself; it overstates it ten to a thousand times."""
+"""Largest estimated relative error of the fast modal sums; the estimate is ten to a thousand times too high."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Stationary variances. variance (cases, speeds, outputs), inf where infinite, with status and reason for each;
-    units (outputs,).
+    """Stationary variances over correlation cases and speeds. variance (cases, speeds, outputs), inf where infinite,
+    with status and reason for each; units (outputs,).
 
     ``direct_counts``: number of points computed by the direct method, by the reason for not using the fast one.
     """
@@ -48,11 +48,11 @@ class Sweep:
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (cases, speeds, outputs)."""
+        """Standard deviations (cases, speeds, outputs) in the outputs' units."""
         return np.sqrt(self.variance)
 
     def of(self, case: str, output: str) -> np.ndarray:
-        """Standard deviation of one output over the speeds."""
+        """Standard deviations (speeds,) of one output in one correlation case."""
         return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
 
 
@@ -76,7 +76,7 @@ def variance_sweep(
             plain = vehicle_with_road(linear, excitation, speed)
             system = system_with_weightings(plain, filters or {})
             states = len(plain.A) - len(plain.B) * len(excitation.F)
-            point = _fast_variances(system, states, excitation, speed, shared, accuracy) if fast else ASKED_FOR
+            point = _fast_variances(system, states, excitation, speed, shared, accuracy) if fast else DIRECT_BY_REQUEST
             if isinstance(point, str):
                 direct[point] += 1
                 point = _direct_variances(system, speed, accuracy)
@@ -89,14 +89,14 @@ def variance_sweep(
     return Sweep(tuple(excitations), np.array(speeds), system.names, units, variance, status, reason, direct)
 
 
-ASKED_FOR = "asked for"
-"""Reason of a direct answer that was wanted."""
-Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
-"""Variance, status and reason of every output."""
+DIRECT_BY_REQUEST = "asked for"
+"""Reason of a variance by the direct method that the caller wanted."""
+OutputVariances = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
+"""Variances, statuses and reasons of all outputs."""
 
 
-def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
-    """Variances from solving for the covariance; the error for an unstable vehicle states its speed."""
+def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> OutputVariances:
+    """Variances from solving the Lyapunov equation; the error for an unstable vehicle states its speed."""
     try:
         exact = stationary_covariance(system, accuracy)
     except Unstable as error:
@@ -105,10 +105,15 @@ def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> A
 
 
 def _fast_variances(
-    system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "SharedModes", accuracy: float
-) -> Answer | str:
-    """Variances by the fast method, or a text that says why it is unreliable here."""
-    quick = modal_variances(system, states, excitation.F, speed, shared)
+    system: DelayedSystem,
+    vehicle_state_count: int,
+    excitation: Excitation,
+    speed: float,
+    shared_modes: "SharedModes",
+    accuracy: float,
+) -> OutputVariances | str:
+    """Variances by modal sums, or a text that says why these are unreliable here."""
+    quick = modal_variances(system, vehicle_state_count, excitation.F, speed, shared_modes)
     if isinstance(quick, str):
         return quick
     no_growth = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
@@ -134,10 +139,14 @@ class Modes:
     @property
     def rate_rounding(self) -> float:
         """Relative rounding error of the slowest decay rate: that of the fastest motion, times the condition number."""
-        return EPS * self.condition * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
+        return (
+            MACHINE_EPSILON
+            * self.condition
+            * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
+        )
 
 
-def modes(A: np.ndarray) -> Modes:
+def modes_of_matrix(A: np.ndarray) -> Modes:
     """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled blocks, so that equal blocks give exactly
     equal results."""
     count, label = connected_components(A != 0, directed=False)
@@ -148,7 +157,7 @@ def modes(A: np.ndarray) -> Modes:
         balanced, (scale, _) = matrix_balance(A[np.ix_(block_indices, block_indices)], permute=False, separate=True)
         values[block_indices], vectors = np.linalg.eig(balanced)
         worst = max(worst, np.linalg.cond(vectors))
-        if not np.isfinite(worst) or worst * EPS > 1:
+        if not np.isfinite(worst) or worst * MACHINE_EPSILON > 1:
             return Modes(A, values, V, inverse, np.inf)
         V[np.ix_(block_indices, block_indices)], inverse[np.ix_(block_indices, block_indices)] = (
             scale[:, None] * vectors,
@@ -157,9 +166,9 @@ def modes(A: np.ndarray) -> Modes:
     return Modes(A, values, V, inverse, worst)
 
 
-EPS = float(np.finfo(float).eps)
+MACHINE_EPSILON = float(np.finfo(float).eps)
 LARGEST_RATE_ROUNDING = 1e-11
-"""Largest relative rounding of the slowest decay with which the sums are still made."""
+"""Largest relative rounding of the slowest decay rate at which modal sums are used."""
 
 
 class SharedModes:
@@ -169,16 +178,16 @@ class SharedModes:
         self.known: dict[bytes, Modes] = {}
 
     def of(self, A: np.ndarray) -> Modes:
-        """Modes of a block."""
+        """Modes of a matrix block, computed once."""
         if (key := A.tobytes()) not in self.known:
-            self.known[key] = modes(A)
+            self.known[key] = modes_of_matrix(A)
         return self.known[key]
 
 
 @dataclass(frozen=True)
 class ModalVariances:
-    """Results per output (p,): variance, ``rounding_floor`` that rounding makes of a zero variance, and bound
-    ``relative_error``.
+    """Variances by modal sums for each output (p,): variance, ``rounding_floor`` that rounding makes of a zero
+    variance, and bound ``relative_error``.
 
     fastest_rate : rate of the system in 1/s
     """
@@ -190,21 +199,20 @@ class ModalVariances:
 
 
 def modal_variances(
-    system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: SharedModes
+    system: DelayedSystem, vehicle_state_count: int, road_filter: np.ndarray, speed: float, shared_modes: SharedModes
 ) -> ModalVariances | str:
-    """Variances of a system as built by ``vehicle_with_road`` and ``system_with_weightings``, or a text that says why
-    they cannot be computed here.
+    """Variances of the outputs by modal sums, for a system as built by ``vehicle_with_road`` and
+    ``system_with_weightings``; or a text that says why they cannot be computed here.
 
-    vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
-    the states of weightings stand last.
-    """
+    vehicle_state_count : number of its states, which stand first; road_filter : the filter F (m, m) in path, one per
+    axle behind them; the states of weightings stand last."""
     axles = len(system.B)
-    first_weighting_state = vehicle + axles * len(road)
+    first_weighting_state = vehicle_state_count + axles * len(road_filter)
     A = system.A
-    vehicle_modes = shared.of(A[:vehicle, :vehicle])
-    path = shared.of(road)
-    behind = shared.of(A[first_weighting_state:, first_weighting_state:])
-    if max(mode_set.condition for mode_set in (vehicle_modes, path, behind)) * EPS > 1e-6:
+    vehicle_modes = shared_modes.of(A[:vehicle_state_count, :vehicle_state_count])
+    path = shared_modes.of(road_filter)
+    behind = shared_modes.of(A[first_weighting_state:, first_weighting_state:])
+    if max(mode_set.condition for mode_set in (vehicle_modes, path, behind)) * MACHINE_EPSILON > 1e-6:
         return "eigenvectors are nearly parallel"
     values = [vehicle_modes.values, np.tile(speed * path.values, axles), behind.values]
     if max(mode_set.real.max(initial=-np.inf) for mode_set in values) > -1e-6:
@@ -213,19 +221,26 @@ def modal_variances(
         return "rates lie too far apart"
     V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
-        met = _coupling_solution(vehicle_modes, A[:vehicle, vehicle:first_weighting_state] @ V, values[1])
-        felt = _coupling_solution(behind, A[first_weighting_state:, :vehicle] @ vehicle_modes.V, values[0])
+        met = _coupling_solution(
+            vehicle_modes, A[:vehicle_state_count, vehicle_state_count:first_weighting_state] @ V, values[1]
+        )
+        felt = _coupling_solution(behind, A[first_weighting_state:, :vehicle_state_count] @ vehicle_modes.V, values[0])
         heard = _coupling_solution(
             behind,
-            A[first_weighting_state:, :vehicle] @ met + A[first_weighting_state:, vehicle:first_weighting_state] @ V,
+            A[first_weighting_state:, :vehicle_state_count] @ met
+            + A[first_weighting_state:, vehicle_state_count:first_weighting_state] @ V,
             values[1],
         )
-    C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:first_weighting_state], system.C[:, first_weighting_state:]
+    C0, C1, C2 = (
+        system.C[:, :vehicle_state_count],
+        system.C[:, vehicle_state_count:first_weighting_state],
+        system.C[:, first_weighting_state:],
+    )
     C = np.hstack([C0 @ vehicle_modes.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
     arrivals, inputs = noise_arrivals(system), []
     for b in arrivals.B:
-        of_road = back @ b[vehicle:first_weighting_state]
-        of_vehicle = vehicle_modes.inverse @ (b[:vehicle] - met @ of_road)
+        of_road = back @ b[vehicle_state_count:first_weighting_state]
+        of_vehicle = vehicle_modes.inverse @ (b[:vehicle_state_count] - met @ of_road)
         of_weighting = behind.inverse @ (b[first_weighting_state:] - felt @ of_vehicle - heard @ of_road)
         inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
     condition = vehicle_modes.condition * path.condition * behind.condition
@@ -240,7 +255,8 @@ def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -
 def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
 ) -> ModalVariances | str:
-    """Variances of y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the hits."""
+    """Variances of the outputs y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the arrivals of
+    noise at the axles."""
     earlier_responses = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)
     for j, b in enumerate(inputs):
@@ -253,5 +269,7 @@ def _variance_sum(
     if not np.isfinite(size).all():
         return "two eigenvalues of vehicle, road and weighting meet"
     floor = rounding_thresholds(C, P)
-    relative_error = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
+    relative_error = (
+        MACHINE_EPSILON * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
+    )
     return ModalVariances(variance.clip(0.0), floor, np.where(size > floor, relative_error, 0.0), float(abs(s).max()))

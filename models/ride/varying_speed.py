@@ -1,4 +1,4 @@
-"""Covariance of a vehicle on a random road while its speed varies, through standstill, delays exact.
+"""Covariance of a vehicle on a random road while its speed varies, also through standstill, with exact axle delays.
 
 Noise lives in path, motion in time (``road_in_path``). In steps of time, E the transition of the state (y, f),
 
@@ -23,21 +23,21 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from models.core.errors import InputError
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covariance
 from models.ride.marginal import MATRIX_ACCURACY
-from models.ride.road_in_path import Responses, RoadInPath, at_speed, road_in_path
-from models.ride.speed_profile import SpeedProfile, integration_points, steps
+from models.ride.road_in_path import Responses, RoadInPath, road_in_path, system_at_speed
+from models.ride.speed_profile import SpeedProfile, integration_points, step_ends_of_drive
 from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_RATE_TIMES_STEP = 1.0
-"""Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""
+"""Largest product of the fastest rate of vehicle or road and the step; half of it changes nothing above 1e-10."""
 STEPS_PER_BLOCK = 128
-"""Steps whose responses are made at once."""
+"""Count of steps whose noise responses are computed at once."""
 
 
 @dataclass(frozen=True)
 class VaryingSpeed:
-    """Standard deviations at every instant of a drive.
+    """Standard deviations of the outputs at every instant of a drive with varying speed.
 
     time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
     and, while the road moves, where it holds white noise; height (N, w) of the road under each wheel, m, which may not
@@ -55,13 +55,13 @@ class VaryingSpeed:
     P: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
-        """Standard deviation (N,) of one output; raises InputError for an unknown name."""
+        """Standard deviation (N,) of one output over the drive. Raises InputError for an unknown name."""
         if name not in self.names:
             raise InputError("", "output", name, "must be an output of the vehicle", self.names)
         return self.deviation[:, self.names.index(name)]
 
     def at(self, instants: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Standard deviations (k, p) at instants (s), each the nearest one of ``time``."""
+        """Standard deviations (k, p) of the outputs at instants (s), each taken at the nearest value of ``time``."""
         return self.deviation[np.abs(self.time[:, None] - np.asarray(instants)).argmin(axis=0)]
 
 
@@ -75,7 +75,8 @@ def varying_speed(
     accuracy: float = MATRIX_ACCURACY,
     largest_rate_times_step: float = LARGEST_RATE_TIMES_STEP,
 ) -> VaryingSpeed:
-    """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
+    """Standard deviations of the outputs along a drive that begins in the stationary state of its first speed, or at
+    rest.
 
     The vehicle's matrices are those of one speed. The cost grows with the time that the last axle needs to where the
     first one is: below a crawl of about 0.3 m/s it is long.
@@ -96,11 +97,11 @@ def varying_speed(
     if fastest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 somewhere: at standstill nothing moves")
     form = road_in_path(vehicle, excitation, weightings)
-    status = stationary_covariance(at_speed(vehicle, excitation, fastest, weightings), accuracy).status
+    status = stationary_covariance(system_at_speed(vehicle, excitation, fastest, weightings), accuracy).status
     if first == 0.0:
         P = _standing_covariance(form)
     else:
-        P = stationary_covariance(at_speed(vehicle, excitation, first, weightings), accuracy).P
+        P = stationary_covariance(system_at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
     rows_of_results = [_all_variances(form, P, first, status)]
     time = [profile.times[0]]
@@ -130,8 +131,8 @@ def quasi_stationary(
     weightings: Mapping[str, str] | None = None,
     accuracy: float = MATRIX_ACCURACY,
 ) -> np.ndarray:
-    """Standard deviations (N, p) as if each of the speeds (N,) had been constant for ever; for speed 0, those of a
-    vehicle at rest.
+    """Standard deviations (N, p) of the outputs as if each of the speeds (N,) had been constant for ever; for speed 0,
+    those of a vehicle at rest.
 
     Errors are those of ``varying_speed``.
     """
@@ -158,7 +159,7 @@ def _covariance_by_step(
     instants: Sequence[float] | np.ndarray,
     largest_rate_times_step: float,
 ) -> Iterator[tuple[float, np.ndarray]]:
-    """End of each step of the drive and the covariance there, starting from P.
+    """Yield the end time of each step of the drive and the covariance of (y, f) there, starting from P.
 
     Where the vehicle moves from the beginning, the steps begin earlier: the first axle is ahead of the last one.
     """
@@ -167,38 +168,39 @@ def _covariance_by_step(
     axle_distances = [road.lengths[j] - road.lengths[i] for i, j in pairs]
     lead = max(axle_distances, default=0.0) / first if first else 0.0
     motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (road_in_path.A, road.F))
-    ends = steps(profile, profile.times[0] - lead, instants, motion, path, largest_rate_times_step)
+    ends = step_ends_of_drive(profile, profile.times[0] - lead, instants, motion, path, largest_rate_times_step)
     points = integration_points(profile, ends, sorted({distance for distance in axle_distances if distance}))
     responses = Responses(road_in_path, profile)
-    hits = [_NoiseMet(responses, axle, points.time, ends) for axle in range(len(road.heights))]
-    queues = [_Queue(responses, i, j, points.time, ends) for i, j in pairs]
+    hits = [_NoiseResponses(responses, axle, points.time, ends) for axle in range(len(road.heights))]
+    queues = [_ResponseQueue(responses, i, j, points.time, ends) for i, j in pairs]
     for step, (start, end) in enumerate(pairwise(ends)):
         E = responses.transition(start, end)
         for queue in queues:
-            queue.move(E, step)
+            queue.advance(E, step)
         if end > profile.times[0]:
-            b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].within(step)]
+            b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].times_in_step(step)]
             half = [_sum_of_products(block, block, weight) / 2.0 for block in b]
-            half += [_sum_of_products(queue.take(len(weight)), b[queue.last], weight) for queue in queues]
+            half += [_sum_of_products(queue.remove_first(len(weight)), b[queue.last], weight) for queue in queues]
             Q = np.sum(half, axis=0)
             P = E @ P @ E.T + Q + Q.T
             yield end, P
 
 
-class _NoiseMet:
-    """State responses at the ends of the steps to noise that an axle meets at given times (s) in ascending order."""
+class _NoiseResponses:
+    """State responses at the ends of the steps to the noise that an axle meets at given times (s) in ascending
+    order."""
 
     def __init__(self, responses: Responses, axle: int, time: np.ndarray, step_ends: np.ndarray) -> None:
         self.responses, self.axle, self.time, self.ends = responses, axle, time, step_ends
         self.first = np.searchsorted(time, step_ends)
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
-    def within(self, step: int) -> slice:
-        """Slice of the times that lie in a step."""
+    def times_in_step(self, step: int) -> slice:
+        """Slice of the meeting times that lie in a step."""
         return slice(self.first[step], self.first[step + 1])
 
     def of(self, step: int) -> np.ndarray:
-        """Responses (n, c, k) to the noise met in a step."""
+        """State responses (n, c, k) to the noise met in a step."""
         block = step // STEPS_PER_BLOCK
         last_step = min((block + 1) * STEPS_PER_BLOCK, len(self.ends) - 1)
         begin = self.first[block * STEPS_PER_BLOCK]
@@ -208,12 +210,13 @@ class _NoiseMet:
                 self.ends[block * STEPS_PER_BLOCK + 1 : last_step + 1],
                 np.diff(self.first[block * STEPS_PER_BLOCK : last_step + 1]),
             )
-            self.made, self.block = self.responses.to_noise(self.axle, time, end), block
+            self.made, self.block = self.responses.noise_responses(self.axle, time, end), block
         return self.made[:, self.first[step] - begin : self.first[step + 1] - begin]
 
 
-class _Queue:
-    """Responses (n, q, k) to noise that one axle has already met and the ``last`` axle will meet at given times (s)."""
+class _ResponseQueue:
+    """State responses (n, q, k) to noise that an axle has already met and the ``last`` axle will meet at given times
+    (s)."""
 
     def __init__(
         self, responses: Responses, axle: int, last_axle: int, time: np.ndarray, step_ends: np.ndarray
@@ -224,15 +227,15 @@ class _Queue:
         met = profile.time(position) if distance else time
         is_before_start = np.isneginf(met)
         self.waiting = _delayed_responses(form, axle, -position[is_before_start])
-        self.met = _NoiseMet(responses, axle, met[~is_before_start], step_ends)
+        self.met = _NoiseResponses(responses, axle, met[~is_before_start], step_ends)
 
-    def move(self, E: np.ndarray, step: int) -> None:
+    def advance(self, E: np.ndarray, step: int) -> None:
         """Advance all responses by one step, and add those to noise that is met within the step."""
         n, _, k = self.waiting.shape
         moved_responses = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
         self.waiting = np.concatenate([moved_responses, self.met.of(step)], axis=1)
 
-    def take(self, response_count: int) -> np.ndarray:
+    def remove_first(self, response_count: int) -> np.ndarray:
         """Remove the first ``response_count`` entries from the queue and return them."""
         removed, self.waiting = self.waiting[:, :response_count], self.waiting[:, response_count:]
         return removed
@@ -246,8 +249,8 @@ def _sum_of_products(first_responses: np.ndarray, second_responses: np.ndarray, 
 
 
 def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
-    """Responses (n, q, k) of a vehicle at rest to noise that the axle met long ago, at a distance ``behind`` (m) its
-    position."""
+    """State responses (n, q, k) of a vehicle at rest to noise that an axle met long ago, at a distance ``behind`` (m)
+    its position."""
     F, G = road_in_path.excitation.F, road_in_path.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
     n, axles, m = road_in_path.noise_inputs.shape
@@ -259,7 +262,7 @@ def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) 
 
 
 def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
-    """State (y, f) of a vehicle at rest as a linear function of its road's filter states f: (n + a m, a m)."""
+    """Matrix (n + a m, a m) from the road's filter states f to the state (y, f) of a vehicle at rest."""
     if np.linalg.cond(road_in_path.A) > 1.0 / (1e3 * np.finfo(float).eps):
         raise InputError(
             "",
@@ -273,7 +276,7 @@ def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
 
 
 def _standing_covariance(road_in_path: RoadInPath) -> np.ndarray:
-    """Covariance of (y, f) where the vehicle stands, at rest."""
+    """Covariance of the state (y, f) of a vehicle that stands still, at rest."""
     road = road_in_path.excitation
     stationary, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)
     axles = range(len(road.heights))
@@ -289,7 +292,7 @@ def _standing_covariance(road_in_path: RoadInPath) -> np.ndarray:
 
 def _all_variances(road_in_path: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
     """Variances of all outputs and of the road's height under each wheel."""
-    n, C = len(road_in_path.A), road_in_path.C + speed * road_in_path.rate
+    n, C = len(road_in_path.A), road_in_path.C + speed * road_in_path.C_per_speed
     H = np.hstack(road_in_path.excitation.heights)
     variance = ((C @ P) * C).sum(axis=1)
     lost = [state == DIFFUSING or (state == INFINITE and speed > 0.0) for state in status]

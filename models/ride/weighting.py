@@ -19,8 +19,8 @@ from models.ride.excited import DelayedSystem
 
 @dataclass(frozen=True)
 class Section:
-    """Second-order section (n0 + n1 p + n2 p^2) / (1 + p / quality + p^2) with p = s / (2 pi frequency), frequency in
-    Hz."""
+    """Second-order filter section (n0 + n1 p + n2 p^2) / (1 + p / quality + p^2) with p = s / (2 pi frequency),
+    frequency in Hz."""
 
     frequency: float
     quality: float
@@ -29,13 +29,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Weighting:
-    """Product of sections; its name is that in the standard."""
+    """Frequency weighting as a product of filter sections; its name is that in the standard."""
 
     name: str
     sections: tuple[Section, ...]
 
     def response(self, frequency: np.ndarray) -> np.ndarray:
-        """Complex frequency response at frequencies (Hz), from the sections' formulas."""
+        """Complex frequency response of the weighting at frequencies (Hz)."""
         transfer = np.ones(np.shape(frequency), complex)
         for section in self.sections:
             p = 1j * np.asarray(frequency) / section.frequency
@@ -44,8 +44,8 @@ class Weighting:
         return transfer
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """State-space form A (n, n), B (n,), C (n,) of x' = A x + B u, y = C x, with n = 2 per section and no direct
-        transmission."""
+        """State-space form A (n, n), B (n,), C (n,) of the weighting, x' = A x + B u, y = C x, with n = 2 per section
+        and no direct transmission."""
         size = 2 * len(self.sections)
         A, B = np.zeros((size, size)), np.zeros(size)
         input_row, direct = np.zeros(size), 1.0  # what reaches the next section: before . x + direct u
@@ -66,7 +66,7 @@ class Weighting:
 def weighting_of_standard(
     name: str, transition: tuple[float, float, float] | None, step: tuple[float, float, float, float] | None = None
 ) -> Weighting:
-    """Weighting from parameters of the standard: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); frequencies in Hz.
+    """Weighting from parameters of ISO 2631-1: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); frequencies in Hz.
 
     The band limit is that of all weightings for comfort and health: 0.4 to 100 Hz, Q = 1 / sqrt(2).
     """
@@ -87,14 +87,15 @@ WEIGHTINGS = {
     "We": weighting_of_standard("We", (1.0, 1.0, 0.63)),
     "Wj": weighting_of_standard("Wj", None, (3.75, 0.91, 5.32, 0.91)),
 }
-"""Wk: vertical, seat and floor; Wd: fore and aft, sideways; Wc: backrest; We: rotations; Wj: under the head."""
+"""Weightings of ISO 2631-1 by name. Wk: vertical, seat and floor; Wd: fore and aft, sideways; Wc: backrest; We:
+rotations; Wj: under the head."""
 
 HEALTH_FACTORS = {"x": 1.4, "y": 1.4, "z": 1.0}
 """Factors of the axes on the seat for health (Wd, Wd, Wk); for comfort all are 1."""
 
 
 def system_with_weightings(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem:
-    """The system with weighted outputs after its own: {"seat_z": "Wk"} adds the output "seat_z Wk".
+    """Returns the system with weighted outputs after its own: {"seat_z": "Wk"} adds the output "seat_z Wk".
 
     Filter states stand after the system's. A weighted output is finite even where white noise reaches the output
     itself: every weighting falls at high frequency. Raises InputError for an unknown output or weighting.

@@ -1,4 +1,4 @@
-"""Road profiles: heights over arc length, from waves or from measured points.
+"""Road profiles: heights over arc length, from sums of waves or from measured points.
 
 Every profile answers in the same way, whatever it was made from: ``height_and_slope(s)``,
 ``sample_uniform(start, step, count)``, ``height_slope_at(s)`` and ``extent``. Arc length s is in m;
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["RoadProfile", "SineProfile", "SplineProfile"]
 
 TRACK_WIDTH = 1.5
-"""Default distance between the two tracks of a measured surface, m."""
+"""Default distance (m) between the two tracks of a measured surface."""
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Where a measured road ends and where it begins: only by a declared rule.
+"""Continuation of a measured road before its start and beyond its end: only by a declared rule.
 
 Beyond its end a finite road is ``refused``, or it goes on ``mirrored``: the measured **points** are
 reflected at the end in arc length, zeta(2 L - s) = zeta(s), again and again, and the spline is fitted
@@ -21,16 +21,16 @@ from models.core.errors import InputError
 from models.road.profile import OVERRUN_SHARE, RoadProfile, SplineProfile
 
 CONTINUATION_RULES = ("mirrored", "refused")
-RUN_IN = 5.0
-"""Default length of the run-in, m."""
+RUN_IN_LENGTH = 5.0
+"""Default length (m) of the run-in."""
 MOST_POINTS = 5_000_000
-"""Longest mirrored road, in points: about 400 MB with its coefficients and the fit."""
+"""Largest count of points of a mirrored road: about 400 MB with its coefficients and the fit."""
 
 
 def continued_road(
     profile: RoadProfile, continuation_rule: str, needed_distance: float, file: object = ""
 ) -> RoadProfile:
-    """Road that reaches at least to ``needed_distance``, or an error; a road that is long enough comes back as it is.
+    """Road that reaches at least to ``needed_distance``; a road that is long enough is returned unchanged.
 
     Parameters
     ----------
@@ -62,7 +62,8 @@ def continued_road(
 
 
 def _mirrored_points(profile: SplineProfile, needed_distance: float, file: object) -> tuple[np.ndarray, np.ndarray]:
-    """Stations and heights of the road, reflected at its ends repeatedly until it reaches ``needed_distance``."""
+    """Stations (m) and heights (m) of the road, reflected at its ends repeatedly until it reaches
+    ``needed_distance``."""
     station, height = profile.points
     gaps, length = np.diff(station), profile.end - profile.start
     copies = math.ceil((needed_distance - profile.start) / length)
@@ -78,8 +79,8 @@ def _mirrored_points(profile: SplineProfile, needed_distance: float, file: objec
     return np.concatenate(stations), np.concatenate(heights)
 
 
-def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | None = None) -> SplineProfile:
-    """Road that rises from the flat: 0 up to its first point, then w(s / length) (zeta - reference).
+def run_in(profile: SplineProfile, length: float = RUN_IN_LENGTH, reference: float | None = None) -> SplineProfile:
+    """Road that rises from the flat: height 0 up to its first point, then w(s / length) (zeta - reference).
 
     w is the quintic smoothstep, so height, slope and curvature are continuous; beyond ``length`` the road
     is the measured one, moved by ``reference``. Without moving it, a road surveyed at 200 m above the sea
@@ -104,7 +105,7 @@ def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | No
     return replace(profile, coefficients=coefficients, window_length=float(length))
 
 
-def reference_height(profile: SplineProfile, length: float = RUN_IN) -> float:
+def reference_height(profile: SplineProfile, length: float = RUN_IN_LENGTH) -> float:
     """Mean height (m, positive down) over the first ``length`` m of a road, which must be as long."""
     if not 0.0 < length <= profile.end - profile.start:
         allowed = f"must be above 0 and at most the road's own {profile.end - profile.start:.6g} m"

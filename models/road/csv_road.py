@@ -1,4 +1,4 @@
-"""Measured roads from CSV: arc length and the heights of two tracks, each with its unit.
+"""Measured roads from CSV files: arc length and the heights of two tracks, each with its unit.
 
     # anything
     s [m], left [mm], right [mm]
@@ -23,7 +23,7 @@ _ROAD_COLUMNS = {"s": DISTANCES, "left": METRES, "right": METRES}
 
 
 def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
-    """C2 road through one track of a CSV file.
+    """Road, a C2 spline, through one track of a CSV file.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
 
 
 def read_csv_tracks(path: str | Path) -> tuple[SplineProfile, SplineProfile]:
-    """Left and right track of a CSV file; file, frame and errors as in :func:`read_csv_road`."""
+    """Left and right track of a road in a CSV file; file, frame and errors as in :func:`read_csv_road`."""
     table = read_table(path, _ROAD_COLUMNS, increasing="s", least_rows=4)
     station = table["s"] - table["s"][0]
     name = Path(path).name

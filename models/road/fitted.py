@@ -1,4 +1,5 @@
-"""Mean and roll process fitted to two measured tracks, with sentences on what the measurement leaves undetermined."""
+"""Random road (mean height and roll process) fitted to two measured tracks, with sentences on what the measurement
+leaves undetermined."""
 
 import itertools
 import math
@@ -11,15 +12,15 @@ from models.road.measured_tracks import MeasuredTracks, TrackSpectra, track_spec
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad
 
-PER_DECADE = 10
-"""Bands per decade in which a density is averaged before the fit, so that every octave counts the same."""
+BANDS_PER_DECADE = 10
+"""Count of bands per decade in which a density is averaged before the fit, so that every octave counts the same."""
 HIGHEST_WAVENUMBER = 2.0 * math.pi * 2.83
-"""Upper end of the standard's band, rad/m: shorter waves are the tyre's business."""
+"""Upper end (rad/m) of the band of ISO 8608: shorter waves are swallowed by the tyre."""
 
 
 @dataclass(frozen=True)
 class FilterFit:
-    """First-order filter fitted to a density between ``low`` and ``high`` (rad/m).
+    """First-order filter fitted to a measured density between the wavenumbers ``low`` and ``high`` (rad/m).
 
     corner_error, intensity_error: relative standard errors from the scatter about the fit. ``log_residual``: rms of
     ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``corner_is_resolved`` if it lies
@@ -30,15 +31,15 @@ class FilterFit:
     corner_error: float
     intensity_error: float
     log_residual: float
-    low: float
-    high: float
+    low_wavenumber: float
+    high_wavenumber: float
     corner_is_resolved: bool
 
 
 @dataclass(frozen=True)
 class FittedRoad:
-    """The fitted road, the fits of its mean and roll process (None for an absent process), sentences on their quality,
-    and the spectra."""
+    """Road fitted to measured tracks, the fits of its mean and roll process (None for an absent process), sentences on
+    their quality, and the spectra."""
 
     road: TwoTrackRoad
     mean: FilterFit
@@ -50,7 +51,7 @@ class FittedRoad:
 def fit_road(
     tracks: MeasuredTracks, window_length: float | None = None, low: float | None = None, high: float | None = None
 ) -> FittedRoad:
-    """First-order mean and roll process by least squares on the logarithms of the measured densities.
+    """Fit of a first-order mean and roll process by least squares on the logarithms of the measured densities.
 
     low, high : band of the fit in rad/m; by default from twice the lowest wavenumber that a window holds, where the
     straight line that was taken out is no longer felt, to the end of the standard's band
@@ -89,13 +90,13 @@ def fit_road(
 
 
 def _fit_first_order(
-    k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str
+    k: np.ndarray, density: np.ndarray, degrees_of_freedom: float, low: float, high: float, name: str
 ) -> FilterFit:
-    """Least-squares fit of ln S = ln(q / 2 pi) - ln(corner^2 + k^2), with the logarithms of q and corner as
-    unknowns."""
+    """Least-squares fit of ln S = ln(q / 2 pi) - ln(corner^2 + k^2), with the logarithms of q and corner as unknowns,
+    to a density over the wavenumber k."""
     from scipy.optimize import least_squares
 
-    middle, mean = _band_averages(k, density, freedom, low, high)
+    middle, mean = _band_averages(k, density, degrees_of_freedom, low, high)
     if len(middle) < 4:
         allowed = f"four bands or more are needed between {low:.3g} and {high:.3g} rad/m: the road is too short"
         raise InputError(name, "bands to fit", len(middle), allowed)
@@ -116,19 +117,19 @@ def _fit_first_order(
 
 
 def _band_averages(
-    k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float
+    k: np.ndarray, density: np.ndarray, degrees_of_freedom: float, low: float, high: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Band centres (rad/m), and logarithms of the densities times k^2 averaged in bands, corrected for the bias of the
-    logarithm."""
+    """Band centres (rad/m), and logarithms of the densities averaged in bands (as density times k^2), corrected for the
+    bias of the logarithm."""
     from scipy.special import digamma
 
-    count = max(1, round(PER_DECADE * math.log10(high / low))) if high > low else 0
+    count = max(1, round(BANDS_PER_DECADE * math.log10(high / low))) if high > low else 0
     edges = np.geomspace(low, high, count + 1)
     middles, values = [], []
     for start, end in itertools.pairwise(edges):
         in_band = (k >= start) & (k < end)
         if in_band.any():
-            half = freedom * in_band.sum() / 2.0
+            half = degrees_of_freedom * in_band.sum() / 2.0
             middle = float(np.exp(np.log(k[in_band]).mean()))
             flat = float(np.mean(density[in_band] * k[in_band] ** 2))
             middles.append(middle)
@@ -137,11 +138,11 @@ def _band_averages(
 
 
 def _data_limit_sentences(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
-    """Sentences on limits of the data that no fit can remove."""
+    """Sentences on limits of the measured data that no fit can remove."""
     lowest_wavenumber = spectra.wavenumber[0]
     low, high = spectra.confidence_factors()
     return [
-        f"{tracks.length:g} m in {spectra.windows} windows: nothing is known of waves longer than "
+        f"{tracks.length:g} m in {spectra.window_count} windows: nothing is known of waves longer than "
         f"{2.0 * math.pi / lowest_wavenumber:.3g} m ({lowest_wavenumber:.3g} rad/m)",
         f"every single density is known to a factor {low:.2f} to {high:.2f} (95 %)",
         f"a coherency below {spectra.chance_coherency():.2f} cannot be told from none (95 %)",
@@ -160,7 +161,7 @@ def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | 
         if not fitted.corner_is_resolved:
             sentences.append(
                 f"the corner of the {name} process is not told by this road: only its level above "
-                f"{fitted.low:.3g} rad/m is; do not read its variance"
+                f"{fitted.low_wavenumber:.3g} rad/m is; do not read its variance"
             )
         if fitted.log_residual > math.log(2.0):
             sentences.append(
@@ -168,7 +169,7 @@ def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | 
                 f"{_scatter_factor(fitted):.1f} (rms)"
             )
     shared = np.abs(spectra.mean_roll) / np.sqrt(spectra.mean * np.maximum(spectra.roll, 1e-300))
-    used = (spectra.wavenumber >= mean.low) & (spectra.wavenumber <= mean.high)
+    used = (spectra.wavenumber >= mean.low_wavenumber) & (spectra.wavenumber <= mean.high_wavenumber)
     often = float(np.mean(shared[used] > spectra.chance_coherency()))
     if roll is not None and often > 0.2:
         sentences.append(

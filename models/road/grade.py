@@ -1,4 +1,4 @@
-"""A hill without a top: a road that comes to climb, or to fall, at a constant slope angle."""
+"""Road on a grade: it comes to climb, or to fall, at a constant slope angle."""
 
 import math
 from dataclasses import dataclass
@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike
 from models.road.profile import HeightsAndSlopes, RoadProfile
 
 TRANSITION_LENGTH = 40.0
-"""Length (m) over which the slope grows from 0 to its full value."""
+"""Length (m) over which the slope of a grade grows from 0 to its full value."""
 
 
 @dataclass(frozen=True, eq=False)
-class Graded:
-    """A profile on a grade: zeta(s) = profile(s) - tan(grade) TRANSITION_LENGTH W((s - start) / TRANSITION_LENGTH).
+class GradedRoad:
+    """A road profile on a grade: zeta(s) = profile(s) - tan(grade) TRANSITION_LENGTH W((s - start) /
+    TRANSITION_LENGTH).
 
     W is the integral of the quintic smoothstep: 0 before 0, x^6 - 3 x^5 + 5/2 x^4 up to 1, x - 1/2 beyond. So
     the slope grows monotonically and without a jump up to its second derivative, and beyond the transition the
@@ -38,12 +39,12 @@ class Graded:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """First and last arc length of the profile (m)."""
+        """First and last arc length (m) of the profile."""
         return self.profile.extent
 
     @property
     def finest(self) -> float:
-        """Length (m) of the finest detail: the profile's, or a quarter of the transition."""
+        """Length (m) of the finest detail: that of the profile, or a quarter of the transition."""
         return min(self.profile.finest, TRANSITION_LENGTH / 4.0)
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:

@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from models.road.profile import SineProfile
 
 DENSITY_OF_CLASS = {name: 16e-6 * 4.0**i for i, name in enumerate("ABCDEFGH")}
-"""Geometric mean of Gd(0.1 waves per metre), m^3, one-sided; the upper limit of a class is twice that."""
+"""Geometric mean of the one-sided density Gd(0.1 waves per metre) of each ISO 8608 class, m^3; the upper limit of a
+class is twice that."""
 
 FACTOR_TO_ONE_SIDED = {"one-sided": 1.0, "two-sided": 2.0}
-"""Factor from a density as it was stated to the one-sided density of the same road."""
+"""Factor from a density as it was stated, one-sided or two-sided, to the one-sided density of the same road."""
 
 
 def iso8608_road(
@@ -33,7 +34,7 @@ def iso8608_road(
     level_convention: str = "one-sided",
     window_length: float = 40.0,
 ) -> "SineProfile":
-    """Road at the geometric mean of an ISO 8608 class.
+    """Random road at the geometric mean of an ISO 8608 class.
 
     Parameters
     ----------
@@ -61,7 +62,8 @@ def iso8608_road(
 
 
 def level_of_class(road_class: str, level_convention: str = "one-sided") -> float:
-    """S0 (m) of a class: the density at its geometric mean is S0 / Omega^2, **two-sided** over Omega in rad/m.
+    """Level S0 (m) of an ISO 8608 class: the density at its geometric mean is S0 / Omega^2, **two-sided** over Omega in
+    rad/m.
 
     One-sided Gd(n) = Gd(0.1) (n / 0.1)^-2 over waves per metre is 2 pi 0.01 Gd(0.1) / Omega^2 over Omega = 2 pi n,
     half of it two-sided. ``level_convention`` says how the standard's figure is read, see :func:`iso8608_road`. Raises
@@ -72,8 +74,8 @@ def level_of_class(road_class: str, level_convention: str = "one-sided") -> floa
 
 
 def class_at_level(density_level: float) -> str:
-    """Text with the ISO class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), and the convention
-    used."""
+    """Text with the ISO 8608 class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), and the
+    convention used."""
     if density_level <= 0.0:
         return "smooth"
     class_number = math.log(
@@ -86,7 +88,8 @@ def class_at_level(density_level: float) -> str:
 def rough_road(
     gd: float, seed: int, n_min: float, n_max: float, waves: int, window_length: float = 40.0
 ) -> "SineProfile":
-    """Road with the **one-sided** density gd (n / 0.1)^-2, gd in m^3; the rest as :func:`iso8608_road`."""
+    """Random road with the **one-sided** density gd (n / 0.1)^-2 (gd in m^3) over n in waves per metre; other
+    parameters as in :func:`iso8608_road`."""
     _check_band(gd, seed, n_min, n_max, waves)
     from models.road.profile import SineProfile
     from models.road.study import road_waves
@@ -97,7 +100,7 @@ def rough_road(
 
 
 def random_phases(seed: int, waves: int) -> np.ndarray:
-    """Phases in [0, 2 pi), rad, shape (waves,), from the Philox counter with ``seed`` as its key.
+    """Random phases in [0, 2 pi), rad, shape (waves,), from the Philox counter with ``seed`` as its key.
 
     Made from the raw 64-bit words, not by a distribution of numpy, whose stream may change between
     versions: a road named by its seed has to stay the same road.

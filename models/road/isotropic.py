@@ -1,4 +1,5 @@
-"""Isotropic roads (Dodds and Robson 1973): the same statistics in every direction, so that one track tells all.
+"""Isotropic random roads (Dodds and Robson 1973): the same statistics in every direction, so that a single track
+defines them.
 
 The covariance of two heights depends on their distance r alone: R(r), the autocovariance of a track. Two parallel
 tracks a distance d apart then have the cross-covariance R(sqrt(x^2 + d^2)), and the cross density
@@ -27,8 +28,9 @@ from models.vehicles.linear_vehicle import WheelPosition
 
 
 @dataclass(frozen=True)
-class DensityPart:
-    """Track density level / (corner^2 + Omega^2)^(waviness / 2), two-sided; its own cross density in closed form.
+class DensityTerm:
+    """Term of a track's spectral density, level / (corner^2 + Omega^2)^(waviness / 2), two-sided, with its cross
+    density in closed form.
 
     level : in m^3 (rad/m)^(waviness), S0 in m for waviness 2; corner in rad/m, 0 or more; waviness above 1
     """
@@ -61,13 +63,13 @@ class DensityPart:
 
 @dataclass(frozen=True)
 class IsotropicRoad:
-    """A road with the same statistics in all directions; its track density is the sum of several terms
+    """Random road with the same statistics in all directions; its track density is the sum of several terms
     ``DensityPart``."""
 
-    parts: tuple[DensityPart, ...]
+    parts: tuple[DensityTerm, ...]
 
     def spectrum(self, wavenumber: np.ndarray) -> np.ndarray:
-        """Two-sided density (m^3) of any track over the wavenumber (rad/m)."""
+        """Two-sided spectral density (m^3) of any track over the wavenumber (rad/m)."""
         return self.cross_spectrum(wavenumber, 0.0)
 
     def cross_spectrum(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
@@ -79,21 +81,22 @@ class IsotropicRoad:
         return self.cross_spectrum(wavenumber, distance) / self.spectrum(wavenumber)
 
 
-def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
-    """Isotropic road with the same spectrum as the two-track road's track at y (m): both of first order."""
+def isotropic_road_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
+    """Isotropic road with the same spectrum as the two-track road has on its track at y (m); both roads must be of
+    first order."""
     if road.mean.cutoff is not None or road.roll.cutoff is not None:
         raise InputError("", "cutoff", road.mean.cutoff or road.roll.cutoff, "is not known to isotropic roads")
     shares = ((road.mean, 1.0), (road.roll, y * y))
     return IsotropicRoad(
         tuple(
-            DensityPart(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity
+            DensityTerm(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity
         )
     )
 
 
 def isotropic_class(road_class: str, corner: float = 0.0, level_convention: str = "one-sided") -> IsotropicRoad:
     """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
-    return IsotropicRoad((DensityPart(level_of_class(road_class, level_convention), corner),))
+    return IsotropicRoad((DensityTerm(level_of_class(road_class, level_convention), corner),))
 
 
 def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Compiled evaluation of road profiles: sums of sines and piecewise cubics, with their windows.
+"""Compiled evaluation of road profiles: sums of sines and piecewise cubics, faded in by a window.
 
 Frame: s along the road in m, zeta in m positive **down** (a rise is negative), slope d(zeta)/ds.
 """
@@ -11,18 +11,20 @@ import numpy as np
 from models.machine.compiled import njit
 
 RESYNCHRONISE = 128
-"""Samples between two exact sin/cos in :func:`sines_uniform`.
+"""Count of samples between two exact evaluations of sin and cos in :func:`sines_uniform`.
 
 One rotation adds at most about 2e-16 of a wave's amplitude; 128 of them stay near 1e-14 even if every
 rounding fell the same way, and the exact values then cost 1/128 of what direct evaluation costs.
 """
 
 VECTOR_LANES = 16
-"""The waves are filled up with waves of amplitude 0 to a multiple of this, so that no vector is left over."""
+"""Number of waves is filled up to a multiple of this with waves of amplitude 0, so that all vector registers are
+full."""
 
 
 class Waves(NamedTuple):
-    """The road -w(s) sum amplitude sin(wavenumber s + phase): m, rad/m, rad, all (n,), and the window's length (m)."""
+    """Waves of a road -w(s) sum amplitude sin(wavenumber s + phase): m, rad/m, rad, all (n,), and the length (m) of its
+    window w."""
 
     amplitude: np.ndarray
     wavenumber: np.ndarray
@@ -32,7 +34,7 @@ class Waves(NamedTuple):
 
 @njit(cache=True)
 def smoothstep(x: float) -> tuple[float, float]:
-    """Quintic 10 x^3 - 15 x^4 + 6 x^5 and its derivative; 0 before x = 0, 1 after x = 1, C2 at both ends."""
+    """Quintic smoothstep 10 x^3 - 15 x^4 + 6 x^5 and its derivative; 0 before x = 0, 1 after x = 1, C2 at both ends."""
     if x <= 0.0:
         return 0.0, 0.0
     if x >= 1.0:
@@ -41,9 +43,9 @@ def smoothstep(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def faded_in(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
-    """Value and slope of ``w(distance / window) * height``; 0 for distances up to 0; a window of 0 means no
-    windowing."""
+def fade_in(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
+    """Height (m) and slope of ``w(distance / window) * height``, w the smoothstep; 0 for distances up to 0; a window of
+    0 means no windowing."""
     if distance <= 0.0:
         return 0.0, 0.0
     if distance >= window:
@@ -54,27 +56,27 @@ def faded_in(distance: float, window: float, height: float, slope: float) -> tup
 
 @njit(cache=True)
 def sines_at(s, amplitude, wavenumber, phase, window):
-    """Height (m, down) and slope at one station. The arrays of ``Waves`` are separate arguments, since passing the
-    tuple from Python doubles the time."""
+    """Height (m, down) and slope of a sum of sines at a station s (m). The arrays of ``Waves`` are separate arguments,
+    since passing the tuple from Python doubles the time."""
     height, slope = 0.0, 0.0
     if s > 0.0:
         for i in range(amplitude.size):
             angle = wavenumber[i] * s + phase[i]
             height -= amplitude[i] * math.sin(angle)
             slope -= amplitude[i] * wavenumber[i] * math.cos(angle)
-    return faded_in(s, window, height, slope)
+    return fade_in(s, window, height, slope)
 
 
 @njit(cache=True)
 def fill_sines(s, waves, height, slope):
-    """Fill ``height`` and ``slope`` at every station of the flat array ``s``."""
+    """Fill ``height`` (m, down) and ``slope`` of a sum of sines at every station of the flat array ``s`` (m)."""
     for j in range(s.size):
         height[j], slope[j] = sines_at(s[j], waves.amplitude, waves.wavenumber, waves.phase, waves.window)
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
-    """Sums of all waves and of their slopes at the present sample; then rotate every wave to the next sample.
+    """Sums of all waves and of their slopes at the present sample; rotates every wave to the next sample.
 
     The waves are the inner loop because they are independent: the sums may be reordered (``reassoc``),
     so the loop becomes one of vector instructions. ``sine`` and ``cosine`` carry the amplitudes.
@@ -91,7 +93,8 @@ def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
 
 @njit(cache=True)
 def sines_uniform(start_station, step, waves, height, slope):
-    """Fill ``height`` and ``slope`` at ``start_station + j step`` by complex rotation, exact every 128 samples."""
+    """Fill ``height`` (m, down) and ``slope`` of a sum of sines at ``start_station + j step`` by complex rotation,
+    exact every 128 samples."""
     amplitude, wavenumber, phase, window = waves
     n = amplitude.size
     work = np.zeros((5, (n + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES))
@@ -106,12 +109,13 @@ def sines_uniform(start_station, step, waves, height, slope):
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
         for j in range(first, min(first + RESYNCHRONISE, height.size)):
             value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
-            height[j], slope[j] = faded_in(start_station + j * step, window, value, rate)
+            height[j], slope[j] = fade_in(start_station + j * step, window, value, rate)
 
 
 @njit(cache=True)
-def segment(stations, s, guessed_piece):
-    """Index of the piece that contains ``s``; the search starts at the piece found last, ``guessed_piece``."""
+def piece_index(stations, s, guessed_piece):
+    """Index of the spline's piece that contains station ``s``; the search starts at the piece found last,
+    ``guessed_piece``."""
     last_piece = stations.size - 2
     for i in range(guessed_piece, min(guessed_piece + 2, last_piece + 1)):
         if stations[i] <= s < stations[i + 1]:
@@ -128,37 +132,38 @@ def segment(stations, s, guessed_piece):
 
 @njit(cache=True)
 def cubic_at(s, piece, stations, coefficients, window):
-    """Height and slope of one cubic piece (coefficient rows from the highest power), multiplied by the window that
-    starts at the first station."""
+    """Height (m, down) and slope of a cubic piece (coefficient rows from the highest power), multiplied by the window
+    that starts at the first station."""
     d = s - stations[piece]
     a, b, c, e = coefficients[piece, 0], coefficients[piece, 1], coefficients[piece, 2], coefficients[piece, 3]
     height = ((a * d + b) * d + c) * d + e
     slope = (3.0 * a * d + 2.0 * b) * d + c
     if window > 0.0:
-        return faded_in(s - stations[0], window, height, slope)
+        return fade_in(s - stations[0], window, height, slope)
     return height, slope
 
 
 @njit(cache=True)
-def cubic_one(s, stations, coefficients, window):
-    """Height and slope at one station."""
-    return cubic_at(s, segment(stations, s, 0), stations, coefficients, window)
+def cubic_at_station(s, stations, coefficients, window):
+    """Height (m, down) and slope of a piecewise cubic road at a station s (m)."""
+    return cubic_at(s, piece_index(stations, s, 0), stations, coefficients, window)
 
 
 @njit(cache=True)
 def fill_cubics(s, stations, coefficients, window, height, slope):
-    """Fill ``height`` and ``slope`` at every station of the flat array ``s``."""
+    """Fill ``height`` (m, down) and ``slope`` of a piecewise cubic road at every station of the flat array ``s``
+    (m)."""
     piece = 0
     for j in range(s.size):
-        piece = segment(stations, s[j], piece)
+        piece = piece_index(stations, s[j], piece)
         height[j], slope[j] = cubic_at(s[j], piece, stations, coefficients, window)
 
 
 @njit(cache=True)
 def cubics_uniform(start_station, step, stations, coefficients, window, height, slope):
-    """Fill ``height`` and ``slope`` at ``start_station + j step``."""
+    """Fill ``height`` (m, down) and ``slope`` of a piecewise cubic road at ``start_station + j step`` (m)."""
     piece = 0
     for j in range(height.size):
         s = start_station + j * step
-        piece = segment(stations, s, piece)
+        piece = piece_index(stations, s, piece)
         height[j], slope[j] = cubic_at(s, piece, stations, coefficients, window)

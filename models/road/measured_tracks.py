@@ -1,4 +1,4 @@
-"""Two measured tracks side by side: their spectra and coherency, with the bands of chance.
+"""Two measured tracks of a road: their spectra and coherency, with confidence bands.
 
 Densities are two-sided over the wavenumber in rad/m, by Welch's method: Hann windows that overlap by half, a straight
 line taken from each. With K windows a density is chi-square distributed with about nu = 2 K / (1 + (1 - 1/K) / 18)
@@ -16,12 +16,13 @@ from models.road.csv_road import read_csv_tracks
 from models.road.opencrg import TRACK_WIDTH, read_opencrg
 
 WELCH_WINDOWS = 8
-"""Windows that a road is cut into unless a window's length is given."""
+"""Count of windows into which a road is divided unless a window length is given."""
 
 
 @dataclass(frozen=True)
 class MeasuredTracks:
-    """Heights left and right (n,) in m, **up**, every ``increment`` m; the tracks lie at y = +- half_track (m)."""
+    """Heights (m, **up**) of the left and right track of a road, (n,) each, every ``increment`` m; the tracks lie at y
+    = +- half_track (m)."""
 
     left: np.ndarray
     right: np.ndarray
@@ -37,7 +38,8 @@ class MeasuredTracks:
 
 @dataclass(frozen=True)
 class TrackSpectra:
-    """Two-sided densities over ``wavenumber`` (rad/m, above 0): tracks, mean and roll process, cross densities.
+    """Two-sided spectral densities of two tracks over ``wavenumber`` (rad/m, above 0): tracks, mean and roll process,
+    cross densities.
 
     left, right, mean and the complex ``cross`` (left with right) in m^3, roll in m; ``mean_roll`` in m^2 is 0 for
     the road of mean and roll process. ``degrees_of_freedom``: degrees of freedom of every density.
@@ -50,23 +52,24 @@ class TrackSpectra:
     mean: np.ndarray
     roll: np.ndarray
     mean_roll: np.ndarray
-    windows: int
+    window_count: int
     degrees_of_freedom: float
 
     @property
     def coherency(self) -> np.ndarray:
-        """|S_lr| / sqrt(S_l S_r), biased up: pure chance gives about sqrt(2 / freedom)."""
+        """Coherency |S_lr| / sqrt(S_l S_r) of left and right track, biased up: pure chance gives about sqrt(2 /
+        freedom)."""
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
     def confidence_factors(self, probability: float = 0.95) -> tuple[float, float]:
-        """Factors by which to multiply a density to get its confidence interval at probability ``probability``."""
+        """Factors by which to multiply a density to get the ends of its confidence interval at a probability."""
         from scipy.stats import chi2
 
         low, high = chi2.ppf([(1.0 - probability) / 2.0, (1.0 + probability) / 2.0], self.degrees_of_freedom)
         return self.degrees_of_freedom / high, self.degrees_of_freedom / low
 
     def chance_coherency(self, probability: float = 0.95) -> float:
-        """Coherency that two unrelated tracks do not exceed by chance, with probability ``probability``."""
+        """Coherency that two unrelated tracks exceed by chance only with probability 1 - ``probability``."""
         independent = self.degrees_of_freedom / 2.0
         return math.sqrt(1.0 - (1.0 - probability) ** (1.0 / (independent - 1.0)))
 
@@ -113,7 +116,8 @@ def read_tracks(
 
 
 def track_spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
-    """Spectral densities by Welch's method; ``window_length`` in m, by default so that eight windows fit.
+    """Spectral densities of two tracks by Welch's method; ``window_length`` in m, by default such that eight windows
+    fit.
 
     Raises InputError for windows of fewer than 16 stations or fewer than two of them: no density at all.
     """

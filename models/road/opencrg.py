@@ -1,4 +1,4 @@
-"""Roads in OpenCRG files (.crg), by the library pyopencrg behind a check of every promised byte.
+"""Roads in OpenCRG files (.crg), read by the library pyopencrg after a check that all announced bytes are there.
 
 OpenCRG gives heights **up** over u (along the reference line) and v (across, positive to the left);
 here zeta = -height, and u minus the file's first u is the arc length s, for every track, so that the
@@ -28,7 +28,7 @@ from models.road import TRACK_WIDTH
 from models.road.profile import RoadProfile, SplineProfile
 
 SMALLEST_INCREMENT = 1e-3
-"""Smallest distance of stations that the format's own checks accept, m."""
+"""Smallest distance (m) of stations that the format's own checks accept."""
 
 _LATERAL_POSITIONS = {"left": (0.5,), "right": (-0.5,), "centre": (0.0,), "mean": (0.5, -0.5)}
 _BYTES_PER_VALUE = {"KRBI": 4, "KDBI": 8, "LRFI": 10, "LDFI": 20}
@@ -37,8 +37,8 @@ _KEYWORD_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
 
 
 @dataclass(frozen=True)
-class _Promise:
-    """Data layout that the header announces: records, channels, bytes per value, text or binary."""
+class _AnnouncedLayout:
+    """Data layout that the header of a file announces: records, channels, bytes per value, text or binary."""
 
     records: int
     channels: int
@@ -50,7 +50,7 @@ class _Promise:
 def read_opencrg(
     path: str | Path, track: str = "mean", *, lateral_offset: float = 0.0, track_width: float = TRACK_WIDTH
 ) -> SplineProfile:
-    """C2 road along one track of an OpenCRG file.
+    """Road, a C2 spline, along one track of an OpenCRG file.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def write_opencrg(
     right_profile: RoadProfile | None = None,
     track_width: float = TRACK_WIDTH,
 ) -> None:
-    """Write a road from s = 0 to ``length`` in the format KDBI.
+    """Write a road from s = 0 to ``length`` (m) to an OpenCRG file in the format KDBI.
 
     KDBI holds IEEE doubles, and the header writes the increment with 17 digits: what is read back at the
     stations is what was written, bit for bit. Between them the reader's spline stands for the road.
@@ -116,7 +116,7 @@ def write_opencrg(
 
 
 def _count_of_stations(path: str | Path, length: float, increment: float) -> int:
-    """Number of stations of a road to be written."""
+    """Number of stations of a road to be written, after checks."""
     if not (math.isfinite(increment) and increment >= SMALLEST_INCREMENT):
         raise InputError(path, "increment (m)", increment, f"must be {SMALLEST_INCREMENT} or more")
     steps = round(length / increment) if math.isfinite(length) else 0
@@ -126,7 +126,8 @@ def _count_of_stations(path: str | Path, length: float, increment: float) -> int
 
 
 def _load(path: str | Path) -> Any:
-    """Read a complete file; every complaint of the library about reading becomes an error."""
+    """The complete OpenCRG file as the library reads it; every complaint of the library about reading becomes an
+    error."""
     promise = _check_header(path)
     try:
         with warnings.catch_warnings():
@@ -151,7 +152,7 @@ def _unreadable_file_error(path: str | Path, error: Exception) -> InputError:
     return InputError(path, "", None, f"not a readable OpenCRG file: {reason or type(error).__name__}")
 
 
-def _check_header(path: str | Path) -> _Promise:
+def _check_header(path: str | Path) -> _AnnouncedLayout:
     """Read the header, check it, and compare the number of bytes that follow with the number that the header gives."""
     try:
         header = read_ipl(path, meta_only=True)
@@ -163,7 +164,7 @@ def _check_header(path: str | Path) -> _Promise:
         formats = ", ".join(_BYTES_PER_VALUE)
         raise InputError(path, "$KD_DEFINITION", None, f"the data channels and one of the formats {formats} are needed")
     text = header.fmt.startswith("L")
-    promise = _Promise(
+    promise = _AnnouncedLayout(
         _count_of_records(path, header), len(header.kd_def), _BYTES_PER_VALUE[header.fmt], text, header.data_offset
     )
     (_check_text if text else _check_binary)(path, promise, data)
@@ -171,7 +172,7 @@ def _check_header(path: str | Path) -> _Promise:
 
 
 def _count_of_records(path: str | Path, header: IplData) -> int:
-    """Number of cross sections between the first and the last u of the header."""
+    """Number of cross sections between the first and the last u (m) of the header."""
     if cut_block(header.struct, "ROAD_CRG_FILE")[0] is not None:
         raise InputError(path, "$ROAD_CRG_FILE", None, "the data must be in the same file as the header")
     block, _ = cut_block(header.struct, "ROAD_CRG")
@@ -190,7 +191,7 @@ def _count_of_records(path: str | Path, header: IplData) -> int:
 
 
 def _header_number(path: str | Path, values: dict[str, str], key: str, default: str = "") -> float:
-    """One number from the header. Length and increment must be there, since without them missing data go unnoticed."""
+    """Number from the header. Length and increment must be there, since without them missing data go unnoticed."""
     text = values.get(key, default)
     try:
         number = float(text.replace("d", "e"))
@@ -201,7 +202,7 @@ def _header_number(path: str | Path, values: dict[str, str], key: str, default: 
     return number
 
 
-def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
+def _check_binary(path: str | Path, promise: _AnnouncedLayout, data: bytes) -> None:
     """Check that binary data are records without gaps, padded to a multiple of 80 bytes."""
     wanted = math.ceil(promise.records * promise.channels * promise.width / _HEADER_LINE_LENGTH) * _HEADER_LINE_LENGTH
     if len(data) != wanted:
@@ -211,7 +212,7 @@ def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
         )
 
 
-def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
+def _check_text(path: str | Path, promise: _AnnouncedLayout, data: bytes) -> None:
     """Check that text data are lines of full width with line ends; a number cut short makes its line shorter."""
     body = data.rstrip(b"\r\n")
     lines, ended = body.split(b"\n"), len(body) < len(data)

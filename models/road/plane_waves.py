@@ -1,4 +1,4 @@
-"""A rough road under a vehicle that may leave its lane: an isotropic Gaussian surface as a sum of plane waves."""
+"""Rough road surface under a vehicle that may leave its lane: an isotropic Gaussian surface as a sum of plane waves."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from models.core.errors import InputError
 from models.core.noise import ROAD, normal_samples
 
 LONGEST_WAVELENGTH, SHORTEST_WAVELENGTH = 60.0, 0.5
-"""Wavelengths (m); shorter ones are swallowed by the tyre's patch."""
+"""Longest and shortest wavelength (m); shorter waves are swallowed by the tyre's contact patch."""
 GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
 
 

@@ -1,4 +1,4 @@
-"""Straight lines through measured points: a hard case, kept to show what it does to an integrator.
+"""Road of straight lines through measured points: a hard case, to show what it does to an integrator.
 
 The slope jumps at every point, and a fourth-order method falls to first order (notes on sampled input:
 errors of 6e-3 to 2e-2 at 0.5 ms where the C2 road gives 4e-5). Never the road of a result.
@@ -11,11 +11,13 @@ from models.road.profile import SplineProfile
 
 
 class PolylineProfile(SplineProfile):
-    """Piecewise linear road; at a point, the slope is that of the following piece. Units as in the base class."""
+    """Piecewise linear road profile; at a point, the slope is that of the following piece. Units as in the base
+    class."""
 
     @classmethod
     def through(cls, stations: ArrayLike, height: ArrayLike, name: str = "polyline") -> "PolylineProfile":
-        """Straight pieces through 2 or more points, m, height positive down; raises InputError as its base."""
+        """Polyline through 2 or more points: stations and heights in m, height positive down. Raises InputError as its
+        base does."""
         s, zeta = np.asarray(stations, dtype=float), np.asarray(height, dtype=float)
         nothing = np.zeros(s.size - 1)
         with np.errstate(divide="ignore", invalid="ignore"):  # repeated stations are refused by the base
@@ -25,7 +27,7 @@ class PolylineProfile(SplineProfile):
 
 
 def polyline_through(road: SplineProfile | tuple[ArrayLike, ArrayLike]) -> PolylineProfile:
-    """Return the polyline through the points of a spline, or through (stations, heights) in m."""
+    """Polyline through the points of a spline, or through (stations, heights) in m."""
     if isinstance(road, SplineProfile):
         return PolylineProfile.through(*road.points, f"{road.name}, polyline")
     return PolylineProfile.through(*road)

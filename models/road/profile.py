@@ -1,4 +1,4 @@
-"""The two kinds of smooth road: a sum of sines without end, and a cubic spline through points.
+"""Smooth road profiles: a sum of sines without end, and a cubic spline through points.
 
 Both are twice continuously differentiable (C2). That is not a matter of looks: with a slope that jumps,
 a fourth-order integrator falls to first order. Arc length s is in m; zeta is the height in m, positive
@@ -18,15 +18,15 @@ from models.road import kernels
 HeightsAndSlopes = tuple[np.ndarray, np.ndarray]
 
 OVERRUN_SHARE = 1e-9
-"""Part of its length by which a road may be overrun: the rounding of s = v t is not the end of the road."""
+"""Share of its length by which a road may be overrun: the rounding of s = v t is not the end of the road."""
 
 
 class RoadProfile(Protocol):
-    """Protocol of a road profile; heights in m, positive down."""
+    """Protocol of a road profile: height (m, positive down) and slope over arc length (m)."""
 
     @property
     def name(self) -> str:
-        """Name for reports and messages."""
+        """Name of the road for reports and messages."""
         ...
 
     @property
@@ -54,7 +54,7 @@ class RoadProfile(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SineProfile:
-    """Sum of sines, zeta(s) = -w(s) sum_i amplitude_i sin(wavenumber_i s + phase_i), and 0 for s <= 0.
+    """Road as a sum of sines, zeta(s) = -w(s) sum_i amplitude_i sin(wavenumber_i s + phase_i), and 0 for s <= 0.
 
     Parameters
     ----------
@@ -85,17 +85,17 @@ class SineProfile:
 
     @property
     def waves(self) -> kernels.Waves:
-        """The profile's waves in the form that compiled functions take."""
+        """Waves of the road in the form that compiled functions take."""
         return kernels.Waves(self.amplitude, self.wavenumber, self.phase, self.window_length)
 
     @property
     def extent(self) -> tuple[float, float]:
-        """First and last arc length: minus and plus infinity."""
+        """First and last arc length of the road: minus and plus infinity."""
         return -math.inf, math.inf
 
     @property
     def finest(self) -> float:
-        """A quarter of the shortest wavelength (m)."""
+        """Length (m) of the finest detail: a quarter of the shortest wavelength."""
         return float(0.5 * math.pi / np.abs(self.wavenumber).max())
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
@@ -173,28 +173,29 @@ class SplineProfile:
 
     @property
     def start(self) -> float:
-        """Arc length of the first point, m."""
+        """Arc length (m) of the first point of the road."""
         return float(self.station[0])
 
     @property
     def end(self) -> float:
-        """Arc length of the last point, m."""
+        """Arc length (m) of the last point of the road."""
         return float(self.station[-1])
 
     @property
     def extent(self) -> tuple[float, float]:
-        """First and last arc length (m); a road with a window is also defined before its start, where it is flat."""
+        """First and last arc length (m) of the road; with a window it is also defined before its start, where it is
+        flat."""
         return (-math.inf if self.window_length > 0.0 else self.start), self.end
 
     @property
     def finest(self) -> float:
-        """The smallest distance (m) of two stations."""
+        """Length (m) of the finest detail: the smallest distance of two stations."""
         return float(np.diff(self.station).min())
 
     @property
     def points(self) -> HeightsAndSlopes:
-        """Stations (m) and heights (m, positive down, without the window), each of shape (n,)."""
-        end_height = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
+        """Stations (m) and heights (m, positive down, without the window) of the road's points, each of shape (n,)."""
+        end_height = kernels.cubic_at_station(self.end, self.station, self.coefficients, 0.0)[0]
         return self.station, np.append(self.coefficients[:, 3], end_height)
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
@@ -219,7 +220,7 @@ class SplineProfile:
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
         self._check_extent(s, s)
-        return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
+        return kernels.cubic_at_station(float(s), self.station, self.coefficients, self.window_length)
 
     def _check_extent(self, first_station: float, last_station: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
@@ -236,7 +237,7 @@ class SplineProfile:
 
 
 def _read_only_copy(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
-    """Read-only, contiguous copy with finite values only."""
+    """Read-only, contiguous copy of an array, checked to have finite values only."""
     array = np.array(values, dtype=float, order="C")
     if array.ndim != dimensions or not np.isfinite(array).all():
         raise InputError("", field, None, f"must be an array of finite numbers with {dimensions} dimension(s)")

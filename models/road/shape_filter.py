@@ -1,4 +1,5 @@
-"""White noise through a shape filter in path: the one-dimensional random process that roads are made of."""
+"""Shape filter that turns white noise over the path into a one-dimensional random process, from which roads are
+made."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from models.core.errors import InputError
 
 @dataclass(frozen=True)
 class ShapeFilter:
-    """First order: f' = -corner f + w, w white of ``intensity`` q (unit of f squared per metre), ' = d/ds.
+    """Shape filter of first order: f' = -corner f + w, w white noise of ``intensity`` q (unit of f squared per metre),
+    ' = d/ds.
 
     With a ``cutoff`` (rad/m, above the corner) the noise first passes u' = -cutoff u + cutoff w: second order, so
     that f has a rate of finite variance, as outputs need which see the road's rate (tyre damping).
@@ -32,7 +34,8 @@ class ShapeFilter:
             raise InputError("", "cutoff", self.cutoff, f"must be above the corner, {self.corner:g} rad/m")
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """F (m, m), G (m, 1), H (1, m) of x' = F x + G w with unit noise w per metre and f = H x; m = 1 or 2."""
+        """State-space matrices F (m, m), G (m, 1), H (1, m) of x' = F x + G w with unit noise w per metre and f = H x;
+        m = 1 or 2."""
         noise = math.sqrt(self.intensity)
         if self.cutoff is None:
             return np.array([[-self.corner]]), np.array([[noise]]), np.ones((1, 1))
@@ -40,13 +43,13 @@ class ShapeFilter:
         return F, np.array([[0.0], [self.cutoff * noise]]), np.array([[1.0, 0.0]])
 
     def spectrum(self, wavenumber: np.ndarray) -> np.ndarray:
-        """Two-sided spectral density over the wavenumber in rad/m."""
+        """Two-sided spectral density of the filtered process over the wavenumber in rad/m."""
         square = np.square(wavenumber)
         low_pass = 1.0 if self.cutoff is None else self.cutoff**2 / (self.cutoff**2 + square)
         return self.intensity / (2.0 * math.pi) / (self.corner**2 + square) * low_pass
 
     def covariance(self, distance: np.ndarray) -> np.ndarray:
-        """Covariance E[f(s) f(s + distance)], distance in m; infinite for a random walk."""
+        """Covariance E[f(s) f(s + distance)] of the filtered process f, distance in m; infinite for a random walk."""
         gap = np.abs(distance)
         if self.corner == 0.0:
             return np.full(np.shape(gap), math.inf if self.intensity else 0.0)

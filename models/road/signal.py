@@ -1,4 +1,4 @@
-"""A road profile under a moving vehicle: what the two wheels feel over time."""
+"""Road heights under the two wheels of a moving vehicle over time."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,8 @@ from models.road.profile import RoadProfile
 
 @dataclass(frozen=True)
 class RoadUnderWheels:
-    """Channels zeta1, zeta2 (m, down) and their time derivatives (m/s) at constant speed (m/s).
+    """Road heights zeta1, zeta2 (m, down) under the front and rear wheel and their time derivatives (m/s), at constant
+    speed (m/s).
 
     The front contact is at s = speed t, the rear one ``wheelbase`` (m) behind it, with no rounding of the
     delay to whole steps.
@@ -30,7 +31,7 @@ class RoadUnderWheels:
         return self.profile.finest / self.speed
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start_time + i step, shape (sample_count, 4)."""
+        """Heights and their rates at start_time + i step (s), shape (sample_count, 4)."""
         values_out = np.empty((sample_count, 4))
         for wheel, behind in enumerate((0.0, self.wheelbase)):
             height, slope = self.profile.sample_uniform(
@@ -40,7 +41,7 @@ class RoadUnderWheels:
         return values_out
 
     def at(self, time: float) -> np.ndarray:
-        """Values at one time (s), shape (4,)."""
+        """Heights and their rates at a time (s), shape (4,)."""
         values_out = np.empty(4)
         for wheel, behind in enumerate((0.0, self.wheelbase)):
             height, slope = self.profile.height_slope_at(self.speed * time - behind)
@@ -48,7 +49,7 @@ class RoadUnderWheels:
         return values_out
 
     def knots(self, duration: float) -> np.ndarray:
-        """Times at which a wheel passes a point where the road is only C2, such as its start."""
+        """Times (s) at which a wheel passes a point where the road is only C2, such as its start."""
         stations = np.array(self.kink_stations)
         times = np.concatenate((stations, stations + self.wheelbase)) / self.speed
         return np.unique(times[(times > 0) & (times < duration)])

@@ -1,4 +1,4 @@
-"""The study road of the drift experiments, and its hills alone: defined once, in closed form.
+"""The study road of the drift experiments, and its hills alone, in closed form.
 
 Heights are positive down. The road is flat at height 0 up to s = 0 and fades in over 40 m, so that a
 vehicle in static equilibrium at s = 0 meets it without a jump in height, slope or curvature.
@@ -14,20 +14,20 @@ from models.road.profile import SineProfile
 STUDY_GD = 2.4e-3
 """Roughness level of the study road: one-sided displacement density at 0.1 waves per metre, m^3."""
 FADE_IN_LENGTH = 40.0
-"""Length of the fade-in, m."""
+"""Length (m) over which the study road fades in from the flat."""
 HILL_AMPLITUDES = np.array([1.2, 0.6, 0.2])
-"""m."""
+"""Amplitudes (m) of the study road's hills."""
 HILL_LENGTHS = np.array([400.0, 150.0, 60.0])
-"""Wavelengths, m."""
+"""Wavelengths (m) of the study road's hills."""
 
 
 def hills_road() -> SineProfile:
-    """A road with hills only: amplitudes 1.2, 0.6, 0.2 m at wavelengths 400, 150, 60 m, all with phase 0 at s = 0."""
+    """Road with hills only: amplitudes 1.2, 0.6, 0.2 m at wavelengths 400, 150, 60 m, all with phase 0 at s = 0."""
     return SineProfile(HILL_AMPLITUDES, 2.0 * math.pi / HILL_LENGTHS, np.zeros(3), FADE_IN_LENGTH, "hills")
 
 
 def study_road(gd: float = STUDY_GD) -> SineProfile:
-    """Hills and 60 waves of roughness from 0.05 to 2 waves per metre, with fixed phases.
+    """Road with hills and 60 waves of roughness from 0.05 to 2 waves per metre, with fixed phases.
 
     Parameters
     ----------
@@ -65,5 +65,5 @@ def road_waves(gd: float, n_min: float, n_max: float, waves: int) -> tuple[np.nd
 
 
 def golden_phases(waves: int) -> np.ndarray:
-    """Phases 2 pi frac(i (sqrt(5) - 1) / 2), i = 1 .. waves, rad: spread evenly without a random number."""
+    """Phases 2 pi frac(i (sqrt(5) - 1) / 2), i = 1 .. waves, rad: evenly spread without random numbers."""
     return 2.0 * math.pi * np.modf(np.arange(1, waves + 1) * (math.sqrt(5.0) - 1.0) / 2.0)[0]

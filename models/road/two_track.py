@@ -1,4 +1,4 @@
-"""A road under two tracks: the mean process z_M and the roll process theta, and what every wheel meets of them.
+"""Random road under two tracks as a mean height and a roll process, and the heights that every wheel meets.
 
 The height at y (m, to the left) of a straight lane is z = z_M + y theta, heights up, z_M and theta independent, each
 white noise through a shape filter in path (G. Rill, The Influence of Correlated Random Road-Excitation Processes on
@@ -25,9 +25,10 @@ from models.road.shape_filter import ShapeFilter
 from models.vehicles.linear_vehicle import WheelPosition
 
 MEAN_CORNER, ROLL_CORNER = 0.3, 1.5
-"""Corners of the paper, rad/m."""
+"""Corner wavenumbers (rad/m) of the mean height and the roll process in Rill's paper."""
 TRACK_DENSITY_LEVEL = 1.6e-5
-"""S0 of the paper, m: what a bad scan of it lets one read; neither exponent nor split between the two is certain."""
+"""Level S0 (m) of a track in Rill's paper, as far as a bad scan of it can be read; neither exponent nor split between
+the two processes is certain."""
 TRACK_CORRELATIONS = ("modelled", "uncorrelated", "equal")
 FRONT_REAR = ("delayed", "uncorrelated", "equal")
 CORRELATION_CASES = {
@@ -37,27 +38,27 @@ CORRELATION_CASES = {
     4: ("uncorrelated", "delayed"),
     5: ("equal", "delayed"),
 }
-"""The paper's five cases of correlation: left and right, front and rear."""
+"""The five cases of correlation in Rill's paper: left and right, front and rear."""
 
 
 @dataclass(frozen=True)
 class TwoTrackRoad:
-    """A road of two random processes: mean height (m, intensity q1 in m) and roll (rad, intensity q2 in 1/m)."""
+    """Random road of two processes: mean height (m, intensity q1 in m) and roll (rad, intensity q2 in 1/m)."""
 
     mean: ShapeFilter
     roll: ShapeFilter
 
     def spectrum(self, wavenumber: np.ndarray, y: float) -> np.ndarray:
-        """Two-sided density (m^3) of the height at y over the wavenumber (rad/m)."""
+        """Two-sided spectral density (m^3) of the height at lateral position y (m) over the wavenumber (rad/m)."""
         return self.cross_spectrum(wavenumber, y, y)
 
     def cross_spectrum(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
-        """Two-sided cross density (m^3) of the heights at y1 and y2; it is real, because both points lie at the same
-        station."""
+        """Two-sided cross density (m^3) of the heights at lateral positions y1 and y2 (m); it is real, because both
+        points lie at the same station."""
         return self.mean.spectrum(wavenumber) + y1 * y2 * self.roll.spectrum(wavenumber)
 
     def coherency(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
-        """|S12| / sqrt(S1 S2) of the heights at y1 and y2, 0 to 1."""
+        """Coherency |S12| / sqrt(S1 S2), 0 to 1, of the heights at lateral positions y1 and y2 (m)."""
         cross = self.cross_spectrum(wavenumber, y1, y2)
         return np.abs(cross) / np.sqrt(self.spectrum(wavenumber, y1) * self.spectrum(wavenumber, y2))
 
@@ -67,11 +68,12 @@ class TwoTrackRoad:
         return self.mean.covariance(distance) + roll
 
     def level(self, y: float) -> float:
-        """Level S0 (m) at y: without cutoffs the two-sided spectrum there tends to S0 / Omega^2."""
+        """Level S0 (m) of the road's spectrum at lateral position y (m): without cutoffs the two-sided spectrum there
+        tends to S0 / Omega^2."""
         return (self.mean.intensity + y * y * self.roll.intensity) / (2.0 * math.pi)
 
     def label(self, y: float) -> str:
-        """Text with the name of the road and the convention of its level."""
+        """Text with the name of the road at lateral position y (m) and the convention of its level."""
         cutoffs = {f.cutoff for f in (self.mean, self.roll) if f.cutoff is not None}
         steep = f", cut off at {' and '.join(f'{c:g}' for c in sorted(cutoffs))} rad/m" if cutoffs else ""
         return (
@@ -100,21 +102,21 @@ def road_of_level(
 
 
 def half_track(wheels: Sequence[WheelPosition]) -> float:
-    """Half the distance (m) between the outermost wheels of the first axle; 0 for wheels on the centre line."""
+    """Half the lateral distance (m) between the outermost wheels of the first axle; 0 for wheels on the centre line."""
     front = [wheel.y for wheel in wheels if wheel.axle == 0]
     return (max(front) - min(front)) / 2.0
 
 
-def on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
-    """The wheels moved to the track at y (m); so a quarter or half car, drawn on the centre line, drives on one track
-    of a road."""
+def wheels_on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
+    """The wheels moved laterally to the track at y (m); so a quarter or half car, drawn on the centre line, drives on
+    one track of a road."""
     return tuple(replace(wheel, y=y) for wheel in wheels)
 
 
 def road_excitation(
     road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
 ) -> Excitation:
-    """The road under the wheels, one filter per axle, each wheel at its own y.
+    """Excitation of the wheels by a two-track road: one filter per axle, with each wheel at its own lateral position.
 
     Parameters
     ----------
@@ -159,8 +161,8 @@ def input_covariance(
 
 
 def _both_filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Matrices F, G of both processes together, and the rows that read z_M and theta; a process of zero intensity is
-    left out."""
+    """Filter matrices F, G of both processes together, and the rows that read z_M and theta; a process of zero
+    intensity is left out."""
     parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
     F, G, H = (block_diag(*matrices) for matrices in zip(*(process.matrices() for process in parts), strict=True))
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
@@ -169,7 +171,7 @@ def _both_filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def _height_row(
     wheel: WheelPosition, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[WheelPosition]
 ) -> np.ndarray:
-    """Factors of the filter states in the height under one wheel."""
+    """Factors of the filter states in the road height under a wheel."""
     if left_right == "equal":
         return mean + abs(wheel.y) * roll
     height = mean + wheel.y * roll

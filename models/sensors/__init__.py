@@ -1,1 +1,2 @@
-"""Accelerometers and inertial units: what they would read, and the motion that follows from their readings."""
+"""Accelerometers and inertial measurement units on a vehicle: simulated readings, and the motion recovered from
+readings."""

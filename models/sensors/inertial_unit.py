@@ -1,4 +1,4 @@
-"""The paper's Section 3.2: what white noise on measured angular rates does to the attitude integrated from them.
+"""Effect of white noise on measured angular rates on the attitude integrated from them (Section 3.2 of the paper).
 
 A gyro's sample errs by ``deviation`` (rad/s) on each axis, white at the sampling rate; over many samples that is a
 random walk of the angle with s = deviation / sqrt(rate) in rad per sqrt(s). S and S~ are the true and the measured
@@ -19,11 +19,18 @@ from scipy.special import hyp1f1
 
 from models.core.errors import InputError
 from models.core.noise import GYRO, GYRO_BIAS, normal_samples
-from models.sensors.rotations import conjugate_quaternion, integrate, quaternion_product, rotation_matrix, skew_matrix
+from models.sensors.rotations import (
+    conjugate_quaternion,
+    integrate_attitude,
+    quaternion_product,
+    rotation_matrix,
+    skew_matrix,
+)
 
 
-def random_walk(deviation: float, rate: float) -> float:
-    """Angle random walk s (rad per sqrt(s)) of samples with ``deviation`` (rad/s) at ``rate`` (Hz), eq. (5).
+def angle_random_walk_of(deviation: float, rate: float) -> float:
+    """Angle random walk s (rad per sqrt(s)) of gyro samples with standard deviation ``deviation`` (rad/s) at ``rate``
+    (Hz), eq. (5).
 
     Raises InputError for a rate that is not above 0.
     """
@@ -37,22 +44,23 @@ def measured_attitude(
     sample_period: float,
     deviation: np.ndarray,
     start_attitude: np.ndarray,
-    paths: range,
+    path_numbers: range,
     seed: int = 0,
 ) -> np.ndarray:
-    """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are held over each period and integrated by
-    exact rotations.
+    """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are constant over each period and
+    integrated by exact rotations.
 
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
     its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
-    noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
+    noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in path_numbers], axis=1)
     return true_attitude(rates[:, None, :] + deviation * noise, sample_period, start_attitude)
 
 
 def true_attitude(rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
-    """Quaternions (n + 1, ..., 4) of rates (n, ..., 3) in rad/s that are constant over each period (s), exactly."""
-    return integrate(np.concatenate([rates, rates[-1:]]), sample_period, start_attitude, "held")
+    """Quaternions (n + 1, ..., 4) of the attitude from rates (n, ..., 3) in rad/s that are constant over each period
+    (s), integrated exactly."""
+    return integrate_attitude(np.concatenate([rates, rates[-1:]]), sample_period, start_attitude, "held")
 
 
 def error_rotation(measured: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
@@ -61,42 +69,43 @@ def error_rotation(measured: np.ndarray, true_attitudes: np.ndarray) -> np.ndarr
     return quaternion_product(measured, conjugate_quaternion(true_attitudes))
 
 
-def mean_scalar(walks: np.ndarray, time: float) -> float:
-    """Expected scalar part q1 of the error quaternion after ``time`` (s): exp(-sum of s^2 t / 8), on any motion.
+def mean_scalar(angle_random_walks: np.ndarray, time: float) -> float:
+    """Expected scalar part q1 of the attitude's error quaternion after ``time`` (s), on any motion: exp(-sum of s^2 t /
+    8) with the angle random walks s.
 
-    walks : (k,) in rad per sqrt(s). It holds for unequal noise and on a turning body alike, because the squares of
-    the three matrices of eq. (26) are all -1: the quaternion's mean cannot see which axis is the noisy one.
+    angle_random_walks : (k,) in rad per sqrt(s). It holds for unequal noise and on a turning body alike, because the
+    squares of the three matrices of eq. (26) are all -1: the quaternion's mean cannot see which axis is the noisy one.
     """
-    return float(np.exp(-np.sum(np.square(walks)) * time / 8))
+    return float(np.exp(-np.sum(np.square(angle_random_walks)) * time / 8))
 
 
 def mean_trace(angle_random_walk: float, time: float) -> float:
-    """E[tr E] = 3 exp(-s^2 t) for three axes of equal noise, on any true motion: beyond the paper, and exact.
+    """Expected trace E[tr E] = 3 exp(-s^2 t) of the error rotation E after ``time`` t (s), for three axes of equal
+    noise s on any true motion: beyond the paper, and exact.
 
     Equal noise is the same in every frame, so that E is the Brownian motion of the rotation group itself.
     """
     return float(3 * np.exp(-(angle_random_walk**2) * time))
 
 
-def mean_error(walks: np.ndarray, rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
-    """E[E] (3, 3) for unequal noise on a turning body: the mean rotation matrix of the error.
+def mean_error(
+    angle_random_walks: np.ndarray, rates: np.ndarray, sample_period: float, start_attitude: np.ndarray
+) -> np.ndarray:
+    """Mean rotation matrix E[E] (3, 3) of the attitude error, for unequal noise on a turning body.
 
-    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis
-    i, and therefore
-        d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T,
-    turned by the true motion S; or, for the measured attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2
-    G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
-    rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,).
-    """
+    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis i,
+    and therefore d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T, turned by the true motion S; or, for the measured
+    attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2 G_i^2). The latter has constant coefficients over
+    each period and is stepped by its matrix exponential: exact for rates that are held. angle_random_walks : (3,) in
+    rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,)."""
     mean = rotation_matrix(start_attitude)
-    for step in _exponentials((skew_matrix(rates) + noise_decay_matrix(walks)) * sample_period):
+    for step in _matrix_exponentials((skew_matrix(rates) + noise_decay_matrix(angle_random_walks)) * sample_period):
         mean = mean @ step
     return mean @ rotation_matrix(true_attitude(rates, sample_period, start_attitude)[-1]).T
 
 
-def _exponentials(m: np.ndarray) -> np.ndarray:
-    """Matrix exponentials of all matrices m (n, 3, 3) at once: power series of m / 2^k with small entries, squared k
-    times.
+def _matrix_exponentials(m: np.ndarray) -> np.ndarray:
+    """Matrix exponentials of all matrices m (n, 3, 3): power series of m / 2^k with small entries, squared k times.
 
     scipy's own goes matrix by matrix through a threaded library, and takes many times as long where others run.
     """
@@ -109,24 +118,27 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
     return exponential
 
 
-def noise_decay_matrix(walks: np.ndarray) -> np.ndarray:
-    """Matrix 1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: rate at which noise reduces the mean rotation matrix, in local
-    components."""
-    return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
+def noise_decay_matrix(angle_random_walks: np.ndarray) -> np.ndarray:
+    """Matrix 1/2 sum s_i^2 G_i^2 (3, 3) in 1/s, the rate at which noise with angle random walks s_i reduces the mean
+    rotation matrix, in local components (G_i: generator of a rotation about axis i)."""
+    return 0.5 * np.diag(np.square(angle_random_walks) - np.sum(np.square(angle_random_walks)))
 
 
-def ito_norm(walks: np.ndarray, time: float) -> float:
-    """|q| of eq. (28) after ``time`` (s): exp(sum of s^2 t / 8), without any scatter."""
-    return 1 / mean_scalar(walks, time)
+def ito_norm(angle_random_walks: np.ndarray, time: float) -> float:
+    """Norm |q| of the quaternion of eq. (28) after ``time`` (s): exp(sum of s^2 t / 8) with the angle random walks s,
+    without any scatter."""
+    return 1 / mean_scalar(angle_random_walks, time)
 
 
-def euler_mean_square(angle_random_walk: float, axes: int, sample_period: float, steps: int) -> float:
-    """E[|q|^2] of explicit Euler on eq. (25) at rest: (1 + k s^2 D / 4)^n, exactly."""
-    return float(np.exp(steps * np.log1p(axes * angle_random_walk**2 * sample_period / 4)))
+def euler_mean_square(angle_random_walk: float, axis_count: int, sample_period: float, step_count: int) -> float:
+    """Expected squared norm E[|q|^2] of the quaternion by explicit Euler steps on eq. (25) at rest: (1 + k s^2 D / 4)^n
+    for k axes, angle random walk s, period D and n steps, exactly."""
+    return float(np.exp(step_count * np.log1p(axis_count * angle_random_walk**2 * sample_period / 4)))
 
 
 def euler_quaternions(turn_vectors: np.ndarray, start_attitude: np.ndarray) -> np.ndarray:
-    """Explicit Euler on eq. (25), never normalised: quaternions (paths, 4) after turns (n, paths, 3) in rad."""
+    """Quaternions (paths, 4) by explicit Euler steps on eq. (25), never normalised, after rotation vectors (n, paths,
+    3) in rad."""
     q = np.broadcast_to(np.asarray(start_attitude, dtype=float), (turn_vectors.shape[1], 4))
     for turn in turn_vectors:
         q = q + 0.5 * quaternion_product(q, np.concatenate([np.zeros((len(q), 1)), turn], axis=1))
@@ -134,9 +146,9 @@ def euler_quaternions(turn_vectors: np.ndarray, start_attitude: np.ndarray) -> n
 
 
 DEGREES_PER_HOUR = math.pi / 180 / 3600
-"""In rad/s."""
+"""Unit degree per hour in rad/s."""
 DEGREES_PER_ROOT_HOUR = math.pi / 180 / 60
-"""In rad per sqrt(s)."""
+"""Unit degree per square root of an hour in rad per sqrt(s)."""
 
 
 def bias_path(
@@ -148,7 +160,8 @@ def bias_path(
     seed: int,
     path: int,
 ) -> np.ndarray:
-    """Bias (sample_count,) in rad/s at samples ``sample_period`` (s) apart, one path of the process.
+    """Bias (sample_count,) of a gyro in rad/s at samples ``sample_period`` (s) apart: a single path of the random
+    process.
 
     turn_on, instability : standard deviations (rad/s); correlation_time : tau (s). The recursion over a period is
     exact, so the process does not depend on the sampling rate. Raises InputError for a time that is not above 0 or a
@@ -166,7 +179,7 @@ def bias_path(
 def angle_variance(
     time: np.ndarray, angle_random_walk: float, turn_on: float, instability: float, correlation_time: float
 ) -> np.ndarray:
-    """Variance (rad^2) of the integrated angle's error after ``time`` (s), any shape.
+    """Variance (rad^2) of the error of an angle integrated from a gyro's rate, after ``time`` (s), any shape.
 
     s^2 t + turn_on^2 t^2 + 2 instability^2 tau^2 (t/tau - 1 + exp(-t/tau)); the last bracket is written as (t/tau)^2 /
     2 times 1F1(1; 3; -t/tau), which loses no digit at short times. angle_random_walk in rad per sqrt(s), the others in
@@ -181,7 +194,7 @@ def angle_variance(
 
 
 def _check_numbers(minimum: float = math.ulp(0.0), **named_values: float) -> None:
-    """Refuse the first number that is below ``minimum``."""
+    """Raise InputError for the first number that is below ``minimum``."""
     for name, value in named_values.items():
         if not value >= minimum:
             raise InputError("", name, value, f"must be {'0 or more' if minimum == 0.0 else 'above 0'}")

@@ -1,4 +1,4 @@
-"""Assumptions of the motion that is recovered from accelerometers."""
+"""Assumptions behind a motion recovered from accelerometers."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -10,17 +10,17 @@ from models.core.result import Result
 from models.sensors.rigid_body_motion import NOISE_FACTOR, UNEXPLAINED_SHARE_LIMIT, Quality, RecoveredMotion
 
 LARGEST_UPRIGHT_PITCH = 1.4
-"""rad (80 degrees): beyond this pitch roll and yaw are hardly told apart, and none of them at a right angle."""
+"""Largest pitch (rad; 80 degrees) at which roll and yaw can be told apart well; at a right angle they cannot."""
 LARGEST_TURN_PER_SAMPLE = 0.2
-"""rad per sample: cubics through four samples then err by some 1e-5 of a turn in each step."""
+"""Largest rotation (rad) per sample: cubics through four samples then err by some 1e-5 of a rotation in each step."""
 LARGEST_LEVEL_TILT = 0.05
-"""rad: a start that is tilted by more turns 0.5 m/s^2 of gravity into a false motion."""
+"""Largest tilt (rad) of a start that counts as level: a larger tilt turns 0.5 m/s^2 of gravity into a false motion."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """Accelerometer readings (n, sensors, 3) in m/s^2 every ``period`` (s), the facts stated about them, and whether
-    the motion was assumed to begin at rest and level, with gravity in the readings."""
+    """Accelerometer readings (n, sensors, 3) in m/s^2 every ``period`` (s), the quality of their rigid-body fit, and
+    whether the motion was assumed to begin at rest and level, with gravity in the readings."""
 
     quality: Quality
     readings: np.ndarray
@@ -70,8 +70,7 @@ def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
 
 
 def _rigid_body_assumption(quality: Quality) -> Assumption:
-    """Assumption that the sensors move with one rigid body. A single sensor that does not is left out, without an
-    assumption about it."""
+    """Assumption that the sensors move with a single rigid body."""
     size = float(np.sqrt(np.mean(quality.misfit**2))) / quality.share if quality.share > 0.0 else 1.0
     return Assumption(
         "rigid body",

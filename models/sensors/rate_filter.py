@@ -1,4 +1,4 @@
-"""Angular velocity from accelerometers without drift: the symmetric part of M as a measurement of the rates.
+"""Angular velocity from accelerometers without drift, by an extended Kalman filter that measures products of the rates.
 
 Integration alone lets the rates drift as the square root of time. The symmetric part w w^T - |w|^2 I needs no
 integration and holds the size of the rates for ever; the sign comes from the integration (filterpy's extended
@@ -10,25 +10,26 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from models.core.errors import InputError
-from models.sensors.rigid_body_motion import Spin, own_acceleration
+from models.sensors.rigid_body_motion import Spin, array_angular_acceleration
 
 SYMMETRIC_ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
-"""Entries of the symmetric part; in a plane the first three alone are known."""
+"""Index pairs of the entries of a symmetric (3, 3) matrix; for sensors in a plane only the first three are known."""
 UNIT_MATRIX = np.eye(3)
 
 
 class _Rates(ExtendedKalmanFilter):
-    """Kalman filter for the rates whose prediction integrates the angular acceleration instead of using a matrix."""
+    """Kalman filter for the angular rates whose prediction integrates the angular acceleration instead of using a
+    matrix."""
 
     def predict_x(self, u: np.ndarray) -> None:
-        """Advance the rates w by their increment ``u`` over one period."""
+        """Advance the angular rates w (rad/s) by their increment ``u`` over a period."""
         self.x += u
 
 
 def filter_rates(
     spins: Spin, sample_period: float, start_rates: np.ndarray, noise: float, deviation: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Local rates (n, 3) in rad/s and their stated standard deviations (n, 3).
+    """Local angular rates (n, 3) in rad/s and their stated standard deviations (n, 3), by the Kalman filter.
 
     start_rates : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
     reading (m/s^2), white. The same readings make the prediction and the measurement, two correlations that the
@@ -44,12 +45,12 @@ def filter_rates(
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
     filter_.x, filter_.P = np.asarray(start_rates) @ frame, deviation**2 * UNIT_MATRIX
-    filter_.Q = np.diag((sample_period * noise * spins.array.own_gains(planar)) ** 2)
+    filter_.Q = np.diag((sample_period * noise * spins.array.array_noise_gains(planar)) ** 2)
     squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
     values = np.column_stack([0.5 * (spins.rate_matrix[:, i, j] + spins.rate_matrix[:, j, i]) for i, j in pairs])
-    known, rows = own_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
+    known, rows = array_angular_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
         _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), sample_period, planar)
         filter_.update(values[i], _rate_product_jacobian, _skew_squared_entries, args=indices, hx_args=indices)
@@ -59,8 +60,8 @@ def filter_rates(
 
 
 def _predict_rates(filter_: _Rates, alpha: np.ndarray, sample_period: float, planar: bool) -> None:
-    """Predict over one period with the mean acceleration; with sensors in a plane, w1 and w2 also turn about the
-    normal."""
+    """Predict the rates over a period with the mean angular acceleration; with sensors in a plane, w1 and w2 also turn
+    about the normal."""
     slope, change = np.zeros((3, 3)), alpha
     if planar:
         w = filter_.x + 0.5 * sample_period * alpha  # the middle of the period
@@ -71,7 +72,7 @@ def _predict_rates(filter_: _Rates, alpha: np.ndarray, sample_period: float, pla
 
 
 def _skew_squared_entries(w: np.ndarray, first_axis: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
-    """Entries of skew(w)^2 = w w^T - |w|^2 I."""
+    """Entries of skew(w)^2 = w w^T - |w|^2 I at pairs of axes, for the angular rate w (rad/s)."""
     return w[first_axis] * w[second_axis] - (first_axis == second_axis) * (w @ w)
 
 

@@ -1,4 +1,4 @@
-"""Motion of a rigid body from the readings of tri-axial accelerometers on it (eqs 15 to 23).
+"""Motion of a rigid body recovered from the readings of tri-axial accelerometers on it (eqs 15 to 23).
 
 A reading is specific force in the body's axes, f = S^T (x'' - g e) with e pointing down (z): at rest and level it
 is -g along z. Relative readings A follow from relative positions R by A = M R with M = skew(alpha) + skew(w)^2, so
@@ -14,26 +14,26 @@ from models.core.errors import InputError
 from models.sensors.rotations import (
     cardan_angles,
     cubic_integrals,
-    from_cardan,
-    integrate,
+    integrate_attitude,
+    quaternion_from_cardan,
     rotation_matrix,
     skew_matrix,
 )
 from models.sensors.sensor_array import SensorArray, sensor_array
 
 UNEXPLAINED_SHARE_LIMIT = 0.05
-"""Share of the relative accelerations that a rigid body may leave unexplained: a mount at 10 times the frequency of
-the motion moves by 1 % of it, one at twice by a third."""
+"""Largest share of the relative accelerations that a rigid body may leave unexplained: a mount at 10 times the
+frequency of the motion moves by 1 % of it, one at twice by a third."""
 GRAVITY = 9.81
-"""m/s^2, down."""
+"""Acceleration of gravity (m/s^2), acting down."""
 NOISE_FACTOR = 1.5
-"""Times the misfit that the readings' noise alone leaves, below which nothing is held against the body."""
+"""Ratio of the misfit to the one expected from the readings' noise up to which a body counts as rigid."""
 
 
 @dataclass(frozen=True)
 class Spin:
-    """Differences of the readings at each instant, in the array's axes e1, e2, n: the matrix M of angular rates, and
-    relative accelerations.
+    """Rotation of the body in the accelerometers' readings at each instant, in the array's axes e1, e2, n: the matrix M
+    of angular rates, and the relative accelerations.
 
     rate_matrix : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
     relative_acceleration : (n, 3, sensors) in m/s^2, readings less their mean
@@ -74,7 +74,8 @@ class Quality:
 
 @dataclass(frozen=True)
 class StartState:
-    """State at the first sample: local rates (rad/s), quaternion, velocity (m/s) and position (m), global."""
+    """State of the body at the first sample: local rates (rad/s), quaternion, velocity (m/s) and position (m),
+    global."""
 
     rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
@@ -84,7 +85,7 @@ class StartState:
     @staticmethod
     def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "StartState":
         """Start of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
-        level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
+        level = tuple(quaternion_from_cardan(0.0, pitch, 0.0).tolist())
         return StartState((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 
 
@@ -96,14 +97,15 @@ class CutOffs:
     position.
     """
 
-    turning: float | None = None
+    rotation: float | None = None
     position: float | None = None
 
 
 @dataclass(frozen=True)
 class RecoveredMotion:
-    """alpha (rad/s^2) and rates (rad/s) local, quaternions, and the reference point's acceleration (m/s^2),
-    velocity (m/s) and position (m) in global axes, all (n, 3) but quaternions (n, 4)."""
+    """Motion of a body recovered from accelerometers: angular acceleration (rad/s^2) and rates (rad/s) local,
+    quaternions, and the reference point's acceleration (m/s^2), velocity (m/s) and position (m) in global axes, all (n,
+    3) but quaternions (n, 4)."""
 
     angular_acceleration: np.ndarray
     rates: np.ndarray
@@ -113,17 +115,16 @@ class RecoveredMotion:
     position: np.ndarray
 
     def angles(self) -> np.ndarray:
-        """Roll, pitch, yaw (n, 3) in rad; raises GimbalLock where they are not defined."""
+        """Roll, pitch, yaw (n, 3) in rad of the body. Raises GimbalLock where they are not defined."""
         return cardan_angles(self.orientation)
 
     def point(self, local_position: np.ndarray) -> np.ndarray:
-        """Positions (n, 3) in m, global, of a point at local (3,) m of the body, eq. (15)."""
+        """Global positions (n, 3) in m of a point of the body at local position (3,) in m, eq. (15)."""
         return self.position + rotation_matrix(self.orientation) @ np.asarray(local_position)
 
 
 def spin_from_readings(array: SensorArray, readings: np.ndarray) -> Spin:
-    """Differences of the accelerometers' readings (n, sensors, 3) in m/s^2, and the matrix M of the rates; gravity
-    cancels at any attitude.
+    """``Spin`` from the accelerometers' readings (n, sensors, 3) in m/s^2; gravity cancels at any attitude.
 
     Raises InputError for a reading that is not a finite number, and for a wrong number of sensors.
     """
@@ -143,15 +144,16 @@ def spin_from_readings(array: SensorArray, readings: np.ndarray) -> Spin:
 
 
 def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
-    """Local angular acceleration (n, 3) in rad/s^2, eq. (20); rates (n, 3) in rad/s, local.
+    """Local angular acceleration (n, 3) of the body in rad/s^2, eq. (20); rates (n, 3) in rad/s, local.
 
     The rates are read by the formula for a plane alone: alpha_1 = n.M e2 - w2 w3, alpha_2 = -n.M e1 + w1 w3.
     """
-    return own_acceleration(spins, rates @ spins.array.frame) @ spins.array.frame.T
+    return array_angular_acceleration(spins, rates @ spins.array.frame) @ spins.array.frame.T
 
 
-def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
-    """Angular acceleration (n, 3) in the array's axes from the differences of readings; w (n, 3) in the same axes."""
+def array_angular_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
+    """Angular acceleration (n, 3) in rad/s^2 in the array's axes from the ``Spin`` of the readings; w (n, 3), rad/s, in
+    the same axes."""
     m = spins.rate_matrix
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
     if spins.array.planar:
@@ -162,7 +164,7 @@ def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
 
 
 def rates_up_to_sign(spins: Spin) -> np.ndarray:
-    """Local rates (n, 3) in rad/s from the symmetric part alone: no integration, no drift, but no sign.
+    """Local angular rates (n, 3) in rad/s from the symmetric part of M alone: no integration, no drift, but no sign.
 
     w w^T = M+ - (tr M+ / 2) I, of which the nearest matrix of rank one is taken. For sensors in a plane the part
     along the normal has a sign of its own, apart from that of the other two.
@@ -172,7 +174,8 @@ def rates_up_to_sign(spins: Spin) -> np.ndarray:
 
 
 def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
-    """Rates (n, 3), except for a common sign, from the largest eigenvalue of w w^T and its eigenvector."""
+    """Angular rates (n, 3) in rad/s, except for a common sign, from the largest eigenvalue of w w^T and its
+    eigenvector."""
     symmetric = 0.5 * (m + np.swapaxes(m, 1, 2))
     half = 0.5 * np.trace(symmetric, axis1=1, axis2=2)[:, None, None]
     sizes, directions = np.linalg.eigh(symmetric - half * np.eye(3))
@@ -180,8 +183,8 @@ def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
 
 
 def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
-    """Magnitudes of the angular rates from in-plane accelerations (axes e1, e2), (w.w) I - (w1, w2) (w1, w2)^T, whose
-    smaller eigenvalue is w3^2."""
+    """Angular rates (n, 3) in rad/s without their signs, from sensors in a plane (axes e1, e2), whose matrix is (w.w) I
+    - (w1, w2) (w1, w2)^T with w3^2 as its smaller eigenvalue."""
     flat = m[:, :2, :2]
     sizes, directions = np.linalg.eigh(-0.5 * (flat + np.swapaxes(flat, 1, 2)))
     about_normal = np.sqrt(np.maximum(sizes[:, :1], 0.0))
@@ -189,21 +192,22 @@ def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
     return np.hstack([within, about_normal])
 
 
-def unexplained(spins: Spin) -> np.ndarray:
+def unexplained_accelerations(spins: Spin) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 that no rigid motion explains, in the array's axes.
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
     flat = _unsigned_in_plane(spins.rate_matrix)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += [] if spins.array.flat else [_unsigned_in_space(spins.rate_matrix)]
+    offers += [] if spins.array.lies_in_plane else [_unsigned_in_space(spins.rate_matrix)]
     left = np.stack([spins.relative_acceleration - _nearest_rigid(spins, w) for w in offers])
     sensor_with_least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[sensor_with_least, np.arange(len(sensor_with_least))]
 
 
 def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
-    """Relative accelerations (n, 3, sensors) of a rigid body with rates w and the angular acceleration that fits best.
+    """Relative accelerations (n, 3, sensors) in m/s^2 of a rigid body with rates w and the angular acceleration that
+    fits best.
 
     By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
     """
@@ -217,7 +221,7 @@ def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
 
 
 def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
-    """Quality of the rigid-body fit to readings (n, sensors, 3); ``noise`` is their standard deviation.
+    """Quality of the rigid-body fit to readings (n, sensors, 3) in m/s^2; ``noise`` is their standard deviation.
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
     """
@@ -235,7 +239,7 @@ def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) ->
 
 def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
     spins = spin_from_readings(array, readings)
-    left = unexplained(spins)
+    left = unexplained_accelerations(spins)
     count = 3 * len(array.names)
     size = float(np.sqrt(np.mean(spins.relative_acceleration**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
@@ -272,7 +276,10 @@ def integrate_rates(spins: Spin, sample_period: float, start_rates: np.ndarray) 
         raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
     first = np.asarray(start_rates) @ spins.array.frame
     if not spins.array.planar:
-        return time_integral(own_acceleration(spins, np.zeros((1, 3))), sample_period, first) @ spins.array.frame.T
+        return (
+            time_integral(array_angular_acceleration(spins, np.zeros((1, 3))), sample_period, first)
+            @ spins.array.frame.T
+        )
     m = spins.rate_matrix
     w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), sample_period, first[2])
     turn = np.exp(1j * time_integral(w3, sample_period, np.array(0.0)))
@@ -285,30 +292,29 @@ def recovered_motion(
     readings: np.ndarray,
     sample_period: float,
     start_state: StartState | None = None,
-    zeroed: bool = False,
+    gravity_corrected: bool = False,
     rates: np.ndarray | None = None,
     cut_offs: CutOffs | None = None,
 ) -> RecoveredMotion:
-    """Motion of the body's reference point and axes, steps 1 to 6 of the paper.
+    """Motion of the body's reference point and axes from accelerometer readings, steps 1 to 6 of the paper.
 
-    readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
-    ground, as sensors with a correction for gravity give it (17); sample_period : s
-    rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
-    Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
-    """
+    readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``gravity_corrected`` set to zero at rest on
+    level ground, as sensors with a correction for gravity give it (17); sample_period : s rates : (n, 3) in rad/s,
+    local, from a gyro or a filter, in the place of the integrated ones Raises InputError for unusable readings,
+    GimbalLock if angles are filtered where they are not defined."""
     start_state, cut_offs = start_state or StartState(), cut_offs or CutOffs()
     spins = spin_from_readings(array, readings)
     w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates
-    w = _high_passed(w, sample_period, cut_offs.turning)
-    orientation = integrate(w, sample_period, np.array(start_state.orientation))
-    if cut_offs.turning is not None:
-        orientation = from_cardan(
-            *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.turning).T
+    w = _high_passed(w, sample_period, cut_offs.rotation)
+    orientation = integrate_attitude(w, sample_period, np.array(start_state.orientation))
+    if cut_offs.rotation is not None:
+        orientation = quaternion_from_cardan(
+            *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.rotation).T
         )
     alpha = angular_acceleration(spins, w)
     gravity_vector = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(
-        array, readings - gravity_vector if zeroed else readings, orientation, alpha, w, gravity_vector
+        array, readings - gravity_vector if gravity_corrected else readings, orientation, alpha, w, gravity_vector
     )
     velocity = _high_passed(
         time_integral(acceleration, sample_period, np.array(start_state.velocity)), sample_period, cut_offs.position
@@ -327,7 +333,7 @@ def reference_acceleration(
     rates: np.ndarray,
     down: np.ndarray,
 ) -> np.ndarray:
-    """Acceleration (n, 3) in m/s^2, global, of the reference point: the mean over all sensors, eq. (23)."""
+    """Global acceleration (n, 3) in m/s^2 of the body's reference point: the mean over all sensors, eq. (23)."""
     lever = (skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates)) @ array.positions.mean(axis=0)
     return np.einsum("nij,nj->ni", rotation_matrix(orientation), readings.mean(axis=1) - lever) + down
 
@@ -337,7 +343,8 @@ def _high_passed(values: np.ndarray, sample_period: float, cut_off: float | None
 
 
 def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = GRAVITY) -> np.ndarray:
-    """False horizontal displacement (n,) in m of a constant tilt error (rad), by gravity: g sin(tilt) t^2 / 2."""
+    """False horizontal displacement (n,) in m that gravity causes with a constant tilt error (rad): g sin(tilt) t^2 /
+    2."""
     return 0.5 * gravity * np.sin(tilt) * times**2
 
 
@@ -348,7 +355,8 @@ BUTTERWORTH_ORDER = 2
 def check_cut_off(
     sample_count: int, sample_period: float, cut_off: float, file: str = "", key_path: str = "high-pass"
 ) -> None:
-    """Refuse a cut-off frequency (Hz) that does not suit ``sample_count`` samples every ``sample_period`` (s)."""
+    """Raise InputError for a cut-off frequency (Hz) that does not suit ``sample_count`` samples every ``sample_period``
+    (s)."""
     if not 0 < cut_off < 0.5 / sample_period:
         raise InputError(file, key_path, cut_off, f"the cut-off must lie between 0 and {0.5 / sample_period:g} Hz")
     if sample_count <= round(1 / (cut_off * sample_period)):
@@ -362,7 +370,8 @@ def check_cut_off(
 
 
 def high_pass(values: np.ndarray, sample_period: float, cut_off: float) -> np.ndarray:
-    """Values (n, ...), sampled every ``sample_period`` (s), with frequencies below ``cut_off`` (Hz) removed.
+    """Values (n, ...), sampled every ``sample_period`` (s), after a high-pass filter that removes frequencies below
+    ``cut_off`` (Hz).
 
     A Butterworth filter of order BUTTERWORTH_ORDER run forwards and backwards, so that the amplitude falls by 1 / (1 +
     (fc/f)^4) and nothing is delayed; the ends are extended by their mirror image, which

@@ -1,4 +1,4 @@
-"""Orientation of a rigid body: unit quaternions, their exact step under a turning rate, and Cardan angles.
+"""Orientation of a rigid body: unit quaternions, their exact integration from angular rates, and Cardan angles.
 
 S (3, 3) turns local (body) components into global ones: x_global = S x_local (eq. 21). A quaternion
 q = (q1, q2, q3, q4) has its scalar first; q and -q are the same orientation. Rates are **local** and in rad/s:
@@ -14,15 +14,16 @@ from scipy.spatial.transform import Rotation
 from models.core.errors import InputError
 from models.machine.compiled import njit
 
-Rule = Literal["held", "mean", "cubic"]
-"""How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
+IntegrationRule = Literal["held", "mean", "cubic"]
+"""How an angular rate runs between its samples: constant ("held"), at the mean of both, or along a cubic; order 1, 2, 4
+of the orientation in the sampling period."""
 HALF_TURN = np.pi
-"""Turn (rad) from sample to sample beyond which nobody can tell the way it went; the series of Magnus ends there."""
+"""Rotation (rad) from sample to sample beyond which its direction cannot be told; the series of Magnus ends there."""
 UNIT_NORM_TOLERANCE = 1e-6
-"""Largest departure of a quaternion's norm from 1."""
+"""Largest difference of a quaternion's norm from 1."""
 GIMBAL_LOCK_COSINE = 1e-6
-"""Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that
-rounding alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
+"""Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that rounding
+alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
 ORTHOGONALITY_TOLERANCE = 1e-6
 """Largest departure of S^T S from the identity that still counts as a rotation."""
 
@@ -46,7 +47,7 @@ class GimbalLock(InputError):
 
 
 def skew_matrix(v: np.ndarray) -> np.ndarray:
-    """Matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
+    """Skew matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
     matrix = np.zeros((*v.shape, 3))
     matrix[..., 2, 1], matrix[..., 0, 2], matrix[..., 1, 0] = np.moveaxis(v, -1, 0)
     return matrix - np.swapaxes(matrix, -1, -2)
@@ -60,11 +61,11 @@ def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def conjugate_quaternion(q: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) of the inverse rotations."""
+    """Conjugate quaternions (..., 4), which are those of the inverse rotations."""
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def exponential(turn: np.ndarray) -> np.ndarray:
+def quaternion_of_rotation_vector(turn: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad; exact to rounding and regular at all angles."""
     half = 0.5 * np.linalg.norm(turn, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * turn], axis=-1)
@@ -78,8 +79,10 @@ def rotation_vector(q: np.ndarray) -> np.ndarray:
     return near[..., 1:] * np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
 
 
-def turns_between_samples(rates: np.ndarray, sample_period: float, integration_rule: Rule = "cubic") -> np.ndarray:
-    """Rotation vectors (n - 1, ..., 3) in rad from each sample of local rates (n, ..., 3) in rad/s to the next one.
+def turns_between_samples(
+    rates: np.ndarray, sample_period: float, integration_rule: IntegrationRule = "cubic"
+) -> np.ndarray:
+    """Rotation vectors (n - 1, ..., 3) in rad from each sample of local angular rates (n, ..., 3) in rad/s to the next.
 
     "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
     "mean" : the mean of both neighbours; "cubic" : the integral of the cubic through four neighbours and the
@@ -89,8 +92,8 @@ def turns_between_samples(rates: np.ndarray, sample_period: float, integration_r
     held."""
     if not 0.0 < sample_period < np.inf:
         raise InputError("", "period", sample_period, "must be above 0, in s")
-    if integration_rule not in get_args(Rule):
-        raise InputError("", "rule", integration_rule, "is not known", get_args(Rule))
+    if integration_rule not in get_args(IntegrationRule):
+        raise InputError("", "rule", integration_rule, "is not known", get_args(IntegrationRule))
     if len(rates) < (needed := 4 if integration_rule == "cubic" else 2):
         raise ValueError(
             f"{len(rates)} samples of the angular velocity: the rule {integration_rule!r} needs at least {needed}"
@@ -108,7 +111,7 @@ def turns_between_samples(rates: np.ndarray, sample_period: float, integration_r
 
 
 def _check_turned(rates: np.ndarray, sample_period: float) -> None:
-    """Refuse angular rates that rotate the body too far between two samples."""
+    """Raise InputError for angular rates that rotate the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * sample_period > HALF_TURN:
         samples = f"for samples every {sample_period:g} s, half a turn from one to the next: are they in degrees?"
@@ -123,10 +126,11 @@ def cubic_integrals(values: np.ndarray, sample_period: float) -> np.ndarray:
     return sample_period / 24 * np.concatenate([first_integral[None], inner, last_integral[None]])
 
 
-def integrate(
-    rates: np.ndarray, sample_period: float, start_attitude: np.ndarray, integration_rule: Rule = "cubic"
+def integrate_attitude(
+    rates: np.ndarray, sample_period: float, start_attitude: np.ndarray, integration_rule: IntegrationRule = "cubic"
 ) -> np.ndarray:
-    """Quaternions (n, ..., 4) at the samples of local rates (n, ..., 3) in rad/s, eq. (22); start (..., 4).
+    """Quaternions (n, ..., 4) of the orientation at the samples of local angular rates (n, ..., 3) in rad/s, eq. (22);
+    start_attitude (..., 4).
 
     Each step is the exact exponential of its rotation vector (``turns_between_samples``), and each result is divided by
     its norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
@@ -134,17 +138,17 @@ def integrate(
     """
     if not np.abs(np.linalg.norm(np.asarray(start_attitude, dtype=float), axis=-1) - 1.0).max() <= UNIT_NORM_TOLERANCE:
         raise InputError("", "start", start_attitude, "must be unit quaternions")
-    steps = exponential(turns_between_samples(rates, sample_period, integration_rule))
+    steps = quaternion_of_rotation_vector(turns_between_samples(rates, sample_period, integration_rule))
     count, middle = len(steps), steps.shape[1:-1]
     first = np.broadcast_to(np.asarray(start_attitude, dtype=float), (*middle, 4)).reshape(-1, 4)
     flat = np.ascontiguousarray(steps.reshape(count, -1, 4))
-    return _chain_rotations(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
+    return _chained_rotations(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
 
 
 @njit(cache=True)
-def _chain_rotations(start_attitude, steps):
-    """Normalised running products start, start steps[0], start steps[0] steps[1] ...: from shapes (m, 4) and (n, m, 4)
-    to (n + 1, m, 4)."""
+def _chained_rotations(start_attitude, steps):
+    """Normalised running products of quaternions, start, start steps[0], start steps[0] steps[1] ...: from shapes (m,
+    4) and (n, m, 4) to (n + 1, m, 4)."""
     attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
     for j in range(steps.shape[1]):
         a, b, c, d = start_attitude[j]
@@ -164,28 +168,30 @@ def _chain_rotations(start_attitude, steps):
 
 
 def rotation_matrix(q: np.ndarray) -> np.ndarray:
-    """Matrices S (..., 3, 3), local to global, of unit quaternions (..., 4), eq. (21)."""
+    """Rotation matrices S (..., 3, 3), local to global, of unit quaternions (..., 4), eq. (21)."""
     a, v = q[..., 0, None, None], q[..., 1:]
     outer = v[..., :, None] * v[..., None, :]
     square = np.trace(outer, axis1=-2, axis2=-1)[..., None, None]
     return (a * a - square) * np.eye(3) + 2 * outer + 2 * a * skew_matrix(v)
 
 
-def from_matrix(s: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4), scalar 0 or more, of matrices (..., 3, 3); raises ValueError if one is no rotation."""
+def quaternion_from_matrix(s: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4), scalar 0 or more, of rotation matrices (..., 3, 3). Raises ValueError if one is no
+    rotation."""
     departure = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
     if not departure < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(s) > 0).all():
         raise ValueError(
             f"not a rotation: S^T S departs from the identity by {departure:.3g}, or S turns left into right"
         )
-    return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
+    return Rotation.quaternion_from_matrix(s).as_quat(canonical=True, scalar_first=True)
 
 
-def from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
-    """Unit quaternions (..., 4) of S = Rz(yaw) Ry(pitch) Rx(roll), all in rad."""
+def quaternion_from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:
+    """Unit quaternions (..., 4) of the rotation S = Rz(yaw) Ry(pitch) Rx(roll) by Cardan angles, all in rad."""
     axes = np.eye(3)
     parts = [
-        exponential(np.asarray(angle, dtype=float)[..., None] * axes[i]) for i, angle in enumerate((roll, pitch, yaw))
+        quaternion_of_rotation_vector(np.asarray(angle, dtype=float)[..., None] * axes[i])
+        for i, angle in enumerate((roll, pitch, yaw))
     ]
     return quaternion_product(quaternion_product(parts[2], parts[1]), parts[0])
 

@@ -1,4 +1,4 @@
-"""Where tri-axial accelerometers sit on a body, and what such an arrangement can and cannot tell."""
+"""Arrangement of tri-axial accelerometers on a body: what it can and cannot measure, and simulated readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,20 +7,24 @@ from typing import Literal
 import numpy as np
 
 from models.core.errors import InputError
-from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix, skew_matrix
 
 Formula = Literal["auto", "spatial", "plane"]
 LINE_SPREAD_RATIO = 1e-3
-"""Second spread by the first one below which sensors lie on a line: on a car some millimetres, no better known."""
+"""Ratio of the second spread of the sensors to the first below which they lie on a line: on a car some millimetres, no
+better known."""
 FLAT_SPREAD_RATIO = 0.1
-"""Third spread by the second one below which "auto" takes the formula for sensors in a plane."""
+"""Ratio of the third spread of the sensors to the second below which "auto" takes the formula for sensors in a
+plane."""
+HALF_AND_BIAS = "gives half the angular acceleration plus a bias"
 PLANE_SPREAD_RATIO = 1e-6
-"""The same below which they lie in a plane to rounding, and there is no choice."""
+"""Ratio of the third spread of the sensors to the second below which they lie in a plane to rounding, so that there is
+no choice."""
 
 
 @dataclass(frozen=True)
 class SensorArray:
-    """Sensors that are fixed at known positions on a body.
+    """Tri-axial accelerometers that are fixed at known positions on a body.
 
     Attributes
     ----------
@@ -47,7 +51,7 @@ class SensorArray:
         return 3 * (len(self.names) - 1) - 6
 
     @property
-    def flat(self) -> bool:
+    def lies_in_plane(self) -> bool:
         """Whether the sensors lie in a plane, except for rounding."""
         return self.weights.shape[1] == 2
 
@@ -58,14 +62,14 @@ class SensorArray:
         The readings' noise is independent and the same on all axes of all sensors. For sensors in a plane the spatial
         formula gives infinite gains.
         """
-        squares = self.own_gains(self.planar if planar is None else planar) ** 2
+        squares = self.array_noise_gains(self.planar if planar is None else planar) ** 2
         shares = np.where(
             np.abs(self.frame) > PLANE_SPREAD_RATIO, self.frame**2, 0.0
         )  # infinity times a rounding error
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
-    def own_gains(self, planar: bool) -> np.ndarray:
-        """Noise gains as ``noise_gains``, about the array's axes e1, e2, n."""
+    def array_noise_gains(self, planar: bool) -> np.ndarray:
+        """Noise gains (3,) as ``noise_gains`` gives, but about the array's axes e1, e2, n."""
         first, second_axis, three = self.inverse_squares
         return np.sqrt(
             [second_axis, first, (first + second_axis) / 4]
@@ -75,8 +79,9 @@ class SensorArray:
 
     @property
     def inverse_squares(self) -> np.ndarray:
-        """1 / spreads^2 (3,) in 1/m^2: variances of the columns of M for readings with unit variance."""
-        return np.append(1 / self.spreads[:2] ** 2, np.inf if self.flat else 1 / self.spreads[2] ** 2)
+        """Inverse squares 1 / spreads^2 (3,) in 1/m^2: variances of the columns of M for readings with unit
+        variance."""
+        return np.append(1 / self.spreads[:2] ** 2, np.inf if self.lies_in_plane else 1 / self.spreads[2] ** 2)
 
     def describe(self) -> list[str]:
         """Sentences on the strengths and weaknesses of the sensor arrangement."""
@@ -85,10 +90,10 @@ class SensorArray:
         spreads = ", ".join(f"{value:.3g}" for value in self.spreads)
         lines = [f"{len(self.names)} sensors, spread {spreads} m along their principal directions"]
         if self.planar:
-            lies = "lie in a plane" if self.flat else f"lie nearly in a plane (flatness {flatness:.2g})"
+            lies = "lie in a plane" if self.lies_in_plane else f"lie nearly in a plane (flatness {flatness:.2g})"
             lines += [
                 f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
-                f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified_noise()}; "
+                f"{HALF_AND_BIAS if self.lies_in_plane else self._amplified_noise()}; "
                 "the formula for a plane is used, integrated together with the rates"
             ]
         gains = ", ".join(f"{value:.2f}" for value in self.noise_gains())
@@ -102,7 +107,7 @@ class SensorArray:
 
 
 def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "auto") -> SensorArray:
-    """The array of named sensors at local positions (3,) in m.
+    """``SensorArray`` of named sensors at local positions (3,) in m.
 
     ``formula`` "spatial" is eq. (18) as it stands, "plane" the one that leaves the normal out, which is exact for
     any arrangement and the less noisy one where the sensors lie nearly in a plane. Raises InputError for fewer than
@@ -145,7 +150,8 @@ def sensor_readings(
     pitch_acceleration: np.ndarray,
     gravity: float,
 ) -> np.ndarray:
-    """Specific forces (n, sensors, 3) in m/s^2, in the chassis' axes (x forward, y right, z down), eqs (16), (17).
+    """Specific forces (n, sensors, 3) in m/s^2 at sensors on a vehicle that heaves and pitches, in the chassis' axes (x
+    forward, y right, z down), eqs (16), (17).
 
     sensor_positions : (sensors, 3) in m from the centre of mass, local; pitch (rad, nose up), its rate and
     acceleration, and the heave acceleration (m/s^2, down), each (n,). The vehicle moves in its plane: no roll, no yaw,
@@ -153,14 +159,16 @@ def sensor_readings(
     """
     count = len(pitch)
     no_angles = np.zeros(count)
-    turn = rotation_matrix(from_cardan(no_angles, pitch, no_angles))
+    turn = rotation_matrix(quaternion_from_cardan(no_angles, pitch, no_angles))
     alpha, w = (np.column_stack([no_angles, values, no_angles]) for values in (pitch_acceleration, rate))
     felt = (heave_acceleration - gravity)[:, None] * turn[:, 2]  # S^T along the global vertical
-    return in_space(sensor_positions, felt, w, alpha)
+    return specific_forces_on_body(sensor_positions, felt, w, alpha)
 
 
-def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Specific forces (n, sensors, 3) in m/s^2, in the body's axes, eqs (16), (17), whatever its motion.
+def specific_forces_on_body(
+    sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray
+) -> np.ndarray:
+    """Specific forces (n, sensors, 3) in m/s^2 at sensors on a body in any motion, in the body's axes, eqs (16), (17).
 
     sensor_positions : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3),
     the body's rates and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
@@ -169,9 +177,9 @@ def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.nd
     return specific_forces[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def on_bracket(mount: np.ndarray, sample_period: float, frequency: float, damping: float) -> np.ndarray:
-    """Reading (n, 3) of a sensor on a light bracket from that of a rigid mount (n, 3), sampled every ``sample_period``
-    (s).
+def reading_on_bracket(mount: np.ndarray, sample_period: float, frequency: float, damping: float) -> np.ndarray:
+    """Reading (n, 3) of a sensor on a light flexible bracket from that of a rigid mount (n, 3), sampled every
+    ``sample_period`` (s).
 
     Along each of the body's axes a one-way coupled oscillator of natural frequency (Hz) and damping ratio: its
     mass is too small to move the body, and what the sensor feels is what spring and damper pass on,

@@ -1,1 +1,2 @@
-"""Tyres: bristles in an elliptic patch, friction by formula, from tables and from property files."""
+"""Tyre models: creep forces of bristles in an elliptic patch; friction by formula, from tables and from property
+files."""

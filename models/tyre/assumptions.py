@@ -1,4 +1,4 @@
-"""Assumptions of a table of friction where its values are read."""
+"""Assumptions behind friction values that are read from a tyre table."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from models.tyre.tyre_table import TyreTable
 
 
 def assumptions(table: TyreTable, load: float) -> list[Assumption]:
-    """Assumptions of a result over "slip_angle" (deg) under a load (N): that both lie among the table's nodes.
+    """Assumptions of a result over "slip_angle" (deg) under a load (N): that both lie within the tyre table.
 
     A table of one load holds for all of them.
     """

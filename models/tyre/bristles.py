@@ -1,4 +1,5 @@
-"""A tyre as an elastic foundation: an elliptic patch of bristles that roll through it, each held by friction.
+"""Creep forces of a tyre as an elastic foundation: an elliptic patch of bristles that roll through it and slide under
+friction.
 
 This is Kalker's simplified theory (``models.contact``, marched to second order) with the bristles of a tyre instead of
 an elastic half-space: one stiffness k (N/m^3) along and across, pressure parabolic. Of the patch, the half width b is
@@ -26,25 +27,25 @@ from models.machine.records import records, stacked
 from models.machine.stack import start
 
 FADING_SPEED = 0.1
-"""Speed (m/s) of the tread below which slip is relative to it."""
+"""Speed (m/s) of the tread below which slip is taken relative to this speed instead."""
 THREE_BRISTLES, SECOND_ORDER_MARCH = KINDS["three"], MARCHES["second-order"]
 FIRST_FLEXIBILITY = 7
-"""Place of the first flexibility among a contact's numbers."""
+"""Index of the first flexibility among the numbers of a contact."""
 UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
-"""A contact that sticks all over and whose side force is C."""
+"""Contact patch that sticks everywhere and whose side force is the cornering stiffness C."""
 
 
 @cache
 def net(cells: int) -> Grid:
-    """Grid of the contact patch with ``cells`` cells per strip, from 3 to 200; InputError otherwise."""
+    """Grid of a contact patch with ``cells`` cells per strip, from 3 to 200. Raises InputError otherwise."""
     if isinstance(cells, bool) or not isinstance(cells, int) or not 3 <= cells <= 200:
         raise InputError("", "cells", cells, "must be a whole number from 3 to 200")
     return grid(cells, int(strips_of(np.array(1.0), cells)), "parabolic")
 
 
-def shape_factor(cells: int) -> float:
-    """Ratio of the slip stiffness to a^2 b k, with bristle stiffness k, for a patch with ``cells`` cells; near the
-    exact 8/3."""
+def cornering_stiffness_factor(cells: int) -> float:
+    """Ratio, near the exact 8/3, of the cornering stiffness to a^2 b k (half length a, half width b, bristle stiffness
+    k), for a patch with ``cells`` cells."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT_CONTACT.items():
         contacts[name] = value
@@ -54,8 +55,8 @@ def shape_factor(cells: int) -> float:
 
 @lean
 def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces_out):
-    """Fill ``forces_out`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column has no meaning. No array is
-    allocated.
+    """Fill ``forces_out`` (w, 4) with the creep forces fx, fy (N) and moments mz (N m) on w tyres; the last column has
+    no meaning.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
     sliding_velocities (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the
@@ -78,7 +79,8 @@ def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, force
 
 @lean
 def _creepages(sign, patches, sliding_velocities):
-    """Creepages of tyres that roll forwards (sign 1) or backwards (sign -1), from the sliding velocities."""
+    """Fill the creepages of tyres that roll forwards (sign 1) or backwards (sign -1), from the sliding velocities
+    (m/s)."""
     for i in range(len(patches)):
         patch, speed = patches[i], max(abs(sliding_velocities[i, 3]), FADING_SPEED)
         patch.xi_x, patch.xi_y = sign * sliding_velocities[i, 0] / speed, sliding_velocities[i, 1] / speed
@@ -87,8 +89,7 @@ def _creepages(sign, patches, sliding_velocities):
 
 @lean
 def _blend_directions(sliding_velocities, backwards, forces_out):
-    """Weighted sum of forces of forward rolling and of backward rolling; the latter are transformed to the forward
-    view."""
+    """Blend the forces of forward and of backward rolling in ``forces_out``, weighted by the speed of the tread."""
     for i in range(len(forces_out)):
         share, answer, behind = (
             min(1.0, max(0.0, 0.5 + 0.5 * sliding_velocities[i, 3] / FADING_SPEED)),
@@ -109,8 +110,8 @@ def brush_forces(
     sliding_velocities: np.ndarray,
     cells: int = 21,
 ) -> np.ndarray:
-    """Forces fx, fy (N) and moments mz (N m), (m, 3), of one tyre for sliding velocities ``sliding_velocities`` (m, 4)
-    as in ``tyre_forces``.
+    """Creep forces fx, fy (N) and moments mz (N m), (m, 3), of a tyre at sliding velocities (m, 4) as in
+    ``tyre_forces``.
 
     load in N; mu; half_length, half_width of the patch in m; stiffness of its bristles in N/m^3.
     """

@@ -1,4 +1,5 @@
-"""Friction by Pacejka's magic formula and by Burckhardt's on surfaces that have a name, and tyre tables filled from it.
+"""Tyre friction by Pacejka's magic formula and by Burckhardt's formula on named surfaces, and tyre tables filled from
+them.
 
 mu = D sin(C atan(B k - E (B k - atan(B k)))) of the slip k, along and across the wheel. Slipping in both directions the
 tyre takes k = hypot(s, tan(slip angle)) on either curve, and each component its share of that. H. B. Pacejka, Tyre and
@@ -14,21 +15,23 @@ from models.core.errors import InputError
 from models.tyre.tyre_table import TyreTable
 
 Friction = Callable[[np.ndarray, float], np.ndarray]
-"""Friction, from 0 on, at slips from 0 on (tan of the slip angle, across) under a load (N)."""
+"""Function that returns the friction coefficient, 0 or more, at slips from 0 on (tan of the slip angle, across) under a
+load (N)."""
 
 
 def graded_nodes(last_node: float, first: float, node_count: int) -> np.ndarray:
-    """Nodes from 0 to ``last_node`` with spacings that grow in proportion to x + ``first``."""
+    """Nodes of a table from 0 to ``last_node`` with spacings that grow in proportion to x + ``first``."""
     nodes = first * np.expm1(np.linspace(0.0, np.log1p(last_node / first), node_count))
     nodes[-1] = last_node
     return nodes
 
 
 ANGLE_NODES, SLIP_NODES = graded_nodes(np.pi / 2.0, 0.03, 261), graded_nodes(1.0, 0.02, 201)
-"""Nodes (rad; 1) between which the tables of the magic formula's surfaces are met to 1e-4 of mu."""
+"""Nodes of slip angle (rad) and of slip (-) between which tables follow the magic formula's surfaces to 1e-4 of the
+friction coefficient."""
 
 
-def by_similarity(
+def table_by_similarity(
     friction_along: Friction,
     friction_across: Friction,
     loads: np.ndarray,
@@ -36,7 +39,7 @@ def by_similarity(
     slips: np.ndarray = SLIP_NODES,
     name: str = "",
 ) -> TyreTable:
-    """Tyre table from a friction curve along the wheel and one across it, combined by similarity.
+    """Tyre table from a friction curve along the wheel and another across it, combined by similarity.
 
     g is the mean over the loads, weighted by h squared: exact if all loads share one shape of the curve across. Where
     both together would be above the largest node of either, which falls short of the curve's peak, they are that.
@@ -47,14 +50,14 @@ def by_similarity(
     mu_x = np.stack([friction_along(total, load) * slips / safe for load in loads], axis=1)
     mu_y = np.stack([friction_across(total, load) * tangent / safe for load in loads], axis=1)
     g, h = product_factors(mu_y)
-    g[0] = _at_no_angle(friction_across, slips, loads)
+    g[0] = _limit_at_zero_angle(friction_across, slips, loads)
     excess = np.maximum(np.hypot(mu_x, g[:, None, :] * h[:, :, None]) / max(mu_x.max(), mu_y.max()), 1.0)
     return TyreTable(angles, slips, loads, mu_x / excess, g / excess.max(axis=1), h, name)
 
 
 def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Factors g (a, s) and h (a, f) whose product approximates mu_y (a, f, s): h is mu_y at slip 0, and g the best fit
-    for all loads.
+    """Factors g (a, s) and h (a, f) whose product approximates the lateral friction mu_y (a, f, s) over slip angles,
+    loads and slips: h is mu_y at slip 0, and g the best fit for all loads.
 
     At slip angle 0, where h is 0, g is that of the next angle.
     """
@@ -66,8 +69,9 @@ def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return g, h
 
 
-def _at_no_angle(friction_across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """Limit of g for slip angles towards 0: ratio of the slope of mu_y at a slip to that without slip."""
+def _limit_at_zero_angle(friction_across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
+    """Limit of the factor g for slip angles towards 0: ratio of the slope of lateral friction at a slip to that without
+    slip."""
     little = np.full(1, 1e-9)
     slope = np.array([friction_across(little, load)[0] / little[0] for load in loads])[:, None]
     secant = np.array([friction_across(slips[1:], load) / slips[1:] for load in loads])
@@ -76,7 +80,7 @@ def _at_no_angle(friction_across: Friction, slips: np.ndarray, loads: np.ndarray
 
 @dataclass(frozen=True)
 class Burckhardt:
-    """Burckhardt's formula, one curve for both directions: mu = c1 (1 - exp(-c2 s)) - c3 s.
+    """Burckhardt's friction formula, the same curve for both directions: mu = c1 (1 - exp(-c2 s)) - c3 s at slip s.
 
     c1 is what friction tends to, c2 how fast, c3 how much it falls up to slip 1; beyond that it stays.
     """
@@ -100,13 +104,13 @@ BURCKHARDT = {
     "packed snow": Burckhardt(0.1946, 94.129, 0.0646),
     "smooth ice": Burckhardt(0.05, 306.39, 0.0),
 }
-"""Figures after M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme (1993), as many texts quote them; recalled, not
-checked against the book."""
+"""Coefficients of Burckhardt's formula by surface, after M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme
+(1993), as many texts quote them; recalled, not checked against the book."""
 
 
 @dataclass(frozen=True)
 class MagicFormulaCurve:
-    """One magic formula: D its peak, B its stiffness, C its shape, E its curvature."""
+    """Pacejka's magic formula for a single curve: D its peak, B its stiffness, C its shape, E its curvature."""
 
     D: float
     B: float
@@ -129,20 +133,21 @@ PACEJKA = {
     "snow/rear": (MagicFormulaCurve(0.409, 9.71, 1.96, 0.624), MagicFormulaCurve(0.394, 20.0, 0.550, -1.93)),
     "ice/rear": (MagicFormulaCurve(0.173, 29.5, 1.77, 0.681), MagicFormulaCurve(0.167, 30.0, 1.48, -1.08)),
 }
-"""Along and across, front and rear tyre of a passenger car: K. Berntorp, B. Olofsson, K. Lundahl, L. Nielsen, Models
-and methodology for optimal trajectory generation in safety-critical road-vehicle manoeuvres, Vehicle System Dynamics 52
-(2014), as retyped in a public repository; the attribution is recalled, not checked."""
+"""Magic formulas along and across, front and rear tyre of a passenger car, by surface: K. Berntorp, B. Olofsson, K.
+Lundahl, L. Nielsen, Models and methodology for optimal trajectory generation in safety-critical road-vehicle
+manoeuvres, Vehicle System Dynamics 52 (2014), as retyped in a public repository; the attribution is recalled, not
+checked."""
 
 PureSlipCurve = Callable[[np.ndarray], np.ndarray]
 NAMED_SURFACES: dict[str, tuple[PureSlipCurve, PureSlipCurve]] = {
     **PACEJKA,
     **{k: (c, c) for k, c in BURCKHARDT.items()},
 }
-"""All surfaces that have a name, along and across."""
+"""Friction curves along and across the wheel for all surfaces that have a name."""
 
 
 def table_of_surface(name: str, friction_scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
-    """Table of one of ``NAMED_SURFACES``, its friction times ``friction_scale`` at a load (N).
+    """Tyre table of one of ``NAMED_SURFACES``, its friction times ``friction_scale`` at a load (N).
 
     fall : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
     quarter of it to twice it, and constant beyond.
@@ -157,7 +162,7 @@ def table_of_surface(name: str, friction_scale: float = 1.0, load: float = 1e4, 
     def load_factor(load_there: float) -> float:
         return friction_scale * (1.0 - fall * (load_there / load - 1.0))
 
-    return by_similarity(
+    return table_by_similarity(
         lambda k, load_there: load_factor(load_there) * law_along(k),
         lambda k, load_there: load_factor(load_there) * across(k),
         loads,

@@ -16,35 +16,37 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.tables import whole_text
-from models.tyre.magic_formula import MagicFormulaCurve, by_similarity
+from models.tyre.magic_formula import MagicFormulaCurve, table_by_similarity
 from models.tyre.tyre_table import TyreTable
 
 ACCEPTED_UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}
-"""Units in which the formula is read; a file in others is refused."""
+"""Units of a property file in which the formula is read; a file in other units is refused."""
 FITTYP_VERSIONS = (5.0, 6.0, 50.0, 51.0, 52.0)
-"""FITTYP of the property files whose equations these are."""
+"""Values of the key FITTYP of the property files whose equations are read here."""
 NEEDED_KEYS = ("FNOMIN", "FZMIN", "FZMAX", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-UNIT_SCALES = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
-"""Scaling factors, 1 where the file has none; all other coefficients are then 0."""
+SCALING_FACTORS = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
+"""Names of scaling factors, 1 where the file has none; all other coefficients are then 0."""
 COEFFICIENT_PATTERN = re.compile(r"P[CDEK][XY]\d")
 LOAD_NODES = 9
-"""Nodes of the load from FZMIN to FZMAX."""
+"""Count of nodes of the load from FZMIN to FZMAX."""
 
 
 @dataclass(frozen=True)
-class Property:
-    """Value of a key as the file has it, and its line."""
+class TirProperty:
+    """Value of a key of a property file as text, and its line number."""
 
     text: str
     line: int
 
 
 def tir_table(path: str | Path) -> TyreTable:
-    """Table of the tyre in a `.tir` file; raises InputError with file, line, key, value and the allowed values."""
+    """Tyre table from a `.tir` file. Raises InputError with file, line, key, value and the allowed values."""
     properties = _keys_of_sections(path)
     _check_properties(path, properties)
-    named = (name for name in properties if name in (*NEEDED_KEYS, *UNIT_SCALES) or COEFFICIENT_PATTERN.fullmatch(name))
-    c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {
+    named = (
+        name for name in properties if name in (*NEEDED_KEYS, *SCALING_FACTORS) or COEFFICIENT_PATTERN.fullmatch(name)
+    )
+    c = defaultdict(float, dict.fromkeys(SCALING_FACTORS, 1.0)) | {
         name: _number_of(path, properties, name) for name in named
     }
     least_load, largest_load, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
@@ -60,13 +62,13 @@ def tir_table(path: str | Path) -> TyreTable:
     )
     curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
     _check_curves(path, curves)
-    return by_similarity(
+    return table_by_similarity(
         lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
     )
 
 
 def longitudinal_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
-    """Magic formula of braking under a load (N) from a file's coefficients."""
+    """Magic formula of braking under a load (N) from the coefficients of a property file."""
     _, load_excess = _load_excess(c, load)
     peak = (c["PDX1"] + c["PDX2"] * load_excess) * c["LMUX"]
     shape = c["PCX1"] * c["LCX"]
@@ -76,7 +78,7 @@ def longitudinal_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
 
 
 def lateral_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
-    """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
+    """Magic formula of cornering under a load (N) from the coefficients of a property file, without their signs."""
     nominal, load_excess = _load_excess(c, load)
     peak = abs(c["PDY1"] + c["PDY2"] * load_excess) * c["LMUY"]
     shape = c["PCY1"] * c["LCY"]
@@ -92,9 +94,9 @@ def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
     return nominal, (load - nominal) / nominal
 
 
-def _keys_of_sections(path: str | Path) -> dict[str, Property]:
-    """Keys of all sections, in capital letters."""
-    properties: dict[str, Property] = {}
+def _keys_of_sections(path: str | Path) -> dict[str, TirProperty]:
+    """Keys of all sections of a property file, in capital letters."""
+    properties: dict[str, TirProperty] = {}
     for line, row in enumerate(whole_text(path).splitlines(), start=1):
         plain = row.partition("$")[0].partition("!")[0].strip()
         name, equals, value = plain.partition("=")
@@ -104,11 +106,11 @@ def _keys_of_sections(path: str | Path) -> dict[str, Property]:
                 raise InputError(
                     path, f"line {line}, {key}", value.strip(), f"stands in line {properties[key].line} already"
                 )
-            properties[key] = Property(value.strip().strip("'\""), line)
+            properties[key] = TirProperty(value.strip().strip("'\""), line)
     return properties
 
 
-def _check_properties(path: str | Path, properties: dict[str, Property]) -> None:
+def _check_properties(path: str | Path, properties: dict[str, TirProperty]) -> None:
     for name, allowed in ACCEPTED_UNITS.items():
         if name not in properties:
             raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
@@ -126,7 +128,7 @@ def _check_properties(path: str | Path, properties: dict[str, Property]) -> None
             raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED_KEYS))
 
 
-def _number_of(path: str | Path, properties: dict[str, Property], name: str) -> float:
+def _number_of(path: str | Path, properties: dict[str, TirProperty], name: str) -> float:
     try:
         value = float(properties[name].text)
     except ValueError:
@@ -136,12 +138,12 @@ def _number_of(path: str | Path, properties: dict[str, Property], name: str) -> 
     return value
 
 
-def _wrong_value(path: str | Path, properties: dict[str, Property], name: str, allowed: str) -> InputError:
+def _wrong_value(path: str | Path, properties: dict[str, TirProperty], name: str, allowed: str) -> InputError:
     return InputError(path, f"line {properties[name].line}, {name}", properties[name].text, allowed)
 
 
 def _check_curves(path: str | Path, curves: dict[float, tuple[MagicFormulaCurve, MagicFormulaCurve]]) -> None:
-    """Refuse coefficients that give no friction, or friction that changes its sign."""
+    """Raise InputError for coefficients that give no friction, or friction that changes its sign."""
     for load, pair in curves.items():
         for letter, curve in zip("XY", pair, strict=True):
             if not (0.0 < curve.D <= 3.0 and 0.0 < curve.C <= 2.0 and 0.0 < curve.B < 1e4):

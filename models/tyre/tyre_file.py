@@ -1,4 +1,4 @@
-"""A user's own tyre table as CSV: a row for each slip angle, load and slip, with mu_x and mu_y.
+"""Tyre table of a user as CSV file: a row for each slip angle, load and slip, with friction coefficients mu_x and mu_y.
 
 Columns ``slip angle [deg], load [kN], slip [-], mu_x [-], mu_y [-]`` in any order, each with one of its units (rad, N,
 %), all combinations once, rows in any order; without the column of the load friction is that of every load. mu_y is
@@ -21,17 +21,17 @@ FRICTION_COLUMNS: ColumnUnits = {
     "mu_y": SHARES,
 }
 COLUMN_SETS: tuple[ColumnUnits, ...] = (FRICTION_COLUMNS, {**FRICTION_COLUMNS, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
-ANY_LOAD = 1e4
-"""Load (N) of the only node where a file has none."""
+LOAD_OF_SINGLE_NODE = 1e4
+"""Load (N) of the only node of a table whose file has no column of the load."""
 PRODUCT_TOLERANCE = 0.03
-"""Share of the largest friction to which g h must meet mu_y."""
+"""Largest difference between the product g h and lateral friction mu_y, as a share of the largest friction."""
 MOST_NODES = 3_000_000
 
 
 def tyre_table(path: str | Path) -> TyreTable:
-    """Table from a CSV file; raises InputError that names file, line, column, value and what is allowed."""
+    """Tyre table from a CSV file. Raises InputError that names file, line, column, value and what is allowed."""
     lines, columns = _columns_in_si(Path(path))
-    columns.setdefault("load", np.full(len(lines), ANY_LOAD))
+    columns.setdefault("load", np.full(len(lines), LOAD_OF_SINGLE_NODE))
     _check_ranges(path, lines, columns)
     axes = [np.unique(columns[name], return_inverse=True) for name in ("slip angle", "load", "slip")]
     angles, loads, slips = (nodes for nodes, _ in axes)
@@ -43,7 +43,9 @@ def tyre_table(path: str | Path) -> TyreTable:
             int(np.prod(shape)),
             "combinations of slip angle, load and slip are too many: are the same values repeated with other digits?",
         )
-    row = _row_of_each(path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes)
+    row = _row_of_each_combination(
+        path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes
+    )
     mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
     g, h = product_factors(mu_y)
     _check_product(path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
@@ -51,7 +53,8 @@ def tyre_table(path: str | Path) -> TyreTable:
 
 
 def _columns_in_si(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Line number (n,) of every row, and columns (n,) in SI; raises InputError for the first row with an error."""
+    """Line number (n,) of every row of the file, and its columns (n,) in SI units. Raises InputError for the first row
+    with an error."""
     parts: list[RowBlock] = []
     for block in table_blocks(path, COLUMN_SETS):
         for row, wrong in block.faulty_rows.items():
@@ -86,7 +89,9 @@ def _error_in_row(
     return InputError(path, f"line {lines[row]}, column {name!r}", float(wrong_value), f"{allowed} (in SI units)")
 
 
-def _row_of_each(path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list) -> np.ndarray:
+def _row_of_each_combination(
+    path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list
+) -> np.ndarray:
     """Index of the row for each combination of nodes; every combination must occur exactly once."""
     shape = tuple(nodes.size for nodes, _ in axes)
     order = np.argsort(combination_number, kind="stable")

@@ -1,4 +1,4 @@
-"""Where a tyre table comes from: a surface that has a name, or a file of the user's."""
+"""Source of a tyre table: a named surface, or a file of the user."""
 
 from pathlib import Path
 
@@ -10,21 +10,21 @@ from models.tyre.tyre_table import TyreTable
 
 READER_OF_EXTENSION = {".csv": tyre_table, ".tir": tir_table}
 SCALE_BOUNDS = (0.0, 2.0)
-"""Factors on friction lie above the first and up to the second."""
+"""Bounds of a factor on friction: above the first and up to the second."""
 
 
-def from_file(path: Path) -> TyreTable:
-    """Tyre table from a file whose extension gives the format; raises InputError if the file holds no such table."""
+def table_from_file(path: Path) -> TyreTable:
+    """Tyre table from a file whose extension gives the format. Raises InputError if the file contains no such table."""
     if path.suffix.lower() not in READER_OF_EXTENSION:
         raise InputError(path.name, "", path.suffix, "is no file of a tyre", tuple(READER_OF_EXTENSION))
     return READER_OF_EXTENSION[path.suffix.lower()](path)
 
 
-def named_tyre(name: str, rear: bool = False) -> TyreTable:
+def table_of_named_tyre(name: str, rear: bool = False) -> TyreTable:
     """Tyre table of a named surface; with ``rear``, the rear tyre's table if the surface has a separate one."""
     rear_name = f"{name}/rear"
     return table_of_surface(rear_name if rear and rear_name in PACEJKA else name)
 
 
 SURFACE_NAMES = tuple(name for name in NAMED_SURFACES if "/" not in name)
-"""Surfaces that have a name."""
+"""Names of the surfaces for which a tyre table is available."""

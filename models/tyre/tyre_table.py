@@ -1,4 +1,5 @@
-"""Friction of a tyre by tables: mu_x(slip angle, slip, load) and mu_y = g(slip angle, slip) h(slip angle, load).
+"""Friction of a tyre by tables of friction coefficients: mu_x(slip angle, slip, load) along, and mu_y = g(slip angle,
+slip) h(slip angle, load) across the wheel.
 
 Between the nodes each is linear in every variable, at the nodes exact, beyond the last node constant; slopes are those
 of the cell. Their resultant does not exceed the largest of either. Source: G.
@@ -16,14 +17,14 @@ from models.core.errors import InputError
 from models.machine.compiled import lean
 
 LARGEST_FRICTION = 3.0
-"""No tyre on any road has more."""
+"""Largest friction coefficient that a tyre on a road can have."""
 ROUNDING_SHARE = 0.01
-"""Share by which friction in both directions together may be above the largest in one: figures are rounded."""
+"""Share by which the resultant friction may be above the largest in a single direction: figures are rounded."""
 
 
 @dataclass(frozen=True, eq=False)
 class TyreTable:
-    """Tables of one tyre on one surface.
+    """Tables of the friction coefficients of a tyre on a surface.
 
     angles (a,) : slip angles in rad, rising from 0; slips (s,) : rising from 0 to 1; loads (f,) : N, rising, above 0;
     mu_x (a, f, s) : along the wheel; g (a, s), h (a, f) : mu_y = g h across it, as a magnitude.
@@ -72,8 +73,8 @@ class TyreTable:
         self._check_resultant()
 
     def _check_resultant(self) -> None:
-        """Check that the resultant friction is not above the largest mu_x or mu_y: linear in slip and load, so only
-        angles lie between."""
+        """Raise InputError if the resultant friction is above the largest mu_x or mu_y. Friction is linear in slip and
+        load, so only angles between nodes are checked besides."""
         peak = max(self.mu_x.max(), (self.g[:, None, :] * self.h[:, :, None]).max())
         for share in (0.0, 0.25, 0.5, 0.75) if self.angles.size > 1 else (0.0,):
             x, g, h = (
@@ -95,18 +96,18 @@ class TyreTable:
 
     @property
     def cornering(self) -> float:
-        """Largest slope (1/rad) of mu_y over the slip angle, at zero slip angle."""
+        """Largest slope (1/rad) of the lateral friction mu_y over the slip angle, at zero slip angle."""
         if self.angles.size == 1:
             return 0.0
         return float((self.g[1].max() * self.h[1].max()) / self.angles[1])
 
     def refined(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> "TyreTable":
-        """The same tyre on finer nodes that include its own nodes; linear interpolation keeps its values."""
+        """The table on finer nodes that include its own nodes; linear interpolation keeps its values."""
         mu_x, g, h = self._at_nodes(angles, slips, loads)
         return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
 
     def scaled(self, factor: float) -> "TyreTable":
-        """A copy of the tyre where friction is ``factor`` times as large."""
+        """Returns a copy of the table in which friction is ``factor`` times as large."""
         return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
 
     def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +116,7 @@ class TyreTable:
         return mu_x[:, 0, :], g * h
 
     def characteristic_values(self, load: float) -> dict[str, float]:
-        """Characteristic values of a tyre under one load (N), by name and unit."""
+        """Characteristic friction values of the tyre under a load (N), by name and unit."""
         x, y = self.friction(self.angles, self.slips, load)
         little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]
         return {
@@ -129,7 +130,7 @@ class TyreTable:
         }
 
     def _at_nodes(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
-        """Values of mu_x, g and h, interpolated at other nodes."""
+        """Tables mu_x, g and h, interpolated at other nodes."""
         mu_x = _interpolate_axis(
             _interpolate_axis(_interpolate_axis(self.mu_x, 0, self.angles, angles), 1, self.loads, loads),
             2,
@@ -152,7 +153,7 @@ def _interpolate_axis(values: np.ndarray, axis: int, old_nodes: np.ndarray, new_
 
 
 class Tables(NamedTuple):
-    """Several tables on common nodes, for compiled functions: mu_x (t, a, f, s), g (t, a, s), h (t, a, f)."""
+    """Tables of t tyres on common nodes, for compiled functions: mu_x (t, a, f, s), g (t, a, s), h (t, a, f)."""
 
     angles: np.ndarray
     slips: np.ndarray
@@ -173,7 +174,7 @@ class TableCell(NamedTuple):
 
 
 def stacked_tables(tables: Sequence[TyreTable]) -> Tables:
-    """Tables brought to the union of their nodes, which does not change their interpolated values."""
+    """``Tables`` of several tyres on the union of their nodes, which does not change their interpolated values."""
     if not tables:
         raise InputError("", "tyres", [], "needs at least one table")
     nodes = [np.unique(np.concatenate([getattr(t, name) for t in tables])) for name in ("angles", "slips", "loads")]
@@ -202,7 +203,8 @@ def cell_and_share(nodes, node_value):
 
 @lean
 def lateral_adhesion(table, cells, k, w, slip_factors, angle_factors):
-    """mu_y of one table at the slip angle and load of ``cells``, and at the slip in cell k with relative position w."""
+    """Lateral friction coefficient mu_y of a table at the slip angle and load of ``cells``, and at the slip in cell k
+    with relative position w."""
     i, p, j, q = cells
     i1, j1, k1 = (
         min(i + 1, angle_factors.shape[1] - 1),
@@ -220,7 +222,7 @@ def lateral_adhesion(table, cells, k, w, slip_factors, angle_factors):
 
 @lean
 def longitudinal_adhesion(table, cells, k, mu_x):
-    """mu_x of one table at the slip angle and load of ``cells``, and at slip node k."""
+    """Longitudinal friction coefficient mu_x of a table at the slip angle and load of ``cells``, and at slip node k."""
     i, p, j, q = cells
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
     if q == 0.0:

@@ -1,1 +1,1 @@
-"""Vehicles: an engine-neutral description each, and equations written straight from its paper."""
+"""Vehicle models: engine-neutral descriptions, and equations of motion written straight from their papers."""

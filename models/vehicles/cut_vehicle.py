@@ -1,4 +1,5 @@
-"""A vehicle in space, cut at the wheels: what is above the cut, free to move and turn without limit.
+"""A vehicle in space without its tyres, free to move and rotate without limit, to be loaded by forces at its wheel
+hubs.
 
 All bodies ride on the chassis, in its own axes. The axes of springs, mounts and bars are fixed in it, too, unless their
 frame is another body: what is inside the vehicle feels relative coordinates alone. The chassis itself has position,
@@ -12,20 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.vehicles.free_vehicle import guided
+from models.vehicles.free_vehicle import with_chassis_as_parent
 from models.vehicles.sliding_springs import sliding_springs
 from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import Preloads, preloads
 
 GRAVITY = 9.81
 X, Y, Z, HEADING, PITCH, ROLL = range(6)
-"""The chassis' coordinates: m and rad; nose down is a positive pitch (about y, to the left)."""
+"""Indices of the chassis' coordinates: m and rad; nose down is a positive pitch (about y, to the left)."""
 ANGLES = {"roll": ROLL, "pitch": PITCH, "heading": HEADING}
 
 
 @dataclass(frozen=True)
 class Element:
-    """A force along an axis, positive in compression, or a moment.
+    """Spring, mount or bar of a cut vehicle: a force along an axis, positive in compression, or a moment.
 
     F = held + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
     d = axis . (second_point - first_point) less its design value, in the axes of the body ``frame``, the chassis
@@ -40,17 +41,17 @@ class Element:
     axis: np.ndarray
     stiffness: float
     damping: float
-    held: float
+    preload: float
     frame: str
     travel_force: Curve | None = None
     rate_force: Curve | None = None
     friction: float = 0.0
     friction_rate: float = 1.0
 
-    def gauge(self) -> "Element":
-        """A copy of the element whose force equals its travel d, so that a run records the travel."""
+    def travel_gauge(self) -> "Element":
+        """A copy of the element whose force equals its travel d, so that a simulation records the travel."""
         straight = replace(self, travel_force=None, rate_force=None, friction=0.0)
-        return replace(straight, stiffness=1.0, damping=0.0, held=0.0)
+        return replace(straight, stiffness=1.0, damping=0.0, preload=0.0)
 
     @property
     def design(self) -> float:
@@ -65,7 +66,7 @@ class Element:
 
 @dataclass(frozen=True)
 class CutVehicle:
-    """A vehicle cut at its hubs: the bodies above the cut.
+    """A vehicle without its tyres, cut at its wheel hubs.
 
     tree : bodies and joints, carriers first, then the chassis; without springs and tyres
     uncut : the vehicle that was cut, all its bodies on the chassis, loaded; tyres are listed there
@@ -86,15 +87,15 @@ class CutVehicle:
 
     @property
     def size(self) -> int:
-        """Number of degrees of freedom."""
+        """Number of degrees of freedom of the cut vehicle."""
         return len(self.tree.coordinates())
 
 
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
-    """Remove the tyres of a vehicle whose body ``chassis`` has all six freedoms; InputError if the vehicle cannot be
-    cut."""
+    """The cut vehicle: the tyres of a vehicle whose body ``chassis`` has all six freedoms are removed. Raises
+    InputError if the vehicle cannot be cut."""
     _check(vehicle, chassis)
-    sprung = sliding_springs(guided(vehicle, chassis))
+    sprung = sliding_springs(with_chassis_as_parent(vehicle, chassis))
     whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
@@ -102,7 +103,8 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
 
 
 def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, ...]:
-    """Springs, then bars, of a vehicle whose springs and bars all name their frames; held : their static forces."""
+    """Elements for the springs, then the bars, of a vehicle whose springs and bars all name their frames; preloads :
+    their static forces."""
 
     def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
@@ -131,8 +133,8 @@ def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, .
 
 
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
-    """Bodies in tree order: massless carriers for heading and pitch, the chassis with roll, and all other bodies behind
-    it."""
+    """Bodies of the cut vehicle in tree order: massless carriers for heading and pitch, the chassis with roll, and all
+    other bodies behind it."""
     body = vehicle.body(chassis)
     carriers = (
         Body(f"{chassis} heading", 0.0, body.position, ("x", "y", "z", "rz")),
@@ -167,8 +169,8 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
 
 
 @dataclass(frozen=True)
-class Rigid:
-    """The cut vehicle as one rigid body, which describes its drift when the springs have settled.
+class RigidVehicle:
+    """The cut vehicle as a single rigid body, which describes its drift when the springs have settled.
 
     mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it (kg m^2), arms (h, 3) of the hubs.
 
@@ -186,7 +188,7 @@ class Rigid:
     arms: np.ndarray
 
     def moments(self, wrenches: np.ndarray) -> np.ndarray:
-        """Moments (m, 3) about the centre of mass, N m, of hub wrenches (m, 6 h) in the chassis' axes."""
+        """Moments (m, 3) about the vehicle's centre of mass, N m, of hub wrenches (m, 6 h) in the chassis' axes."""
         parts = wrenches.reshape(len(wrenches), -1, 6)
         return (np.cross(self.arms, parts[:, :, :3]) + parts[:, :, 3:]).sum(axis=1)
 
@@ -197,18 +199,19 @@ class Rigid:
         inverse = np.linalg.inv(self.inertia)
         return inverse @ (rows.T * deviation**2) @ rows @ inverse
 
-    def toppling(self) -> np.ndarray:
+    def toppling_rates(self) -> np.ndarray:
         """Growth rates (2,) of roll and pitch, 1/s, under forces whose directions are fixed in space."""
         loads = -self.arms[:, 2].mean() * self.mass * GRAVITY
         return np.sqrt(np.maximum(loads, 0.0) / np.diag(self.inertia)[:2])
 
     def angle_variance(self, deviation: np.ndarray, period: float, times: np.ndarray) -> np.ndarray:
-        """Variances (m, 3) of roll, pitch and heading (rad^2) by noise, at times (m,) after a start from rest."""
+        """Variances (m, 3) of roll, pitch and heading (rad^2) caused by noise of the hub samples, at times (m,) after a
+        start from rest."""
         return np.outer(times**3 / 3, period * np.diag(self.turning(deviation)))
 
     def position_variance(self, deviation: np.ndarray, period: float, times: np.ndarray, frame: str) -> np.ndarray:
-        """Variances (m, 3) of x, y, z (m^2) by noise at times (m,) after a start from rest; ``frame`` : of the
-        forces."""
+        """Variances (m, 3) of x, y, z (m^2) caused by noise of the hub samples, at times (m,) after a start from rest;
+        ``frame`` : of the forces."""
         force = period * (deviation.reshape(-1, 6)[:, :3] ** 2).sum(axis=0) / self.mass**2
         variances = np.outer(times**3 / 3, force)
         if frame != "inertial":
@@ -217,8 +220,8 @@ class Rigid:
         return variances
 
 
-def rigid(vehicle: CutVehicle) -> Rigid:
-    """``Rigid`` of all bodies, combined in the design position."""
+def rigid_vehicle(vehicle: CutVehicle) -> RigidVehicle:
+    """``Rigid`` with the mass properties of all bodies of a cut vehicle, combined in the design position."""
     bodies = vehicle.uncut.bodies
     mass = sum(body.mass for body in bodies)
     centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass
@@ -226,4 +229,4 @@ def rigid(vehicle: CutVehicle) -> Rigid:
     for body in bodies:
         arm = np.subtract(body.position, centre)
         inertia += np.array(body.inertia) + steiner(body.mass, arm)
-    return Rigid(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.uncut.tyres]) - centre)
+    return RigidVehicle(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.uncut.tyres]) - centre)

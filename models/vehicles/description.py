@@ -65,7 +65,8 @@ class PitchSpring:
 
 @dataclass(frozen=True)
 class Axle:
-    """Where the road or a wheel force acts: the wheel body, and its position ahead of the chassis' centre (m)."""
+    """Axle of a vehicle in the plane, where the road or a wheel force acts: its wheel body, and its position ahead of
+    the chassis' centre (m)."""
 
     name: str
     wheel: str
@@ -74,7 +75,8 @@ class Axle:
 
 @dataclass(frozen=True)
 class Vehicle:
-    """Bodies, struts and axles; ``gravity`` (m/s^2) acts down; ``geometry`` exact uses sin and cos of pitch."""
+    """Vehicle that moves in the vertical plane: bodies, struts and axles; ``gravity`` (m/s^2) acts down; ``geometry``
+    "exact" uses sin and cos of pitch."""
 
     bodies: tuple[Body, ...]
     struts: tuple[Strut, ...]
@@ -85,17 +87,18 @@ class Vehicle:
 
     @property
     def tyres(self) -> tuple[Strut, ...]:
-        """The struts that end on the ground, in the order of ``struts``."""
+        """Tyres: the struts that end on the ground, in the order of ``struts``."""
         return tuple(strut for strut in self.struts if strut.lower.body is None)
 
     def coordinates(self) -> tuple[tuple[str, str], ...]:
-        """Coordinates in the order of the state, as (body, "z" or "pitch")."""
+        """Coordinates of the vehicle in the order of the state, as (body, "z" or "pitch")."""
         heave = [(body.name, "z") for body in self.bodies]
         return (*heave, *((body.name, "pitch") for body in self.bodies if body.pitch_inertia is not None))
 
 
 def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, D, K of M q'' + D q' + K q = f, each (n, n) in the order of ``vehicle.coordinates()``.
+    """Mass, damping and stiffness matrices M, D, K of M q'' + D q' + K q = f, each (n, n) in the order of
+    ``vehicle.coordinates()``.
 
     Units kg, N s/m and N/m for heave rows; pitch rows are moments (N m). Gravity is not in K, nor a spring with
     a dead band, which is slack about zero pitch. Tyres that can lift are on the road.
@@ -117,7 +120,7 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _vertical(point: Point, coordinates: tuple[tuple[str, str], ...]) -> np.ndarray:
-    """Row that maps small coordinates to the vertical displacement of a point: z - x pitch."""
+    """Row (n,) that maps small coordinates to the vertical displacement of a point (m, down): z - x pitch."""
     row = np.zeros(len(coordinates))
     for i, (body, kind) in enumerate(coordinates):
         if body == point.body:

@@ -1,4 +1,5 @@
-"""A vehicle of the ride that may turn through any angle: the same bodies, masses and springs on a carrier that yaws.
+"""A vehicle in space that may turn through any heading: the bodies, masses and springs of the ride vehicle on a yawing
+carrier.
 
 The laws of the ride hold along directions fixed in space, for small motion about straight travel. Here a massless
 **carrier** on the ground has the chassis' motion in the plane, x, y and yaw, all finite (ISO 8855: x forward, y left, z
@@ -17,16 +18,16 @@ from models.core.errors import InputError
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, Freedom, SpatialVehicle, Tyre, Vector
 
 CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"
-SPECK = 1e-9
-"""Mass (kg) of a rotor: Exudyn divides by the mass of whatever has inertia."""
-PLANE: tuple[Freedom, ...] = ("x", "y", "rz")
-RESTING_COORDINATES: tuple[Freedom, ...] = ("z", "rx", "ry")
+ROTOR_MASS = 1e-9
+"""Mass (kg) of a rotor: Exudyn divides by the mass of every body that has inertia."""
+CARRIER_FREEDOMS: tuple[Freedom, ...] = ("x", "y", "rz")
+SWAY_FREEDOMS: tuple[Freedom, ...] = ("z", "rx", "ry")
 
 
 def free_vehicle(
     vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0, fixed: tuple[str, ...] = ()
 ) -> SpatialVehicle:
-    """The vehicle on a carrier body, without side forces, drag and outputs; its bodies are in tree order.
+    """The vehicle on a yawing carrier body, without side forces, drag and outputs; its bodies are in tree order.
 
     gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle where its tyre names none, 0 for wheels that do
     not spin; fixed : tyres whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six
@@ -36,19 +37,19 @@ def free_vehicle(
     _check_headings(vehicle, chassis.name)
     x, y, _ = chassis.position
     bodies = [
-        Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE),
-        Body(SWAY, 0.0, (x, y, 0.0), RESTING_COORDINATES, parent=CARRIER),
+        Body(CARRIER, 0.0, (0.0, 0.0, 0.0), CARRIER_FREEDOMS),
+        Body(SWAY, 0.0, (x, y, 0.0), SWAY_FREEDOMS, parent=CARRIER),
     ]
     bodies += [
         replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
-        for body in guided(vehicle, chassis.name).bodies
+        for body in with_chassis_as_parent(vehicle, chassis.name).bodies
     ]
     bodies += [
-        Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
+        Body(rotor(tyre.name), ROTOR_MASS, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
         for tyre in vehicle.tyres
         if spin_inertia and tyre.name not in fixed
     ]
-    bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
+    bars = tuple(_bar_on_sway(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
     free = replace(
         vehicle, bodies=_bodies_before_riders(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity
     )
@@ -64,8 +65,8 @@ def _about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
     return (0.0, 0.0, 0.0), (0.0, inertia, 0.0), (0.0, 0.0, 0.0)
 
 
-def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
-    """The vehicle in which the chassis becomes the parent of every body that had none, so that these move in its
+def with_chassis_as_parent(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
+    """The vehicle with the chassis as the parent of every body that had none, so that these move in the chassis'
     axes."""
     return replace(
         vehicle,
@@ -76,7 +77,7 @@ def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
 
 
 def chassis_of(vehicle: SpatialVehicle) -> Body:
-    """The body on which the tyres' side forces act; InputError unless it is free."""
+    """The body on which the tyres' side forces act. Raises InputError unless it has all six freedoms."""
     names = {force.chassis for force in vehicle.side_forces if force.chassis not in vehicle.towed}
     missing = [tyre.name for tyre in vehicle.tyres if tyre.name not in {force.name for force in vehicle.side_forces}]
     if missing or len(names) != 1:
@@ -94,7 +95,7 @@ def chassis_of(vehicle: SpatialVehicle) -> Body:
 
 
 def _check_headings(vehicle: SpatialVehicle, chassis: str) -> None:
-    """Refuse an axle with a heading of its own, relative to the body that carries it, since tyre forces follow that
+    """Raise InputError for an axle that can yaw relative to the body that carries it, since tyre forces follow that
     body's heading."""
     hitches = {vehicle.body(name).parent for name in vehicle.towed}
     for tyre in vehicle.tyres:
@@ -112,40 +113,42 @@ def rotor(tyre: str) -> str:
     return f"{tyre} {ROTOR}"
 
 
-def anchor(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
-    """Index of the last coordinate that moves a body, -1 if none does, and position (m) of its joint in the design
-    position."""
+def last_coordinate_and_joint(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
+    """Index of the last coordinate that moves a body, -1 if none does, and the position (m) of that coordinate's joint
+    in the design position."""
     given_body = vehicle.body(body)
     last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body]
     if last:
         return last[-1], given_body.position
-    return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else anchor(vehicle, given_body.parent)
+    return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else last_coordinate_and_joint(vehicle, given_body.parent)
 
 
 def joints(vehicle: SpatialVehicle) -> np.ndarray:
-    """Table (n, 5) with a row per coordinate: its kind (index in FREEDOMS), the coordinate below it (-1: none), and the
-    vector (m) from that one's joint to its own in the design position."""
+    """Joint table (n, 5) of a vehicle with a row per coordinate: its kind (index in FREEDOMS), the coordinate below it
+    (-1: none), and the vector (m) from the joint below to its own in the design position."""
     rows = []
     for body in vehicle.bodies:
-        below, origin = (-1, (0.0, 0.0, 0.0)) if body.parent is None else anchor(vehicle, body.parent)
+        below, origin = (
+            (-1, (0.0, 0.0, 0.0)) if body.parent is None else last_coordinate_and_joint(vehicle, body.parent)
+        )
         for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
             rows.append([FREEDOMS.index(freedom), below, *np.subtract(body.position, origin)])
             below, origin = len(rows) - 1, body.position
     return np.array(rows)
 
 
-def frames(vehicle: SpatialVehicle) -> np.ndarray:
+def freedom_axes(vehicle: SpatialVehicle) -> np.ndarray:
     """Axes (n, 3, 3), as columns, of the freedoms of each coordinate's body in the design position."""
     axes = [vehicle.body(name).axes for name, _ in vehicle.coordinates()]
     return np.array(axes, float).reshape(-1, 3, 3).transpose(0, 2, 1)
 
 
-def _swaying(bar: AntiRollBar) -> AntiRollBar:
+def _bar_on_sway(bar: AntiRollBar) -> AntiRollBar:
     return replace(bar, body=SWAY)
 
 
 def _bodies_before_riders(bodies: list[Body]) -> tuple[Body, ...]:
-    """Bodies in tree order: each one is followed directly by all bodies that it carries, as engines number them."""
+    """Bodies in tree order: each body is followed directly by all bodies that it carries, as engines number them."""
     walked: list[Body] = []
 
     def walk(parent: str | None) -> None:

@@ -1,4 +1,5 @@
-"""Where points and bodies of a vehicle go when its coordinates are small: exact to second order."""
+"""Kinematics of a vehicle for small coordinates: displacements of points and rotations of bodies, exact to second
+order."""
 
 from functools import lru_cache
 
@@ -7,12 +8,12 @@ import numpy as np
 from models.core.errors import InputError
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, SpatialVehicle, Vector
 
-End = tuple[str | None, Vector]
-"""A body, None for the ground, and a point (m) that is fixed to it, in the design position."""
-UNIT = np.eye(3)
-"""Rows are the axes x, y, z."""
-TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
-"""(3, 3, 3): e_i x v = TURN[i] @ v."""
+SpringEnd = tuple[str | None, Vector]
+"""End of a spring: a body, None for the ground, and a point (m) that is fixed to it, in the design position."""
+UNIT_AXES = np.eye(3)
+"""Unit matrix, whose rows are the axes x, y, z."""
+ROTATION_GENERATORS = np.array([np.cross(unit, UNIT_AXES).T for unit in UNIT_AXES])
+"""Generators (3, 3, 3) of rotations about the axes: e_i x v = TURN[i] @ v."""
 
 
 class Kinematics:
@@ -31,14 +32,14 @@ class Kinematics:
         self._shifts = _shifts_of(tuple(bodies))
 
     def coordinate(self, body: str, freedom: str) -> np.ndarray:
-        """Row (n,) that selects one coordinate from q; zeros if the body does not have it."""
+        """Row (n,) that selects a coordinate from all coordinates q; zeros if the body does not have it."""
         row = np.zeros(self.size)
         if (body, freedom) in self._index:
             row[self._index[body, freedom]] = 1.0  # type: ignore[index]
         return row
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """Displacement (3, n) of a point (m) per coordinate, read-only; zeros on the ground, None."""
+        """Displacement (3, n) of a point (m) of a body per coordinate, read-only; zeros on the ground, None."""
         x, y, z = point
         place = body, (x, y, z)
         if place not in self._shifts:
@@ -50,7 +51,9 @@ class Kinematics:
         columns = np.zeros((3, self.size))
         for rider, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
-            columns[:, i] = UNIT[along] if along < 3 else TURN[along - 3] @ np.subtract(point, rider.position)
+            columns[:, i] = (
+                UNIT_AXES[along] if along < 3 else ROTATION_GENERATORS[along - 3] @ np.subtract(point, rider.position)
+            )
         return columns
 
     def turn(self, body: str) -> np.ndarray:
@@ -59,10 +62,10 @@ class Kinematics:
         for _, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
             if along >= 3:
-                columns[:, i] = UNIT[along - 3]
+                columns[:, i] = UNIT_AXES[along - 3]
         return columns
 
-    def bend(self, body: str | None, point: Vector) -> np.ndarray:
+    def second_derivatives(self, body: str | None, point: Vector) -> np.ndarray:
         """Second derivatives (3, n, n) of a point's displacement (m) with respect to the coordinates."""
         first = self.shift(body, point)
         second = np.zeros((3, self.size, self.size))
@@ -71,23 +74,33 @@ class Kinematics:
             along = FREEDOMS.index(freedom)
             if along >= 3:
                 for _, _, inner in motions[k:]:
-                    second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
+                    second[:, outer, inner] = second[:, inner, outer] = ROTATION_GENERATORS[along - 3] @ first[:, inner]
         return second
 
     def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
-        """Change (3, n) of an axis fixed in a body, per coordinate; zeros for the space, None."""
-        return np.zeros((3, self.size)) if frame is None else -np.tensordot(axis, TURN, 1) @ self.turn(frame)
+        """Change (3, n) of an axis fixed in a body, per coordinate; zeros for an axis fixed in space, None."""
+        return (
+            np.zeros((3, self.size))
+            if frame is None
+            else -np.tensordot(axis, ROTATION_GENERATORS, 1) @ self.turn(frame)
+        )
 
-    def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
-        """Second derivatives (n, n) of axis . (point two - point one); axis fixed in ``frame``, a body or space."""
-        ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
+    def travel_second_derivatives(
+        self, first_end: SpringEnd, second_end: SpringEnd, axis: Vector, frame: str | None
+    ) -> np.ndarray:
+        """Second derivatives (n, n) of the travel axis . (second point - first point) with respect to the coordinates;
+        the axis is fixed in ``frame``, a body or space."""
+        ends, second = (
+            self.shift(*second_end) - self.shift(*first_end),
+            self.second_derivatives(*second_end) - self.second_derivatives(*first_end),
+        )
         total = np.tensordot(axis, second, 1)
         if frame is None:
             return total
         mixed, (x, y, z) = self.turned_axis(frame, axis).T @ ends, self._bodies[frame].position
         beyond = x + axis[0], y + axis[1], z + axis[2]
-        bent = self.bend(frame, beyond) - self.bend(frame, (x, y, z))
-        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], first[1]), bent, 1))
+        bent = self.second_derivatives(frame, beyond) - self.second_derivatives(frame, (x, y, z))
+        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(second_end[1], first_end[1]), bent, 1))
 
     def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
         """Coordinates that move a body, from the ground outwards: (body that has the coordinate, freedom, index)."""
@@ -99,14 +112,14 @@ class Kinematics:
 
 
 @lru_cache(maxsize=16)
-def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[End, np.ndarray]:
+def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[SpringEnd, np.ndarray]:
     """Cache of points' displacements (3, n), shared by all vehicles with the same ``bodies``: name, parent, position
     and freedoms."""
     return {}
 
 
 def _check_parallel(vehicle: SpatialVehicle) -> None:
-    """InputError for features of the vehicle that the linear equations do not support."""
+    """Raise InputError for features of the vehicle that the linear equations do not support."""
     turned = next((body.name for body in vehicle.bodies if body.axes != PARALLEL), None)
     if turned is not None:
         raise InputError(vehicle.name, f"bodies[{turned}].axes", None, "must be parallel to the vehicle's axes")

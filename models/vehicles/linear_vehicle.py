@@ -1,4 +1,5 @@
-"""The linear vehicle that every ride analysis starts from, whoever has linearised it."""
+"""Linear equations of motion of a vehicle on a road, from which every ride analysis starts, whoever has linearised
+them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +21,7 @@ class WheelPosition:
 
 @dataclass(frozen=True)
 class Output:
-    """One output quantity: a linear function of the vehicle's motion and of the road.
+    """Output quantity of a linear vehicle: a linear function of the vehicle's motion and of the road.
 
     acceleration_factors, rate_factors, displacement_factors (n,): of q'', q', q. road_factors, road_rate_factors (w,):
     of the heights under the wheels (m) and of their rates (m/s). ``kind`` says what it is ("acceleration", "travel",
@@ -38,7 +39,8 @@ class Output:
 
 
 class OutputRows(NamedTuple):
-    """Factors of all outputs as matrices, each row one ``Output``: (p, n), and (p, w) for those of the road."""
+    """Factors of all outputs of a linear vehicle as matrices, each row that of one ``Output``: (p, n), and (p, w) for
+    those of the road."""
 
     acceleration_factors: np.ndarray
     rate_factors: np.ndarray
@@ -49,7 +51,8 @@ class OutputRows(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearVehicle:
-    """Linear vehicle M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
+    """Linear equations of motion of a vehicle, M q'' + D q' + K q = R z + S z', with road heights z (w,) under the
+    wheels (m, up).
 
     mass, damping, stiffness (n, n); road_stiffness R (n, w) in N/m, road_damping S (n, w) in N s/m. ``coordinates``
     names the n freedoms as (body, freedom). ``source`` says who linearised ("analytic", "exudyn", "mujoco") and where.
@@ -78,28 +81,28 @@ class LinearVehicle:
 
     @cached_property
     def read(self) -> OutputRows:
-        """``OutputRows`` of all outputs."""
+        """``OutputRows`` with the factors of all outputs."""
         return OutputRows(
             *(np.array([getattr(output, factor) for output in self.outputs]) for factor in OutputRows._fields)
         )
 
 
-def poles(vehicle: LinearVehicle) -> np.ndarray:
-    """Eigenvalues (2 n,) in 1/s in order of increasing magnitude; of a conjugate pair, the one with negative imaginary
-    part comes first."""
+def eigenvalues(vehicle: LinearVehicle) -> np.ndarray:
+    """Eigenvalues (2 n,) of a linear vehicle in 1/s in order of increasing magnitude; of a conjugate pair, the
+    eigenvalue with negative imaginary part comes first."""
     n = len(vehicle.mass)
     motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
     values = np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), motion]))
     return values[np.lexsort((values.imag, np.round(np.abs(values), 6)))]
 
 
-def shift(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
+def eigenvalue_shifts(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
     """Complex change (1/s) of each eigenvalue (2 n,) of the unloaded vehicle by the load.
 
     Eigenvalues of both vehicles are paired such that the sum of all distances is smallest.
     """
     from scipy.optimize import linear_sum_assignment
 
-    before, after = poles(unloaded), poles(loaded)
+    before, after = eigenvalues(unloaded), eigenvalues(loaded)
     rows, columns = linear_sum_assignment(np.abs(before[:, None] - after[None, :]))
     return after[columns] - before[rows]

@@ -13,9 +13,9 @@ from models.core.strict import Strict, quantity
 from models.vehicles.description import Axle, Body, Geometry, Point, Strut, Vehicle
 
 STATES = ("z1", "z2", "z3", "pitch")
-"""Names of the coordinates; the state is these four and their rates."""
+"""Names of the vehicle's four coordinates; its state consists of these and their rates."""
 STATE_NAMES = (*STATES, *(f"{name}_rate" for name in STATES))
-"""Names of the eight states, as of their channels."""
+"""Names of the eight states, which are also the names of their channels."""
 
 
 class Parameters(Strict):
@@ -38,12 +38,12 @@ class Parameters(Strict):
     g: float = quantity("m/s^2", "gravity, acting down", default=9.81, zero=True)
 
     def array(self) -> np.ndarray:
-        """All values in the order of the fields, shape (15,): what the compiled equations read."""
+        """All parameters in the order of the fields, shape (15,), as the compiled equations read them."""
         return np.array([getattr(self, name) for name in type(self).model_fields])
 
 
 def describe(p: Parameters, geometry: Geometry = "exact") -> Vehicle:
-    """The vehicle on its tyres, over a flat road, as bodies and struts."""
+    """Description of the pitch-plane vehicle on its tyres, over a flat road, as bodies and struts."""
     bodies = (Body("wheel1", p.m1), Body("wheel2", p.m2), Body("chassis", p.m3, p.I))
     front, rear, ground = Point("wheel1"), Point("wheel2"), Point(None)
     struts = (
@@ -57,7 +57,7 @@ def describe(p: Parameters, geometry: Geometry = "exact") -> Vehicle:
 
 
 def equilibrium(p: Parameters, geometry: Geometry = "exact") -> np.ndarray:
-    """Static equilibrium on the flat road, shape (8,), rates zero.
+    """Static equilibrium of the pitch-plane vehicle on the flat road: state, shape (8,), with zero rates.
 
     Closed form: the axle loads follow from the moment about the other axle, and the two strut lengths
     give heave and (the sine of) pitch.

@@ -1,4 +1,4 @@
-"""The pitch-plane vehicle's equations of motion, written straight from the paper (eqs 35 to 39).
+"""Equations of motion of the pitch-plane vehicle, written straight from the paper (eqs 35 to 39).
 
 Each right-hand side takes the state y (8,), the input u of its mode, the parameters p (15,) in the
 order of ``pitch_plane.Parameters`` and fills dy (8,). They are plain functions that numba can compile
@@ -23,15 +23,15 @@ from models.vehicles.description import Geometry, Vehicle
 from models.vehicles.pitch_plane import Parameters
 
 
-def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
-    """Array for the compiled equations: the parameters (15,), then stiffness, damping and dead band of each pitch
-    spring."""
+def parameter_numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
+    """Array of numbers for the compiled equations: the parameters (15,), then stiffness, damping and dead band of each
+    pitch spring."""
     springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
     return np.concatenate((p.array(), *springs))
 
 
 @register_jitable
-def suspension(y, p, sine, cosine):
+def suspension_forces(y, p, sine, cosine):
     """Suspension forces f3, f4 (N, compression positive), eq. (35)."""
     a, b = p[0], p[1]
     f3 = p[8] * (y[2] - y[0] - b * sine) + p[12] * (y[6] - y[4] - b * y[7] * cosine)
@@ -44,13 +44,13 @@ def suspension_loads(y: Any, p: Parameters, geometry: Geometry) -> tuple[np.ndar
     eight arrays (n,); eqs (35), (36)."""
     exact = geometry == "exact"
     sine, cosine = (np.sin(y[3]), np.cos(y[3])) if exact else (y[3], np.ones_like(y[3]))
-    f3, f4 = suspension(y, p.array(), sine, cosine)
+    f3, f4 = suspension_forces(y, p.array(), sine, cosine)
     return f3, f4, cosine * (p.b * f3 - p.a * f4)
 
 
 @register_jitable
-def tyres(y, u, p):
-    """Wheel forces f1, f2 (N, up on the wheel) on a road u, eqs (33) and (35)."""
+def linear_tyres(y, u, p):
+    """Tyre forces f1, f2 (N, up on the wheel) of the linear tyres on a road u, eqs (33) and (35)."""
     f1 = p[6] * (y[0] - u[0]) + p[10] * (y[4] - u[2])
     f2 = p[7] * (y[1] - u[1]) + p[11] * (y[5] - u[3])
     return f1, f2
@@ -58,7 +58,8 @@ def tyres(y, u, p):
 
 @register_jitable
 def pushing_tyres(y, u, p):
-    """Rates of the vehicle on tyres that never pull (the effect ``lift_off``). NaN in the states gives NaN."""
+    """Tyre forces f1, f2 (N, up on the wheel) of tyres that never pull (the effect ``lift_off``), on a road u. NaN in
+    the states gives NaN."""
     e1, e2 = y[0] - u[0], y[1] - u[1]
     f1 = max(min(p[6] * e1 + p[10] * (y[4] - u[2]), 2.0 * p[6] * e1), 0.0)
     f2 = max(min(p[7] * e2 + p[11] * (y[5] - u[3]), 2.0 * p[7] * e2), 0.0)
@@ -67,8 +68,8 @@ def pushing_tyres(y, u, p):
 
 @register_jitable
 def newton_euler(y, wheels, struts, cosine, p, dy):
-    """Accelerations from the balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on the wheel),
-    suspension forces f3, f4."""
+    """Fill the time derivatives dy (8,) from the balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on
+    the wheel), suspension forces f3, f4 (N)."""
     (f1, f2), (f3, f4) = wheels, struts
     for i in range(4):
         dy[i] = y[4 + i]
@@ -80,87 +81,88 @@ def newton_euler(y, wheels, struts, cosine, p, dy):
 
 @register_jitable
 def road_exact(y, u, p, dy):
-    """Road-excited vehicle, nonlinear in pitch (38)."""
+    """Fill the time derivatives of the road-excited vehicle, nonlinear in pitch (38)."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, tyres(y, u, p), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, linear_tyres(y, u, p), suspension_forces(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def road_linear(y, u, p, dy):
-    """Road-excited vehicle, linearised about zero pitch (38 with A(0))."""
-    newton_euler(y, tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
+    """Fill the time derivatives of the road-excited vehicle, linearised about zero pitch (38 with A(0))."""
+    newton_euler(y, linear_tyres(y, u, p), suspension_forces(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def lift_off_exact(y, u, p, dy):
-    """Vehicle on tyres that only push, nonlinear in pitch."""
+    """Fill the time derivatives of the vehicle on tyres that never pull, nonlinear in pitch."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, pushing_tyres(y, u, p), suspension_forces(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def lift_off_linear(y, u, p, dy):
-    """Rates of the vehicle on tyres that never pull, linearised about zero pitch."""
-    newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
+    """Fill the time derivatives of the vehicle on tyres that never pull, linearised about zero pitch."""
+    newton_euler(y, pushing_tyres(y, u, p), suspension_forces(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def force_exact(y, u, p, dy):
-    """Force-excited vehicle, wheel forces vertical in the inertial frame (37)."""
+    """Fill the time derivatives of the force-excited vehicle, wheel forces vertical in the inertial frame (37)."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def force_linear(y, u, p, dy):
-    """Force-excited vehicle, linearised about zero pitch (37 with A(0))."""
-    newton_euler(y, (u[0], u[1]), suspension(y, p, y[3], 1.0), 1.0, p, dy)
+    """Fill the time derivatives of the force-excited vehicle, linearised about zero pitch (37 with A(0))."""
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def force_body(y, u, p, dy):
-    """Force-excited vehicle, wheel forces along the chassis' own vertical axis.
+    """Fill the time derivatives of the force-excited vehicle, wheel forces along the chassis' own vertical axis.
 
     By virtual work: the vertical part f cos(beta) acts on the wheel; the horizontal part f sin(beta)
     goes through the wheel's guide to the chassis at the strut's point, f b sin(beta)^2 about its centre.
     Without wheel mass the moment is b f1 - a f2 at every pitch: no cosine, hence no instability.
     """
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    newton_euler(y, (u[0] * cosine, u[1] * cosine), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0] * cosine, u[1] * cosine), suspension_forces(y, p, sine, cosine), cosine, p, dy)
     dy[7] += sine * sine * (p[1] * u[0] - p[0] * u[1]) / p[5]
 
 
 @register_jitable
 def pitch_exact(y, u, p, dy):
-    """Force-excited vehicle guided by a prescribed pitch (39); pitch and its rate are read from u."""
+    """Fill the time derivatives of the force-excited vehicle with prescribed pitch (39); pitch and its rate are read
+    from u."""
     sine, cosine = math.sin(u[2]), math.cos(u[2])
     y[3], y[7] = u[2], u[3]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, sine, cosine), cosine, p, dy)
     dy[7] = u[4]
 
 
 @register_jitable
 def pitch_linear(y, u, p, dy):
-    """Rates of the vehicle with its pitch guided, linearised about zero pitch."""
+    """Fill the time derivatives of the force-excited vehicle with prescribed pitch, linearised about zero pitch."""
     y[3], y[7] = u[2], u[3]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, u[2], 1.0), 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, u[2], 1.0), 1.0, p, dy)
     dy[7] = u[4]
 
 
 @register_jitable
 def heave_pitch_exact(y, u, p, dy):
-    """Rates of two wheels under a chassis whose heave and pitch are prescribed in u."""
+    """Fill the time derivatives of two wheels under a chassis whose heave and pitch are prescribed in u."""
     sine, cosine = math.sin(u[3]), math.cos(u[3])
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, sine, cosine), cosine, p, dy)
     dy[6], dy[7] = u[6], u[7]
 
 
 @register_jitable
 def heave_pitch_linear(y, u, p, dy):
-    """Rates of the vehicle with heave and pitch guided, linearised about zero pitch."""
+    """Fill the time derivatives of the vehicle with prescribed heave and pitch, linearised about zero pitch."""
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
-    newton_euler(y, (u[0], u[1]), suspension(y, p, u[3], 1.0), 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension_forces(y, p, u[3], 1.0), 1.0, p, dy)
     dy[6], dy[7] = u[6], u[7]
 
 
@@ -177,12 +179,14 @@ RIGHT_HAND_SIDES = {
     ("heave-pitch", "exact"): heave_pitch_exact,
     ("heave-pitch", "linear"): heave_pitch_linear,
 }
-"""By mode and geometry; linearised, a body-fixed force is a vertical one."""
+"""Right-hand sides of the equations of motion by mode and geometry; linearised, a body-fixed force is a vertical
+one."""
 
 
 @register_jitable
 def pitch_springs(y, u, p, dy):
-    """Add rotational springs and dampers to the ground; their N m/rad, N m s/rad and dead band (rad) begin at p[15]."""
+    """Add rotational springs and dampers between chassis and ground to dy; their N m/rad, N m s/rad and dead band (rad)
+    begin at p[15]."""
     for i in range(15, len(p), 3):
         beyond = abs(y[3]) - p[i + 2]
         if beyond >= 0.0:
@@ -191,9 +195,9 @@ def pitch_springs(y, u, p, dy):
 
 @register_jitable
 def pitch_moment(y, u, p, dy):
-    """Add a moment on the chassis (N m, nose up), which is the last channel of the input."""
+    """Add a moment on the chassis (N m, nose up), the last channel of the input, to dy."""
     dy[7] += u[-1] / p[5]
 
 
-ADDED = {"springs": pitch_springs, "moment": pitch_moment}
-"""Terms that a right-hand side may be followed by."""
+ADDED_TERMS = {"springs": pitch_springs, "moment": pitch_moment}
+"""Further terms by which a right-hand side may be followed."""

@@ -1,4 +1,5 @@
-"""Queries on implausible vehicles: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
+"""Plausibility checks of a vehicle: a mass in tonnes, springs in N/mm, a strut far from its wheel, a wheel without a
+strut.
 
 Nothing here refuses: each finding names the entry, its value and what is usual, as the units of a file are named. Only
 what is far from every vehicle on wheels is queried, from a quarter of a small car to a loaded truck; a vehicle that is
@@ -18,32 +19,34 @@ from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
 from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest, static_stiffness
 
 GRAVITY = 9.81
-MASS = 30.0, 60e3
-"""kg, of everything."""
+USUAL_MASS = 30.0, 60e3
+"""Usual range of the mass (kg) of the whole vehicle."""
 LEAST_SPRUNG_RATIO = 0.7
-"""Sprung by unsprung mass at the least: the axle of an empty trailer."""
-SHARE = 0.03
-"""Of the weight, that an axle carries at the least, where there are several."""
-UNEVEN = 3.0
-"""Load, or stiffness, of one wheel of an axle divided by that of the other."""
-BOUNCE = 0.5, 6.0
-"""Hz, of the whole vehicle on springs and tyres, from how far it sinks under its weight."""
-HOP = 3.0, 60.0
-"""Hz, of a wheel or an axle between road and body."""
-DAMPING = 0.005, 5.0
-"""Of the critical one, of a damper beside its spring under its static load."""
-PRESSED = 5e-4, 0.25
-"""m, of a tyre under its static load."""
+"""Smallest usual ratio of sprung to unsprung mass: that of the axle of an empty trailer."""
+LEAST_AXLE_SHARE = 0.03
+"""Smallest usual share of the weight on an axle, where there are several."""
+LARGEST_WHEEL_RATIO = 3.0
+"""Largest usual ratio of load, or stiffness, between the wheels of an axle."""
+USUAL_BOUNCE_FREQUENCY = 0.5, 6.0
+"""Usual range of the bounce frequency (Hz) of the vehicle on springs and tyres, from its static deflection."""
+USUAL_HOP_FREQUENCY = 3.0, 60.0
+"""Usual range of the hop frequency (Hz) of a wheel or an axle between road and body."""
+USUAL_DAMPING_RATIO = 0.005, 5.0
+"""Usual range of the damping ratio of a damper beside its spring under its static load."""
+USUAL_TYRE_DEFLECTION = 5e-4, 0.25
+"""Usual range of the deflection (m) of a tyre under its static load."""
 FARTHEST_STRUT = 0.7
-"""m, from a strut to its wheel sideways or along, beyond the track of a rigid axle: levers bring it inwards."""
-WHEELBASE = 0.5, 25.0
-TRACK = 0.3, 4.0
-HEIGHT = 5.0
-"""m, of a centre of mass above the ground."""
-GYRATION = {"rx": (0.15, 1.5), "ry": (0.12, 1.2), "rz": (0.12, 1.2)}
-"""Radius of gyration of what is carried, by the track in roll, by the wheelbase in pitch and yaw."""
-UPRIGHT = 0.3
-"""Vertical part of a direction from which on a spring carries."""
+"""Largest usual distance (m) from a strut to its wheel sideways or along, beyond the track of a rigid axle: levers
+bring it inwards."""
+USUAL_WHEELBASE = 0.5, 25.0
+USUAL_TRACK = 0.3, 4.0
+LARGEST_HEIGHT = 5.0
+"""Largest usual height (m) of a centre of mass above the ground."""
+USUAL_GYRATION_RATIOS = {"rx": (0.15, 1.5), "ry": (0.12, 1.2), "rz": (0.12, 1.2)}
+"""Usual ranges of the ratio of the sprung body's radius of gyration to the track in roll, and to the wheelbase in pitch
+and yaw."""
+LEAST_VERTICAL_COMPONENT = 0.3
+"""Smallest vertical component of a spring's direction with which the spring counts as carrying weight."""
 
 
 @dataclass(frozen=True)
@@ -54,35 +57,35 @@ class VehicleFigures:
 
     @cached_property
     def wheels(self) -> dict[str, tuple[Tyre, ...]]:
-        """Bodies that carry tyres, by name, with their tyres; empty if all bodies do."""
+        """Unsprung bodies, those that carry tyres, by name, with their tyres; empty if all bodies carry tyres."""
         names = dict.fromkeys(tyre.body for tyre in self.vehicle.tyres)
         tyres_of = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
         return tyres_of if len(tyres_of) < len(self.vehicle.bodies) else {}
 
     @cached_property
-    def carried(self) -> Body:
+    def sprung_body(self) -> Body:
         """The sprung body: the heaviest body that carries no tyre."""
         return max((b for b in self.vehicle.bodies if b.name not in self.wheels), key=lambda body: body.mass)
 
     @cached_property
-    def total(self) -> float:
+    def total_mass(self) -> float:
         """Mass of the whole vehicle, kg."""
         return sum(body.mass for body in self.vehicle.bodies)
 
     @cached_property
-    def held(self) -> dict[str, float]:
+    def static_forces(self) -> dict[str, float]:
         """Static forces of all tyres, springs and bars, N; InputError if a weight is not supported."""
         preloaded = preloads(replace(self.vehicle, gravity=GRAVITY))
         return preloaded.parts | preloaded.tyres
 
     @cached_property
     def wheelbase(self) -> float:
-        """Wheelbase, m; 0 for a single axle."""
+        """Wheelbase of the vehicle, m; 0 for a single axle."""
         return max(self.vehicle.axles) - min(self.vehicle.axles)
 
     @cached_property
     def track(self) -> float:
-        """Largest track width, m; 0 for a vehicle without width."""
+        """Largest track width of the vehicle, m; 0 for a vehicle without width."""
         return float(np.ptp([tyre.point[1] for tyre in self.vehicle.tyres]))
 
     def struts(self, wheel: str) -> list[SpringDamper]:
@@ -90,17 +93,19 @@ class VehicleFigures:
         return [
             s
             for s in self.vehicle.springs
-            if s.second_body is not None and wheel in (s.first_body, s.second_body) and abs(s.axis[2]) > UPRIGHT
+            if s.second_body is not None
+            and wheel in (s.first_body, s.second_body)
+            and abs(s.axis[2]) > LEAST_VERTICAL_COMPONENT
         ]
 
-    def on_joints(self, wheel: str) -> bool:
+    def has_joint_elements(self, wheel: str) -> bool:
         """Whether a joint element acts on a wheel or an axle."""
         chain = self.vehicle.chain(wheel)
         return any(e.stiffness and body in chain for e in self.vehicle.joint_elements for body, _ in e.coordinates)
 
 
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """Queries on implausible values of a vehicle, in SI, without those that the user has accepted; empty for an
+    """Findings on implausible values of a vehicle, in SI units, without those that the user has accepted; empty for an
     ordinary vehicle."""
     whole = VehicleFigures(vehicle)
     queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
@@ -116,27 +121,28 @@ def _is_unusual(value: float, usual: tuple[float, float]) -> bool:
 
 
 def _masses(figures: VehicleFigures) -> Iterator[Finding]:
-    if _is_unusual(figures.total, MASS):
+    if _is_unusual(figures.total_mass, USUAL_MASS):
         yield _query(
             "mass",
             "mass of the vehicle",
-            f"{figures.total:.4g} kg; usual are {MASS[0]:g} to {MASS[1]:g} kg. {_tonnes(figures.total)}",
-            figures.total,
+            f"{figures.total_mass:.4g} kg; usual are {USUAL_MASS[0]:g} to {USUAL_MASS[1]:g} kg. "
+            f"{_tonnes(figures.total_mass)}",
+            figures.total_mass,
             "kg",
         )
     unsprung = sum(figures.vehicle.body(name).mass for name in figures.wheels)
     if (
         figures.wheels
-        and not _is_unusual(figures.total, MASS)
-        and figures.total - unsprung < LEAST_SPRUNG_RATIO * unsprung
+        and not _is_unusual(figures.total_mass, USUAL_MASS)
+        and figures.total_mass - unsprung < LEAST_SPRUNG_RATIO * unsprung
     ):
         yield _query(
             "mass",
-            f"bodies[{figures.carried.name}].mass",
-            f"{figures.carried.mass:.4g} kg; all that is carried "
-            f"weighs {figures.total - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
-            f"{_tonnes(figures.carried.mass)}",
-            figures.carried.mass,
+            f"bodies[{figures.sprung_body.name}].mass",
+            f"{figures.sprung_body.mass:.4g} kg; all that is carried "
+            f"weighs {figures.total_mass - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
+            f"{_tonnes(figures.sprung_body.mass)}",
+            figures.sprung_body.mass,
             "kg",
         )
 
@@ -147,25 +153,28 @@ def _tonnes(value: float) -> str:
 
 def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
     metres = "Lengths are in m, not in mm"
-    for name, value, usual in (("wheelbase", figures.wheelbase, WHEELBASE), ("track", figures.track, TRACK)):
+    for name, value, usual in (
+        ("wheelbase", figures.wheelbase, USUAL_WHEELBASE),
+        ("track", figures.track, USUAL_TRACK),
+    ):
         if value and _is_unusual(value, usual):
             yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
     for body in figures.vehicle.bodies:
-        if _is_unusual(body.position[2], (-0.01, HEIGHT)):
+        if _is_unusual(body.position[2], (-0.01, LARGEST_HEIGHT)):
             yield _query(
                 "size",
                 f"bodies[{body.name}].position",
-                f"{body.position[2]:.4g} m above the ground; usual are 0 to {HEIGHT:g} m. {metres}",
+                f"{body.position[2]:.4g} m above the ground; usual are 0 to {LARGEST_HEIGHT:g} m. {metres}",
                 body.position[2],
                 "m",
             )
 
 
 def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
-    """Findings on the inertia of the sprung body: its rotations, and whether the tensor would need negative mass."""
-    body, spans = figures.carried, {"rx": figures.track, "ry": figures.wheelbase, "rz": figures.wheelbase}
-    about = dict(zip(GYRATION, np.diag(body.inertia).tolist(), strict=True))
-    for freedom, usual in GYRATION.items():
+    """Findings on the inertia of the sprung body (radii of gyration) and on tensors that would need negative mass."""
+    body, spans = figures.sprung_body, {"rx": figures.track, "ry": figures.wheelbase, "rz": figures.wheelbase}
+    about = dict(zip(USUAL_GYRATION_RATIOS, np.diag(body.inertia).tolist(), strict=True))
+    for freedom, usual in USUAL_GYRATION_RATIOS.items():
         span, inertia = spans[freedom], about[freedom]
         radius = (inertia / body.mass) ** 0.5
         if span and freedom in body.freedoms and inertia and _is_unusual(radius / span, usual):
@@ -195,9 +204,9 @@ def _struts(figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on wheels without a strut, and on struts far from their wheels."""
     for wheel, tyres in figures.wheels.items():
         struts = figures.struts(wheel)
-        if figures.on_joints(wheel):
+        if figures.has_joint_elements(wheel):
             continue
-        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != figures.carried.name:
+        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != figures.sprung_body.name:
             kind = "damper alone" if struts else "strut"
             yield _query(
                 "strut",
@@ -233,7 +242,7 @@ def _statics(figures: VehicleFigures) -> Iterator[Finding]:
     if any(_masses(figures)) or any(_sizes(figures)):
         return
     try:
-        figures.held  # noqa: B018
+        figures.static_forces  # noqa: B018
     except InputError as error:
         yield _query("load", error.place, error.allowed, 0.0, "N")
         return
@@ -243,37 +252,37 @@ def _statics(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _loads(figures: VehicleFigures) -> Iterator[Finding]:
-    weight, axles = figures.total * GRAVITY, dict[int, list[Tyre]]()
+    weight, axles = figures.total_mass * GRAVITY, dict[int, list[Tyre]]()
     for tyre in figures.vehicle.tyres:
         axles.setdefault(tyre.axle, []).append(tyre)
-        if figures.held[tyre.name] < 0:
+        if figures.static_forces[tyre.name] < 0:
             yield _query(
                 "load",
                 f"tyres[{tyre.name}]",
-                f"its static load is {figures.held[tyre.name]:.4g} N: the wheel "
+                f"its static load is {figures.static_forces[tyre.name]:.4g} N: the wheel "
                 "pulls on the road. The centre of mass lies beyond the axles, or an axle at a wrong place",
-                figures.held[tyre.name],
+                figures.static_forces[tyre.name],
                 "N",
             )
     for tyres in axles.values():
-        loads = [figures.held[tyre.name] for tyre in tyres]
+        loads = [figures.static_forces[tyre.name] for tyre in tyres]
         names = " and ".join(tyre.name for tyre in tyres)
-        if len(axles) > 1 and 0 <= sum(loads) < SHARE * weight:
+        if len(axles) > 1 and 0 <= sum(loads) < LEAST_AXLE_SHARE * weight:
             yield _query(
                 "load",
                 f"tyres[{names}]",
                 f"carry {sum(loads):.4g} N of {weight:.4g} N, "
-                f"{sum(loads) / weight:.1%}; usual are at least {SHARE:.0%} on an axle",
+                f"{sum(loads) / weight:.1%}; usual are at least {LEAST_AXLE_SHARE:.0%} on an axle",
                 sum(loads),
                 "N",
             )
         for what, unit, values in (("load", "N", loads), ("stiffness", "N/m", [tyre.stiffness for tyre in tyres])):
-            if min(values) >= 0 and max(values) > UNEVEN * min(values):
+            if min(values) >= 0 and max(values) > LARGEST_WHEEL_RATIO * min(values):
                 yield _query(
                     what,
                     f"tyres[{names}]",
                     f"the {what}s {min(values):.4g} and {max(values):.4g} {unit} of one "
-                    f"axle differ by more than {UNEVEN:g} times",
+                    f"axle differ by more than {LARGEST_WHEEL_RATIO:g} times",
                     max(values) / max(min(values), 1e-300),
                     "1",
                 )
@@ -283,75 +292,79 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the frequencies of the sprung body, from its static deflection, and of each wheel between road and
     body, and on the tyres' static deflections."""
     remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
-    sunk = _sunk(figures)
+    sunk = _static_deflection(figures)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
-    if _is_unusual(bounce, BOUNCE):
+    if _is_unusual(bounce, USUAL_BOUNCE_FREQUENCY):
         yield _query(
             "frequency",
-            f"bodies[{figures.carried.name}]",
+            f"bodies[{figures.sprung_body.name}]",
             f"sinks {sunk:.4g} m under the vehicle's weight, a "
-            f"natural frequency of {bounce:.3g} Hz; usual are {BOUNCE[0]:g} to {BOUNCE[1]:g} Hz. {remedy}",
+            f"natural frequency of {bounce:.3g} Hz; usual are {USUAL_BOUNCE_FREQUENCY[0]:g} to "
+            f"{USUAL_BOUNCE_FREQUENCY[1]:g} Hz. {remedy}",
             bounce,
             "Hz",
         )
     for wheel in figures.wheels:
-        hop = _hop(figures, wheel)
-        if hop is not None and _is_unusual(hop, HOP):
+        hop = _hop_frequency(figures, wheel)
+        if hop is not None and _is_unusual(hop, USUAL_HOP_FREQUENCY):
             yield _query(
                 "frequency",
                 f"bodies[{wheel}]",
-                f"between road and body it hops at {hop:.3g} Hz; usual are {HOP[0]:g} to {HOP[1]:g} Hz. {remedy}",
+                f"between road and body it hops at {hop:.3g} Hz; usual are {USUAL_HOP_FREQUENCY[0]:g} to "
+                f"{USUAL_HOP_FREQUENCY[1]:g} Hz. {remedy}",
                 hop,
                 "Hz",
             )
     for tyre in figures.vehicle.tyres:
-        pressed = figures.held[tyre.name] / tyre.stiffness
-        if pressed > 0 and _is_unusual(pressed, PRESSED):
+        pressed = figures.static_forces[tyre.name] / tyre.stiffness
+        if pressed > 0 and _is_unusual(pressed, USUAL_TYRE_DEFLECTION):
             yield _query(
                 "frequency",
                 f"tyres[{tyre.name}].stiffness",
                 f"{tyre.stiffness:.4g} N/m gives way by "
-                f"{pressed:.3g} m under {figures.held[tyre.name]:.4g} N; usual are {PRESSED[0]:g} to "
-                f"{PRESSED[1]:g} m. {remedy}",
+                f"{pressed:.3g} m under {figures.static_forces[tyre.name]:.4g} N; usual are "
+                f"{USUAL_TYRE_DEFLECTION[0]:g} to "
+                f"{USUAL_TYRE_DEFLECTION[1]:g} m. {remedy}",
                 pressed,
                 "m",
             )
 
 
-def _sunk(figures: VehicleFigures) -> float:
+def _static_deflection(figures: VehicleFigures) -> float:
     """Static deflection (m) of the sprung body under the weights, with springs and tyres in series."""
     vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)  # bars carry no weight
     weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     moved = np.linalg.lstsq(stiffness, np.asarray(weights), rcond=1e-12)[0]
-    return float(motion.shift(figures.carried.name, figures.carried.position)[2] @ moved)
+    return float(motion.shift(figures.sprung_body.name, figures.sprung_body.position)[2] @ moved)
 
 
-def _hop(figures: VehicleFigures, wheel: str) -> float | None:
-    """Frequency (Hz) of the vertical motion of a wheel or an axle with all other bodies fixed; None if it cannot move
-    so."""
+def _hop_frequency(figures: VehicleFigures, wheel: str) -> float | None:
+    """Natural frequency (Hz) of the vertical motion of a wheel or an axle with all other bodies fixed; None if it
+    cannot move so."""
     vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     row = motion.coordinate(wheel, "z")
-    if not row.any() or wheel == figures.carried.name:
+    if not row.any() or wheel == figures.sprung_body.name:
         return None
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)
     return float(np.sqrt((row @ stiffness @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
 
 
 def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
-    """Findings on damping ratios of the struts with the mass above them, and on different springs on one axle."""
+    """Findings on the damping ratios of struts with the mass that rests on them."""
     struts = {strut.name: strut for wheel in figures.wheels for strut in figures.struts(wheel)}
     for name, strut in struts.items():
-        stiffness, load = slopes_at_rest(strut)[0], figures.held[name]
+        stiffness, load = slopes_at_rest(strut)[0], figures.static_forces[name]
         if not (strut.damping and stiffness > 0 and load > 0):
             continue
         share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)
-        if _is_unusual(share, DAMPING):
+        if _is_unusual(share, USUAL_DAMPING_RATIO):
             yield _query(
                 "damping",
                 f"springs[{name}].damping",
                 f"{strut.damping:.4g} N s/m is {share:.2g} of the "
-                f"critical damping of what rests on it; usual are {DAMPING[0]:g} to {DAMPING[1]:g}. Damping "
+                f"critical damping of what rests on it; usual are {USUAL_DAMPING_RATIO[0]:g} to "
+                f"{USUAL_DAMPING_RATIO[1]:g}. Damping "
                 "is in N s/m, not in N s/mm",
                 share,
                 "1",

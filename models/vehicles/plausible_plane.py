@@ -1,4 +1,4 @@
-"""Queries on implausible pitch-plane vehicles: their parameters, judged as the vehicle in space that they describe."""
+"""Plausibility checks of pitch-plane vehicles, by the checks of the equivalent vehicle in space."""
 
 from collections.abc import Sequence
 
@@ -11,14 +11,13 @@ UP = (0.0, 0.0, 1.0)
 
 
 def plausible_plane(p: Parameters, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """Queries on implausible values of a pitch-plane parameter set, as ``plausible`` gives them, under the parameters'
+    """Findings on implausible values of a pitch-plane parameter set, as ``plausible`` gives them, under the parameters'
     symbols."""
-    return plausible(in_space(p), accept)
+    return plausible(equivalent_spatial_vehicle(p), accept)
 
 
-def in_space(p: Parameters) -> SpatialVehicle:
-    """Spatial vehicle without width that equals a parameter set. Its wheels are 0.3 m and its chassis 0.6 m above the
-    ground, which has no influence. Its parts have the names of the parameters."""
+def equivalent_spatial_vehicle(p: Parameters) -> SpatialVehicle:
+    """Vehicle in space without width that is equivalent to a pitch-plane parameter set."""
     chassis, still = "chassis: m3, I", ((0.0,) * 3,) * 3
     ends = (
         ("front", p.b, p.m1, p.k1, p.d1, p.k3, p.d3, "m1", "k1, d1", "k3, d3"),

@@ -1,4 +1,4 @@
-"""Joint elements along slides as spring-dampers between points: the same law, for systems that have no other.
+"""Replacement of joint elements along slides by spring-dampers between points, for systems that have no joint elements.
 
 A body slides along the axes of what carries it. So the sum of its slides is the travel of a spring between it and its
 carrier along an axis fixed there, and the difference of two slides on one carrier that of a spring between both bodies.
@@ -13,7 +13,8 @@ from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Spri
 
 
 def sliding_springs(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with spring-dampers in place of all joint elements; InputError if one cannot be replaced."""
+    """The vehicle with equivalent spring-dampers in place of all joint elements. Raises InputError if one cannot be
+    replaced."""
     springs = tuple(_spring(vehicle, element) for element in vehicle.joint_elements)
     return replace(vehicle, springs=(*vehicle.springs, *springs), joint_elements=())
 

@@ -1,4 +1,5 @@
-"""Engine-neutral description of a vehicle in space: the one source of Exudyn, MuJoCo and the analytic M, D, K.
+"""Engine-neutral description of a vehicle in space, from which Exudyn, MuJoCo and the analytic mass, damping and
+stiffness matrices are built.
 
 Axes of ride (see ``models.ride``): x forward, y left, z up from the ground. Every point is given in metres where it
 lies in the **design position**, all coordinates zero, in which every body is parallel to the axes. The laws below are
@@ -23,7 +24,7 @@ Freedom = Literal["x", "y", "z", "rx", "ry", "rz"]
 FREEDOMS: tuple[Freedom, ...] = ("x", "y", "z", "rx", "ry", "rz")
 """Order in which the freedoms of a body are applied and counted."""
 PARALLEL: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-"""Directions of the freedoms of a body unless it says otherwise: along the vehicle's axes."""
+"""Directions of a body's freedoms by default: along the vehicle's axes."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,8 @@ class Body:
 
 @dataclass(frozen=True)
 class JointElement:
-    """Spring, damper, constant force and geared rotor along a sum of coordinates, d = sum of factor q.
+    """Spring, damper, constant force and geared rotor along a sum of coordinates, d = sum of factor q over coordinates
+    q.
 
     F = held + stiffness d + damping d' + inertia d'' acts as -factor F on each of the ``coordinates`` (body, freedom).
     held (N or N m), stiffness (N/m, N m/rad), damping (N s/m, N m s/rad), inertia (kg, kg m^2): of what turns with d
@@ -72,7 +74,7 @@ class JointElement:
     factors: tuple[float, ...]
     stiffness: float = 0.0
     damping: float = 0.0
-    held: float = 0.0
+    preload: float = 0.0
     inertia: float = 0.0
 
 
@@ -87,12 +89,12 @@ class Curve:
     forces: tuple[float, ...]
 
     def __call__(self, argument: float) -> float:
-        """Force (N) at a travel or rate."""
+        """Force (N) of the curve at a travel (m) or rate (m/s)."""
         i = self._piece_of(argument)
         return self.forces[i] + self._slopes[i] * (argument - self.arguments[i])
 
     def slope_at_rest(self) -> float:
-        """Slope at 0. At a corner it is the mean of both sides, as a central difference gives."""
+        """Slope of the curve at 0. At a corner it is the mean of both sides, as a central difference gives."""
         slopes, at = self._slopes, self._piece_of(0.0)
         if self.arguments[at] == 0.0 and at > 0:
             return 0.5 * (slopes[at - 1] + slopes[at])
@@ -111,13 +113,14 @@ class Curve:
         return [(f[i + 1] - f[i]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
 
     def _piece_of(self, argument: float) -> int:
-        """Index of the straight piece for the argument; outer pieces extend to infinity."""
+        """Index of the curve's straight piece that contains the argument; outer pieces extend to infinity."""
         return bisect_right(self.arguments, argument, 1, len(self.arguments) - 1) - 1
 
 
 @dataclass(frozen=True)
 class SpringDamper:
-    """Spring, damper, curves and dry friction between p1 fixed to ``first_body`` and p2 to ``second_body``.
+    """Spring, damper, force curves and dry friction between a point p1 fixed to ``first_body`` and a point p2 fixed to
+    ``second_body``.
 
     With a = ``axis`` (a unit vector fixed in ``frame``) and d = a . (p2 - p1) less its value in the design position,
 
@@ -148,14 +151,14 @@ class SpringDamper:
     frame: str | None = None
 
     @property
-    def bent(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether the spring is nonlinear: it has curves or dry friction."""
         return bool(self.travel_force or self.rate_force or self.friction)
 
 
 @dataclass(frozen=True)
 class AntiRollBar:
-    """A bar between a body that rolls and the points ``left`` and ``right`` of an axle's bodies.
+    """Anti-roll bar between a body that rolls and the points ``left`` and ``right`` of an axle's bodies.
 
     With e = rx - (h_left - h_right) / (y_left - y_right), rx the body's own roll coordinate (rad) and h how far each
     point has risen from its design position along z of ``frame``, the moment M = M0 + stiffness e + damping e' (N m)
@@ -176,13 +179,14 @@ class AntiRollBar:
 
     @property
     def track(self) -> float:
-        """Lateral distance (m) of the two points, positive."""
+        """Lateral distance (m) of the two points of the bar, positive."""
         return self.point_left[1] - self.point_right[1]
 
 
 @dataclass(frozen=True)
 class Tyre:
-    """A wheel on the road: F = F0 + stiffness (zeta - h) + damping (zeta' - h'), up, at ``point`` of ``body``.
+    """Vertical spring and damper of a wheel on the road: F = F0 + stiffness (zeta - h) + damping (zeta' - h'), up, at
+    ``point`` of ``body``.
 
     h is how far the point has risen from its design position, zeta the height of the road under it (m). ``axle``
     counts from the front, 0 first. The point is the centre of a wheel, or one end of a rigid axle. A tyre that
@@ -219,7 +223,8 @@ class SideForce:
 
 @dataclass(frozen=True)
 class Drag:
-    """Force -coefficient v x' along x at the centre of ``body``; x' is its motion beside the speed v (m/s).
+    """Aerodynamic drag force -coefficient v x' along x at the centre of ``body``; x' is its velocity relative to the
+    vehicle's speed v (m/s).
 
     coefficient in N s^2/m^2.
     """
@@ -236,7 +241,7 @@ TyreKind = Literal["tyre force", "tyre deflection"]
 
 @dataclass(frozen=True)
 class PointOutput:
-    """Acceleration (m/s^2), velocity (m/s) or displacement (m) of a point of a body along ``axis``."""
+    """Output of a point of a body along ``axis``: acceleration (m/s^2), velocity (m/s) or displacement (m)."""
 
     name: str
     kind: PointKind
@@ -247,8 +252,8 @@ class PointOutput:
 
 @dataclass(frozen=True)
 class TurnOutput:
-    """Rotation of a body about ``axis``: its angular acceleration (rad/s^2), angular velocity (rad/s), or small angle
-    (rad)."""
+    """Output of a body's rotation about ``axis``: its angular acceleration (rad/s^2), angular velocity (rad/s), or
+    small angle (rad)."""
 
     name: str
     kind: TurnKind
@@ -258,8 +263,8 @@ class TurnOutput:
 
 @dataclass(frozen=True)
 class PartOutput:
-    """Output of a spring-damper: travel d (m), its rate (m/s), or force less preload (N); of a bar: e, e' or its
-    moment."""
+    """Output of a spring-damper: travel d (m), its rate (m/s), or force minus preload (N); of a bar: twist angle, its
+    rate or its moment."""
 
     name: str
     kind: PartKind
@@ -268,8 +273,8 @@ class PartOutput:
 
 @dataclass(frozen=True)
 class TyreOutput:
-    """Output of a tyre: force less static load (N, positive when the tyre presses harder), or deflection zeta - h
-    (m)."""
+    """Output of a tyre: force minus static load (N, positive when the tyre presses harder), or deflection zeta - h (m)
+    of road height zeta minus wheel rise h."""
 
     name: str
     kind: TyreKind
@@ -278,7 +283,8 @@ class TyreOutput:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits that make up a reduced vehicle, for small motion only.
+    """Limits that make up a reduced vehicle, for small motion only: bodies without mass, rigid springs, locked
+    freedoms.
 
     Names of ``massless`` bodies and ``rigid`` springs, and ``locked`` freedoms as (body, freedom). Rigid springs and
     locked freedoms leave q = N r with fewer coordinates r; bodies without mass leave a mass matrix that may be singular
@@ -300,7 +306,7 @@ SpatialOutput = PointOutput | TurnOutput | PartOutput | TyreOutput
 
 @dataclass(frozen=True)
 class SpatialVehicle:
-    """Bodies (parents before their children), what acts between them, and what is read.
+    """Vehicle in space: bodies (parents before their children), forces between them, and outputs.
 
     ``gravity`` (m/s^2) acts along -z on every body. At 0 the vehicle is unloaded; above, the spring-dampers, bars
     and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
@@ -327,7 +333,7 @@ class SpatialVehicle:
     towed: tuple[str, ...] = ()
 
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
-        """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""
+        """Coordinates of the vehicle in the order of the state: body by body, freedoms in the order of FREEDOMS."""
         return tuple((body.name, freedom) for body in self.bodies for freedom in FREEDOMS if freedom in body.freedoms)
 
     @property
@@ -340,7 +346,7 @@ class SpatialVehicle:
         return replace(self, tyres=tuple(replace(tyre, pushes_only=pushes_only) for tyre in self.tyres))
 
     def in_frame(self, frame: str) -> "SpatialVehicle":
-        """The vehicle in which every spring and bar without a frame gets the body ``frame``."""
+        """The vehicle in which every spring and bar without a frame gets the body ``frame`` as its frame."""
         return replace(
             self,
             springs=tuple(replace(spring, frame=spring.frame or frame) for spring in self.springs),
@@ -348,15 +354,16 @@ class SpatialVehicle:
         )
 
     def body(self, name: str) -> Body:
-        """The body with a given name; KeyError if there is none."""
+        """The body with this name; KeyError if there is none."""
         return {body.name: body for body in self.bodies}[name]
 
     def chain(self, name: str | None) -> tuple[str, ...]:
-        """A body and all bodies that carry it, down to the one without parent; empty for None, the ground."""
+        """Names of a body and of all bodies that carry it, down to the one without parent; empty for None, the
+        ground."""
         return () if name is None else (name, *self.chain(self.body(name).parent))
 
     def towed_under(self, name: str | None) -> str | None:
-        """The towed body that is, or carries, the given body; None if there is none."""
+        """Name of the towed body that is, or carries, the given body; None if there is none."""
         return next((body for body in self.chain(name) if body in self.towed), None)
 
     def turns(self, name: str | None) -> bool:
@@ -370,5 +377,5 @@ def hitch_of(towed: str) -> str:
 
 
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
-    """Inertia (3, 3) of a point mass at an arm (3,), kg m^2."""
+    """Inertia (3, 3) of a point mass (kg) at an arm (3,) in m, in kg m^2."""
     return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))

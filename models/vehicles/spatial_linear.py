@@ -1,4 +1,5 @@
-"""M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
+"""Mass, damping and stiffness matrices, road inputs and outputs of a vehicle in space, for small motion about its
+design position."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,15 +24,16 @@ from models.vehicles.spatial import (
 )
 
 NEGLIGIBLE_TRAVEL = 1e-10
-"""Share of the largest one below which a travel of a reduced vehicle counts as none."""
+"""Share of the largest travel below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
-"""Stiffness and damping."""
+"""Stiffness and damping of a spring (N/m, N s/m)."""
 
 
 def linearise(
     vehicle: SpatialVehicle, speed: float | None = None, equivalent: Mapping[str, Gains] | None = None
 ) -> LinearVehicle:
-    """M q'' + D q' + K q = R z + S z' about the design position: without gravity unloaded, with it the equilibrium.
+    """Linear vehicle M q'' + D q' + K q = R z + S z' for small motion about the design position, unloaded without
+    gravity, in equilibrium with it.
 
     speed : m/s, above 0, wanted by side forces and drag only; InputError where they miss it.
     Tyres that may leave the road are on it.
@@ -49,8 +51,8 @@ def linearise(
     for row, k, c in (*parts.values(), *tyres.values()):
         stiffness += k * np.outer(row, row)
         damping += c * np.outer(row, row)
-    stiffness += _geometric(vehicle, motion)
-    _speed_forces(vehicle, motion, speed, damping, stiffness)
+    stiffness += _geometric_stiffness(vehicle, motion)
+    _add_speed_forces(vehicle, motion, speed, damping, stiffness)
     whole = LinearVehicle(
         mass=mass(vehicle),
         damping=damping,
@@ -63,23 +65,27 @@ def linearise(
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
     limits = vehicle.limits
-    return limited(whole, massless(vehicle, limits.massless), free(vehicle, limits)) if limits else whole
+    return (
+        reduced_vehicle(whole, mass_matrix_without(vehicle, limits.massless), remaining_motions(vehicle, limits))
+        if limits
+        else whole
+    )
 
 
 def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
-    """Positions of the tyres' contacts with the road."""
+    """Positions of the contacts of a vehicle's tyres with the road."""
     return tuple(WheelPosition(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
 def outputs(vehicle: SpatialVehicle, motion: Kinematics) -> tuple[Output, ...]:
-    """``Output`` of every output: from the ``motion`` of points (possibly an engine's), and the slopes of the springs
-    at rest."""
+    """``Output`` of every output of a vehicle: from the ``motion`` of points (possibly an engine's), and the slopes of
+    the springs at rest."""
     parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
 def mass(vehicle: SpatialVehicle) -> np.ndarray:
-    """Mass matrix (n, n) in the design position: kg, kg m, kg m^2."""
+    """Mass matrix (n, n) of a vehicle in the design position: kg, kg m, kg m^2."""
     motion = Kinematics(vehicle)
     total = np.zeros((motion.size, motion.size))
     for body in vehicle.bodies:
@@ -92,7 +98,8 @@ def mass(vehicle: SpatialVehicle) -> np.ndarray:
 
 
 def slopes_at_rest(spring: SpringDamper) -> Gains:
-    """Stiffness (N/m) and damping (N s/m) for small motion: linear terms, and slopes of curves and friction at rest."""
+    """Stiffness (N/m) and damping (N s/m) of a spring for small motion: linear terms, and slopes of curves and friction
+    at rest."""
     travel, rate = spring.travel_force, spring.rate_force
     return (
         spring.stiffness + (travel.slope_at_rest() if travel else 0.0),
@@ -101,15 +108,15 @@ def slopes_at_rest(spring: SpringDamper) -> Gains:
 
 
 class Preloads(NamedTuple):
-    """Static forces F0 by name: of spring-dampers (N), bars (N m), joint elements (N, N m) and tyres (N); all 0 without
-    gravity."""
+    """Static forces of a vehicle's parts by name: of spring-dampers (N), bars (N m), joint elements (N, N m) and tyres
+    (N); all 0 without gravity."""
 
     parts: dict[str, float]
     tyres: dict[str, float]
 
 
 def preloads(vehicle: SpatialVehicle) -> Preloads:
-    """Preloads that hold the design position against gravity; a tyre's is its static wheel load.
+    """Preloads that hold a vehicle in its design position against gravity; that of a tyre is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
     sunk by K^-1 times the weights. InputError where no spring can carry a weight, and for a tyre that only pushes
@@ -136,17 +143,19 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     return Preloads({name: k * float(row @ sunk) for name, (row, k, _) in parts.items()}, loads)
 
 
-Part = tuple[np.ndarray, float, float]
-"""Row (n,) of a deformation by the coordinates, stiffness, damping."""
+DeformationRow = tuple[np.ndarray, float, float]
+"""A spring, bar or tyre for small motion: row (n,) of its deformation per coordinate, stiffness, damping."""
 
 
 def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
     return {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
 
 
-def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
-    """Rows and gains of spring-dampers, bars and joint elements, by name."""
-    rows = dict[str, Part]()
+def _parts_by_name(
+    vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]
+) -> dict[str, DeformationRow]:
+    """Rows and gains of a vehicle's spring-dampers, bars and joint elements, by name."""
+    rows = dict[str, DeformationRow]()
     for spring in vehicle.springs:
         ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
             spring.first_body, spring.first_point
@@ -156,31 +165,33 @@ def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[s
             motion.turned_axis(spring.frame, spring.axis),
         )
         rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
-    rows |= {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
+    rows |= {bar.name: (_bar_twist_row(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
     return rows | {e.name: (_joint_row(motion, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
 
 
 def _joint_row(motion: Kinematics, element: JointElement) -> np.ndarray:
-    """Row (n,) of factors in the displacement d of a joint element, which is linear in the coordinates."""
+    """Row (n,) of the coordinates' factors in the displacement d of a joint element, which is linear in the
+    coordinates."""
     places = zip(element.coordinates, element.factors, strict=True)
     return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
 
 
-def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
-    """Row (n,) of factors in the twist angle of a bar, whose vertical direction turns with its frame."""
+def _bar_twist_row(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
+    """Row (n,) of the coordinates' factors in the twist angle of a bar, whose vertical direction turns with its
+    frame."""
     risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
     turning = np.subtract(bar.point_right, bar.point_left) @ motion.turned_axis(bar.frame, (0.0, 0.0, 1.0))
     rolls = 0.0 if bar.frame == bar.body else motion.coordinate(bar.body, "rx")
     return rolls - risen / bar.track + turning / bar.track
 
 
-def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
+def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, DeformationRow]:
     return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
 
 
-def preloaded(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
-    """The vehicle with the preloads of its joint elements in them."""
-    elements = tuple(replace(element, held=preloads.parts[element.name]) for element in vehicle.joint_elements)
+def with_preloads(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
+    """The vehicle with the preloads of its joint elements included in these."""
+    elements = tuple(replace(element, preload=preloads.parts[element.name]) for element in vehicle.joint_elements)
     return replace(vehicle, joint_elements=elements)
 
 
@@ -190,7 +201,7 @@ def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
-def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+def _geometric_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     """Geometric stiffness (n, n) from weights and preloads whose lever arms change: -sum of force times second
     derivative."""
     total = np.zeros((motion.size, motion.size))
@@ -198,22 +209,22 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
         return total
     held = preloads(vehicle)
     for body in vehicle.bodies:
-        total += body.mass * vehicle.gravity * motion.bend(body.name, body.position)[2]
+        total += body.mass * vehicle.gravity * motion.second_derivatives(body.name, body.position)[2]
     for spring in vehicle.springs:
         ends = (spring.first_body, spring.first_point), (spring.second_body, spring.second_point)
-        total += held.parts[spring.name] * motion.travel_bend(*ends, spring.axis, spring.frame)
+        total += held.parts[spring.name] * motion.travel_second_derivatives(*ends, spring.axis, spring.frame)
     for bar in vehicle.bars:
         ends = (bar.left, bar.point_left), (bar.right, bar.point_right)
-        total += held.parts[bar.name] / bar.track * motion.travel_bend(*ends, (0.0, 0.0, 1.0), bar.frame)
+        total += held.parts[bar.name] / bar.track * motion.travel_second_derivatives(*ends, (0.0, 0.0, 1.0), bar.frame)
     for tyre in vehicle.tyres:
-        total -= held.tyres[tyre.name] * motion.bend(tyre.body, tyre.point)[2]
+        total -= held.tyres[tyre.name] * motion.second_derivatives(tyre.body, tyre.point)[2]
     return total
 
 
-def _speed_forces(
+def _add_speed_forces(
     vehicle: SpatialVehicle, motion: Kinematics, speed: float | None, damping: np.ndarray, stiffness: np.ndarray
 ) -> None:
-    """Add the contributions of side forces and drag to damping and stiffness in place."""
+    """Add the contributions of side forces and drag at a speed (m/s) to the damping and stiffness matrices in place."""
     if not vehicle.side_forces and not vehicle.drags:
         return
     if speed is None or not speed > 0:
@@ -243,17 +254,17 @@ UNITS = {
     "tyre force": "N",
     "tyre deflection": "m",
 }
-"""Unit of each kind of output; of an anti-roll bar and of a joint element that turns rad, rad/s and N m."""
+"""Unit of each kind of output; for an anti-roll bar, and for a joint element that rotates, rad, rad/s and N m."""
 
 
 def _output(
     spec: SpatialOutput,
     vehicle: SpatialVehicle,
     motion: Kinematics,
-    parts: Mapping[str, Part],
-    tyres: Mapping[str, Part],
+    parts: Mapping[str, DeformationRow],
+    tyres: Mapping[str, DeformationRow],
 ) -> Output:
-    """Rows of one output."""
+    """``Output`` with the factors of an output of the vehicle."""
     rows = np.zeros((3, motion.size))  # of q, q', q''
     road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
     unit, order = UNITS[spec.kind], 2 if "acceleration" in spec.kind else int("velocity" in spec.kind)
@@ -276,12 +287,13 @@ def _output(
 
 
 def _is_angle(element: JointElement) -> bool:
-    """Whether the d of a joint element is an angle."""
+    """Whether the displacement d of a joint element is an angle."""
     return all(freedom.startswith("r") for _, freedom in element.coordinates)
 
 
-def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
-    """Linear vehicle in the remaining coordinates r with q = N r; the mass matrix may be singular.
+def reduced_vehicle(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
+    """Linear vehicle in the remaining coordinates r of a reduced vehicle, with q = N r; the mass matrix may be
+    singular.
 
     mass_matrix : (n, n) of ``massless``; N : (n, r) of ``free``. InputError where no coordinate is left.
     """
@@ -304,17 +316,17 @@ def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> Li
     )
 
 
-def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
-    """Mass matrix (n, n) without the given bodies; no rounding residue of them remains."""
+def mass_matrix_without(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
+    """Mass matrix (n, n) of a vehicle without the mass of the given bodies; no rounding residue of them remains."""
     light = tuple(
         replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
     )
     return mass(replace(vehicle, bodies=light))
 
 
-def free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
-    """Matrix N (n, r) of the remaining motions: unit vectors where only coordinates are locked, else a basis of motions
-    that leave the rigid springs' lengths unchanged."""
+def remaining_motions(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+    """Matrix N (n, r) of the motions that remain to a reduced vehicle: unit vectors where only coordinates are locked,
+    else a basis of motions that leave the rigid springs' lengths unchanged."""
     coordinates = vehicle.coordinates()
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
     if not limits.rigid:

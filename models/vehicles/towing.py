@@ -1,4 +1,4 @@
-"""What a towed body weighs on its hitch, and a line of a plan on both."""
+"""Static load of a towed body on its hitch, and a line of text about it."""
 
 from models.vehicles.spatial import SpatialVehicle, hitch_of
 from models.vehicles.spatial_linear import Preloads
@@ -14,7 +14,7 @@ def hitch_load(vehicle: SpatialVehicle, preloads: Preloads, towed: str) -> float
 
 
 def hitch_line(vehicle: SpatialVehicle, preloads: Preloads, towed: str) -> str:
-    """Text on a towed body: which body tows it, position and freedoms of its hitch, and static load on the hitch
+    """Text about a towed body: which body tows it, position and freedoms of its hitch, and static load on the hitch
     (N)."""
     hitch, load = vehicle.body(hitch_of(towed)), hitch_load(vehicle, preloads, towed)
     x, y, z = hitch.position

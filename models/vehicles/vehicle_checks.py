@@ -1,4 +1,4 @@
-"""Checks of a vehicle as a whole, before any number is computed from it."""
+"""Checks that a vehicle is possible, before any number is computed from it."""
 
 from collections import defaultdict
 
@@ -12,16 +12,16 @@ from models.vehicles.spatial_linear import mass
 GROUND = "the ground"
 
 
-def check(vehicle: SpatialVehicle, file: str) -> None:
-    """Raise InputError with the name of the entry that makes the vehicle impossible."""
-    _bodies(vehicle, file)
-    _connected(vehicle, file)
-    _inert(vehicle, file)
-    _movable(vehicle, file)
-    _towed(vehicle, file)
+def check_vehicle(vehicle: SpatialVehicle, file: str) -> None:
+    """Raise InputError with the name of the entry in the vehicle file that makes the vehicle impossible."""
+    _check_bodies(vehicle, file)
+    _check_connections(vehicle, file)
+    _check_inertia(vehicle, file)
+    _check_mobility(vehicle, file)
+    _check_towing(vehicle, file)
 
 
-def _bodies(vehicle: SpatialVehicle, file: str) -> None:
+def _check_bodies(vehicle: SpatialVehicle, file: str) -> None:
     for body in vehicle.bodies:
         place = f"bodies[{body.name}]"
         if len(set(body.freedoms)) < len(body.freedoms):
@@ -35,9 +35,9 @@ def _bodies(vehicle: SpatialVehicle, file: str) -> None:
             raise InputError(file, f"{place}.inertia", tensor.tolist(), said)
 
 
-def _connected(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that springs, tyres and bars connect every body to the ground, and that no moving body is held by its
-    joint alone."""
+def _check_connections(vehicle: SpatialVehicle, file: str) -> None:
+    """Raise InputError unless springs, tyres and bars connect every body to the ground, and no moving body is held by
+    its joint alone."""
     beside = defaultdict[str, set[str]](set)
     for first, two in _links(vehicle):
         beside[first].add(two)
@@ -67,8 +67,8 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
     return springs + tyres + bars + along
 
 
-def _inert(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
+def _check_inertia(vehicle: SpatialVehicle, file: str) -> None:
+    """Raise InputError unless every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
     definite."""
     matrix, coordinates = mass(vehicle), vehicle.coordinates()
     for (name, freedom), inertia in zip(coordinates, matrix.diagonal(), strict=True):
@@ -83,8 +83,8 @@ def _inert(vehicle: SpatialVehicle, file: str) -> None:
         raise InputError(file, f"bodies[{name}].inertia", None, said)
 
 
-def _movable(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that every tyre can move vertically, and a chassis with side forces laterally."""
+def _check_mobility(vehicle: SpatialVehicle, file: str) -> None:
+    """Raise InputError unless every tyre can move vertically, and a chassis with side forces laterally."""
     motion = Kinematics(vehicle)
     for tyre in vehicle.tyres:
         if not motion.shift(tyre.body, tyre.point)[2].any():
@@ -95,8 +95,8 @@ def _movable(vehicle: SpatialVehicle, file: str) -> None:
             raise InputError(file, f"tyres[{force.name}].cornering", force.stiffness, said)
 
 
-def _towed(vehicle: SpatialVehicle, file: str) -> None:
-    """Require that every towed body, and the vehicle that tows it, has wheels."""
+def _check_towing(vehicle: SpatialVehicle, file: str) -> None:
+    """Raise InputError unless every towed body, and the vehicle that tows it, has wheels."""
     on_wheels = {vehicle.towed_under(tyre.body) for tyre in vehicle.tyres}
     for name in vehicle.towed:
         if name not in on_wheels:

@@ -1,4 +1,4 @@
-"""A vehicle file becomes a vehicle in space: read strictly, checked as a whole, every fault told by its entry."""
+"""Reading of a vehicle file in TOML into a vehicle in space: strict, with checks, every fault named by its entry."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,7 +30,7 @@ from models.vehicles.spatial import (
     Vector,
     hitch_of,
 )
-from models.vehicles.vehicle_checks import check
+from models.vehicles.vehicle_checks import check_vehicle
 from models.vehicles.vehicle_tables import (
     AxleTable,
     BarTable,
@@ -44,53 +44,60 @@ from models.vehicles.vehicle_tables import (
 )
 
 GROUND = "ground"
-SHIPPED = Path(__file__).parent / "parameters" / "vehicles"
+SHIPPED_FOLDER = Path(__file__).parent / "parameters" / "vehicles"
 
 
-def shipped() -> tuple[str, ...]:
+def shipped_vehicles() -> tuple[str, ...]:
     """Names of the vehicles that come with twinrig."""
-    return tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
+    return tuple(sorted(path.stem for path in SHIPPED_FOLDER.glob("*.toml")))
 
 
 def load_vehicle(
-    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False, towing: bool = False
+    name: str,
+    folder: str | Path = ".",
+    file: str = "",
+    place: str = "",
+    allows_reduced: bool = False,
+    allows_towing: bool = False,
 ) -> SpatialVehicle:
-    """A vehicle that comes with twinrig, by its name, or a user's TOML file, relative to ``folder``; unloaded.
+    """The unloaded vehicle that comes with twinrig under a name, or that a user's TOML file, relative to ``folder``,
+    describes.
 
-    ``file`` and ``place`` say who asked for it, for the message if there is none. reduced : may it have [reduced]?
-    towing : may it tow bodies by a hitch? Raises InputError.
-    """
+    ``file`` and ``place`` say who asked for it, for the message if there is none. allows_reduced : may it have
+    [reduced]? allows_towing : may it tow bodies by a hitch? Raises InputError."""
     path = vehicle_path(name, folder, file, place)
     vehicle = build_vehicle(parse(path), path.name)
-    if vehicle.limits and not reduced:
+    if vehicle.limits and not allows_reduced:
         raise InputError(
             file,
             place,
             name,
             "has a table [reduced], which only the study ride of linear vehicles reads: name the whole vehicle here",
         )
-    if vehicle.towed and not towing:
+    if vehicle.towed and not allows_towing:
         allowed = f"tows {vehicle.towed[0]!r} by a hitch, which only handling and braking drive: name a vehicle alone"
         raise InputError(file, place, name, allowed)
     return vehicle
 
 
 def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str = "") -> Path:
-    """Path of the file that ``load_vehicle`` reads for a vehicle; raises InputError."""
+    """Path of the file that ``load_vehicle`` reads for a vehicle. Raises InputError."""
     if not name.endswith(".toml"):
-        if name not in shipped():
-            raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped())
-        return SHIPPED / f"{name}.toml"
+        if name not in shipped_vehicles():
+            raise InputError(
+                file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped_vehicles()
+            )
+        return SHIPPED_FOLDER / f"{name}.toml"
     return existing_file(name, Path(folder), file, place)
 
 
 def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:
-    """The vehicle of nested tables as a TOML file holds them; raises InputError for the first fault."""
+    """The vehicle from nested tables as a TOML file contains them. Raises InputError for the first fault."""
     return _Builder(_read(table, file), file).vehicle()
 
 
 def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
-    """The checked tables. An error inside a list of tables is reported with the name of the entry."""
+    """Checked tables of a vehicle file. An error inside a list of tables is reported with the name of the entry."""
     try:
         return read(VehicleTable, table, file)
     except InputError as error:
@@ -100,16 +107,16 @@ def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
         section, number = place[1], int(place[2])
         entry = table[section][number]
         name = entry.get("name") if isinstance(entry, Mapping) else None
-        told = _place_of_key(section, name or number) + error.place[place.end() :]
+        told = _key_path(section, name or number) + error.place[place.end() :]
         raise InputError(file, told, error.value, error.allowed) from None
 
 
-def _place_of_key(table: str, entry: object, key: str = "") -> str:
-    return f"{table}[{entry}]" + (f".{key}" if key else "")
+def _key_path(table: str, entry_name: object, key: str = "") -> str:
+    return f"{table}[{entry_name}]" + (f".{key}" if key else "")
 
 
 class _Builder:
-    """Builds the parts of a vehicle from the tables of one file."""
+    """Builder of the parts of a vehicle from the tables of a vehicle file."""
 
     def __init__(self, tables: VehicleTable, file: str) -> None:
         self.tables, self.file = tables, file
@@ -123,7 +130,7 @@ class _Builder:
         self.tyres = {tyre.name: self._tyre(tyre) for tyre in tables.tyres}
 
     def vehicle(self) -> SpatialVehicle:
-        """The vehicle, checked as a whole."""
+        """The complete vehicle, after checks."""
         tables = self.tables
         springs = (*map(self._spring, tables.springs), *self._mounts(), *map(self._seat_spring, tables.seats))
         bars = tuple(map(self._bar, tables.anti_roll_bars))
@@ -142,7 +149,7 @@ class _Builder:
             outputs=tuple(self._output(output, parts) for output in tables.outputs),
             towed=self.towed,
         )
-        check(vehicle, self.file)
+        check_vehicle(vehicle, self.file)
         return replace(vehicle, limits=self._limits(vehicle))
 
     def _limits(self, vehicle: SpatialVehicle) -> Limits:
@@ -158,15 +165,15 @@ class _Builder:
         locked = frozenset(place for place in places if list(place) in table.locked)
         return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
 
-    def _require(self, right: Any, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
-        """Raise InputError unless the condition ``right`` holds."""
-        if not right:
+    def _require(self, condition: Any, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
+        """Raise InputError unless the condition ``condition`` holds."""
+        if not condition:
             raise InputError(self.file, place, value, allowed, tuple(choices))
 
     def _unique(self, table: str, entries: Sequence[Any], reserved: Sequence[str] = ()) -> None:
         names = [entry.name for entry in entries]
         for i, name in enumerate(names):
-            place = _place_of_key(table, name, "name")
+            place = _key_path(table, name, "name")
             self._require(name not in reserved, place, name, "this name means the ground: choose another")
             self._require(name not in names[:i], place, name, "two entries have this name")
 
@@ -184,11 +191,11 @@ class _Builder:
         names, done = tuple(waiting), dict[str, Body]()
         for body in self.tables.bodies:
             if body.parent is not None:
-                self._known_name(_place_of_key("bodies", body.name, "parent"), body.parent, "body", names)
+                self._known_name(_key_path("bodies", body.name, "parent"), body.parent, "body", names)
         while waiting:
             first = next(iter(waiting.values()))
             ready = next((body for body in waiting.values() if body.parent is None or body.parent in done), None)
-            place = _place_of_key("bodies", first.name, "parent")
+            place = _key_path("bodies", first.name, "parent")
             self._require(ready, place, first.parent, "bodies ride on one another")
             assert ready is not None
             (xx, yy, zz), (xy, xz, yz) = ready.inertia, ready.products
@@ -203,8 +210,8 @@ class _Builder:
         return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
 
     def _hitch(self, body: Body, point: Vector) -> Body:
-        """Massless body with the rotations of a towed one, at the point where its parent tows it."""
-        place, name = _place_of_key("bodies", body.name), hitch_of(body.name)
+        """Massless body with the rotations of a towed body, at the point where its parent tows it."""
+        place, name = _key_path("bodies", body.name), hitch_of(body.name)
         self._require(
             body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
         )
@@ -215,7 +222,7 @@ class _Builder:
         return Body(name, 0.0, point, body.freedoms, parent=body.parent)
 
     def _towed_under(self, name: str | None) -> str | None:
-        """The towed body that is, or carries, the given body."""
+        """Name of the towed body that is, or carries, the given body; None if there is none."""
         while name is not None and name not in self.towed:
             name = self.bodies[name].parent
         return name
@@ -225,17 +232,17 @@ class _Builder:
         axles = {axle.name: axle for axle in self.tables.axles}
         for before, axle in pairwise(axles.values()):
             allowed = f"axles are listed from the front: must lie behind {before.name!r}, below {before.x:g} m"
-            self._require(axle.x < before.x, _place_of_key("axles", axle.name, "x"), axle.x, allowed)
+            self._require(axle.x < before.x, _key_path("axles", axle.name, "x"), axle.x, allowed)
         named = {
-            self._known_name(_place_of_key("tyres", tyre.name, "axle"), tyre.axle, "axle", tuple(axles))
+            self._known_name(_key_path("tyres", tyre.name, "axle"), tyre.axle, "axle", tuple(axles))
             for tyre in self.tables.tyres
         }
         for name in axles:
-            self._require(name in named, _place_of_key("axles", name), None, "no tyre names this axle")
+            self._require(name in named, _key_path("axles", name), None, "no tyre names this axle")
         return axles
 
     def _spring(self, spring: SpringTable) -> SpringDamper:
-        place = _place_of_key("springs", spring.name)
+        place = _key_path("springs", spring.name)
         ends, points = self._two_bodies(place, spring.bodies), self._points(place, spring)
         axis = self._axis(place, spring, points)
         gains = spring.stiffness, spring.damping
@@ -256,14 +263,15 @@ class _Builder:
         )
 
     def _frame(self, place: str, name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
-        """The frame: the body that the table names, else the towed body that carries both ends, if any."""
+        """Name of the body in which an axis is fixed: the body that the table names, else the towed body that carries
+        both ends, if any."""
         if name is not None:
             return self._body(f"{place}.frame", name)
         first, second = map(self._towed_under, end_bodies)
         return first if first == second else None
 
     def _two_bodies(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
-        """The two bodies that a part connects; None for the ground."""
+        """Names of the two bodies that a part connects; None for the ground."""
         (first, second), place = bodies, f"{place}.bodies"
         self._require(first != second, place, bodies, "connects a body with itself")
         self._require(first != GROUND, place, bodies, "name the ground second")
@@ -276,7 +284,8 @@ class _Builder:
         return _vector(first), _vector(second)
 
     def _axis(self, place: str, spring: SpringTable, points: tuple[Vector, Vector]) -> Vector:
-        """Unit vector of the axis: the given one, else from the second point to the first, else upwards."""
+        """Unit vector of a spring's axis: the given direction, else from the second point to the first, else
+        upwards."""
         if spring.direction is not None:
             return self._unit(f"{place}.direction", spring.direction)
         apart = np.subtract(*points)
@@ -302,24 +311,24 @@ class _Builder:
 
     def _mounts(self) -> Iterator[SpringDamper]:
         for mount in self.tables.mounts:
-            ends, at = self._two_bodies(_place_of_key("mounts", mount.name), mount.bodies), _vector(mount.point)
+            ends, at = self._two_bodies(_key_path("mounts", mount.name), mount.bodies), _vector(mount.point)
             acts = any(mount.stiffness) or any(mount.damping)
-            place = _place_of_key("mounts", mount.name, "stiffness")
+            place = _key_path("mounts", mount.name, "stiffness")
             self._require(acts, place, mount.stiffness, "has neither spring nor damper")
-            frame = self._frame(_place_of_key("mounts", mount.name), mount.frame, ends)
+            frame = self._frame(_key_path("mounts", mount.name), mount.frame, ends)
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
                 yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
 
     def _seat_spring(self, seat: SeatTable) -> SpringDamper:
         """Spring of a seat, with the occupant as first and the carrier as second body, so that force is positive in
         compression."""
-        carrier = self._body(_place_of_key("seats", seat.name, "body"), seat.body)
+        carrier = self._body(_key_path("seats", seat.name, "body"), seat.body)
         at = _vector(seat.position)
         law, frame = (seat.stiffness, seat.damping), self._towed_under(carrier)
         return SpringDamper(seat.name, seat.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
 
     def _tyre(self, tyre: TyreTable) -> Tyre:
-        place, axle = _place_of_key("tyres", tyre.name), self.axles[tyre.axle]
+        place, axle = _key_path("tyres", tyre.name), self.axles[tyre.axle]
         x, y, z = self.bodies[self._body(f"{place}.body", tyre.body)].position
         allowed = f"its body lies at x = {x:g} m, its axle {axle.name!r} at {axle.x:g} m: they must agree"
         self._require(abs(x - axle.x) <= 1e-9, f"{place}.axle", tyre.axle, allowed)
@@ -327,7 +336,7 @@ class _Builder:
         return Tyre(tyre.name, tyre.body, at, number, tyre.stiffness, tyre.damping)
 
     def _bar(self, bar: BarTable) -> AntiRollBar:
-        place, names = _place_of_key("anti_roll_bars", bar.name), tuple(self.tyres)
+        place, names = _key_path("anti_roll_bars", bar.name), tuple(self.tyres)
         body = self.bodies[self._body(f"{place}.body", bar.body)]
         towed = body.name in self.towed
         rolls = towed or ("rx" in body.freedoms and body.parent is None)
@@ -343,7 +352,7 @@ class _Builder:
         """Side forces of the tyres. They act on the chassis, which guides the wheels laterally."""
         rolling, chassis = [tyre for tyre in self.tables.tyres if tyre.cornering], self.tables.chassis
         for axle in (axle for axle in self.tables.axles if axle.roll_steer):
-            place = _place_of_key("axles", axle.name, "roll_steer")
+            place = _key_path("axles", axle.name, "roll_steer")
             self._require(rolling, place, axle.roll_steer, "steers nothing: no tyre has a cornering stiffness")
         if not rolling:
             return ()
@@ -357,13 +366,13 @@ class _Builder:
             guided = tyre.body == carrying or "y" not in self.bodies[tyre.body].freedoms
             kind = "chassis" if carrying == chassis else "towed body"
             allowed = f"its side force acts on the {kind}: body {tyre.body!r} must not have the freedom y"
-            self._require(guided, _place_of_key("tyres", tyre.name, "cornering"), tyre.cornering, allowed)
+            self._require(guided, _key_path("tyres", tyre.name, "cornering"), tyre.cornering, allowed)
             steer = self.axles[tyre.axle].roll_steer
             forces.append(SideForce(tyre.name, carrying, (x, y, 0.0), carrying, tyre.cornering, steer))
         return tuple(forces)
 
     def _output(self, output: OutputTable, parts: tuple[str, ...]) -> SpatialOutput:
-        place, kind = _place_of_key("outputs", output.name), output.kind
+        place, kind = _key_path("outputs", output.name), output.kind
         needed = "part" if kind in ("travel", "travel rate", "force") else "tyre" if "tyre" in kind else "body"
         foreign = {"part": "body point tyre", "tyre": "body point part", "body": "part tyre"}[needed].split()
         for key in foreign:

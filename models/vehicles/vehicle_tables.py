@@ -1,4 +1,4 @@
-"""The tables of a vehicle file, as a user writes them: axes x forward, y left, z up from the ground, SI units."""
+"""Tables of a vehicle file, as a user writes them: axes x forward, y left, z up from the ground, SI units."""
 
 from typing import Annotated, Any, Literal
 
@@ -19,8 +19,8 @@ UP = [0.0, 0.0, 1.0]
 FRAME = "body in whose axes the direction is fixed; by default what the system of the scene takes"
 
 
-def of(unit: str, meaning: str, default: Any = ...) -> Any:
-    """Field of a list of quantities."""
+def quantity_list(unit: str, meaning: str, default: Any = ...) -> Any:
+    """Schema field for a list of quantities with a unit and a meaning."""
     return Field(default, description=meaning, json_schema_extra={"unit": unit})
 
 
@@ -29,23 +29,25 @@ def _source() -> Any:
 
 
 class Entry(Strict):
-    """Keys that every table of a vehicle file has: a name, by which messages and outputs call it, and where its values
-    are from."""
+    """Keys that every table of a vehicle file has: a name, by which messages and outputs call it, and the source of its
+    values."""
 
     name: Name
     source: str = _source()
 
 
 class BodyTable(Entry):
-    """[[bodies]]: a rigid body, where its centre of mass lies and what it may do."""
+    """[[bodies]]: a rigid body, the position of its centre of mass and its freedoms."""
 
     mass: float = quantity("kg", "mass")
-    position: Triple = of("m", "centre of mass: x forward, y left, z above the ground")
+    position: Triple = quantity_list("m", "centre of mass: x forward, y left, z above the ground")
     freedoms: list[Freedom] = Field(description="which of x, y, z, rx (roll), ry (pitch), rz (yaw) it has")
-    inertia: NotNegativeTriple = of("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
-    products: Triple = of("kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0])
+    inertia: NotNegativeTriple = quantity_list("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
+    products: Triple = quantity_list("kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0])
     parent: str | None = Field(None, description="body it rides on; its freedoms then count relative to that body")
-    hitch: Triple | None = of("m", "where its parent tows it, as a trailer: its freedoms are turns about it", None)
+    hitch: Triple | None = quantity_list(
+        "m", "where its parent tows it, as a trailer: its freedoms are turns about it", None
+    )
 
 
 class CurveTable(Strict):
@@ -59,9 +61,13 @@ class SpringTable(Entry):
     """[[springs]]: spring, damper, curves and friction between points of two bodies along a direction."""
 
     bodies: Names = Field(description='two bodies; the second may be "ground"')
-    point: Triple | None = of("m", "the place of both points", None)
-    points: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = of("m", "one point on each body", None)
-    direction: Triple | None = of("", "up where nothing else is said, or from the second point to the first", None)
+    point: Triple | None = quantity_list("m", "the place of both points", None)
+    points: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = quantity_list(
+        "m", "one point on each body", None
+    )
+    direction: Triple | None = quantity_list(
+        "", "up where nothing else is said, or from the second point to the first", None
+    )
     stiffness: float = quantity("N/m", "spring", default=0.0, zero=True)
     damping: float = quantity("N s/m", "damper", default=0.0, zero=True)
     travel_force: CurveTable | None = Field(None, description="force over travel beside the spring, as a bump stop")
@@ -75,9 +81,9 @@ class MountTable(Entry):
     """[[mounts]]: three springs and dampers along x, y, z at one place; outputs call them NAME.x, NAME.y, NAME.z."""
 
     bodies: Names = Field(description='two bodies; the second may be "ground"')
-    point: Triple = of("m", "its place")
-    stiffness: NotNegativeTriple = of("N/m", "along x, y, z")
-    damping: NotNegativeTriple = of("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
+    point: Triple = quantity_list("m", "its place")
+    stiffness: NotNegativeTriple = quantity_list("N/m", "along x, y, z")
+    damping: NotNegativeTriple = quantity_list("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
     frame: str | None = Field(None, description=FRAME)
 
 
@@ -86,7 +92,7 @@ class SeatTable(Entry):
 
     body: str = Field(description="body that carries the seat")
     mass: float = quantity("kg", "mass of the occupant")
-    position: Triple = of("m", "the occupant, and the foot of the seat under it")
+    position: Triple = quantity_list("m", "the occupant, and the foot of the seat under it")
     stiffness: float = quantity("N/m", "spring")
     damping: float = quantity("N s/m", "damper", zero=True)
 
@@ -101,7 +107,7 @@ class BarTable(Entry):
 
 
 class AxleTable(Entry):
-    """[[axles]], from the front."""
+    """[[axles]]: an axle of the vehicle, listed from the front."""
 
     x: float = quantity("m", "place of the axle", signed=True)
     roll_steer: float = quantity("rad/rad", "steer of its wheels over roll of the chassis", default=0.0, signed=True)
@@ -142,19 +148,20 @@ Kind = Literal[
 
 
 class OutputTable(Strict):
-    """[[outputs]]: what is read; of a point of a body, of a spring, mount, seat or bar, or of a tyre."""
+    """[[outputs]]: an output of the simulation: motion of a point of a body, or a quantity of a spring, mount, seat or
+    bar, or of a tyre."""
 
     name: Name
     kind: Kind
     body: str | None = Field(None, description="body, for accelerations and other motion")
-    point: Triple | None = of("m", "point of the body, its centre of mass where nothing is said", None)
-    direction: Triple = of("", "direction or axis", UP)
+    point: Triple | None = quantity_list("m", "point of the body, its centre of mass where nothing is said", None)
+    direction: Triple = quantity_list("", "direction or axis", UP)
     part: str | None = Field(None, description="spring, mount (NAME.z), seat or bar, for travel, travel rate, force")
     tyre: str | None = Field(None, description="tyre, for tyre force and deflection")
 
 
 class ReducedTable(Strict):
-    """[reduced]: what a choice of effects has left out, as limits; only the closed form of ride reads them."""
+    """[reduced]: parts that a choice of effects has left out, as limits; only the closed form of ride reads them."""
 
     massless: list[Name] = Field(default_factory=list, description="bodies that count as having no mass")
     rigid: list[Name] = Field(default_factory=list, description="springs, and NAME.x of mounts, that count as rigid")
@@ -162,7 +169,7 @@ class ReducedTable(Strict):
 
 
 class VehicleTable(Strict):
-    """A vehicle file."""
+    """Tables of a vehicle file."""
 
     title: str = Field(description="what the vehicle is")
     notes: str = Field("", description="what a reader should know")

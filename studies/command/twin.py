@@ -12,20 +12,20 @@ from models.own_model.certificate import (
     EQUAL_ACCELERATION_SHARE,
     Agreement,
     certificate,
+    comparison_states,
     softness_difference,
-    states_of,
 )
 from models.own_model.control_table import ControlTable, read_controls
 from models.own_model.elements import Element, two_digit_text
 from models.own_model.explain import Comparison, Difference, compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
-from models.own_model.names import some_names
-from models.own_model.path import PathReport, compare_paths, steps_of_path
+from models.own_model.names import first_names_text
+from models.own_model.path import PathReport, compare_paths, step_count_of_path
 from models.own_model.reading import TwinModel
 from models.own_model.states import STATE_COUNT
-from models.own_model.two_paths import PathGap, paths_apart
-from models.own_model.urdf import Misread, misread_numbers
+from models.own_model.two_paths import PathGap, compare_two_paths
+from models.own_model.urdf import MisreadNumber, misread_numbers
 
 ReportProgress = Callable[[str, float], None]
 """Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
@@ -61,7 +61,7 @@ class ExaminedFile:
     file: ModelFile
     agreements: tuple[Agreement, ...]
     explanations: dict[str, list[tuple[Element, float]]]
-    misread: tuple[Misread, ...]
+    misread: tuple[MisreadNumber, ...]
     path: PathReport | None
     price_lines: tuple[str, ...] = ()
     constraint_lines: tuple[str, ...] = ()
@@ -137,7 +137,7 @@ def examine(
         raise InputError("--controls", "", str(twin_options.controls), allowed)
     read_files = [read(path, without, twin_options.folder) for path in files]
     for file in read_files if twin_options.compare_paths else ():
-        steps_of_path(file.twin)
+        step_count_of_path(file.twin)
     tables = [
         read_controls(twin_options.controls, file.twin.model) if twin_options.controls else None for file in read_files
     ]
@@ -155,7 +155,7 @@ def examine(
         names = [str(path) for path in files]
     comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
     gap = (
-        paths_apart(first, second)
+        compare_two_paths(first, second)
         if twin_options.compare_paths and comparison.acceleration_agreement is not None
         else None
     )
@@ -185,7 +185,7 @@ def _examine_file(
     lost = misread_numbers(file) if file.document.kind == "URDF" else []
     report = None
     if twin_options.compare_paths:
-        activity = f"marching {steps_of_path(file.twin):,} steps by every build"
+        activity = f"marching {step_count_of_path(file.twin):,} steps by every build"
         report_progress(activity, 1 / 3)
         report = compare_paths(file.twin, None, table, lambda share: report_progress(activity, (1 + share) / 3))
     price: tuple[str, ...] = ()
@@ -204,10 +204,10 @@ def _constraint_lines(file: ModelFile, state_count: int) -> Iterator[str]:
     """Yield lines on joint limits that test states exceed, on dry friction, and on constraints, which are soft in
     MuJoCo, with the effect of the softness on accelerations."""
     twin = file.twin
-    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, state_count)] if file.ignored_limits else []
+    beyond = [limits_struck(twin)(q) for q, _ in comparison_states(twin, state_count)] if file.ignored_limits else []
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
-        yield f"limits of {some_names(tuple(names))} would act at {sum(map(bool, beyond))} of the states"
+        yield f"limits of {first_names_text(tuple(names))} would act at {sum(map(bool, beyond))} of the states"
     if twin.driven.frictions:
         yield _friction_line(twin, state_count)
     if twin.driven.tied:
@@ -223,7 +223,7 @@ def _constraint_lines(file: ModelFile, state_count: int) -> Iterator[str]:
 def _friction_line(twin: TwinModel, count: int) -> str:
     """Line on dry friction: the number of states at which builds are compared, and the law that each build is compared
     with."""
-    states = states_of(twin, count)
+    states = comparison_states(twin, count)
     head = f"dry friction of {plural(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
     if sliding_states(twin, states):
         return (
@@ -289,7 +289,7 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
         rows.append(f"  {build}: {f'it is the {said}' if said else 'no single element explains it'}")
     rows += [f"  {lost.sentence()}" for lost in examined_file.misread]
-    rows += [f"  left out: {content.line()}" for content in examined_file.file.left_out]
+    rows += [f"  left out: {content.line()}" for content in examined_file.file.removed_contents]
     if examined_file.file.ignored_limits:
         rows.append(f"  {limits_sentence(examined_file.file.ignored_limits)}")
     rows += [f"  {note}" for note in (*examined_file.constraint_lines, *examined_file.file.notes)]
@@ -304,7 +304,7 @@ def _at_which_controls(difference: Difference) -> str:
 
 def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
     if comparison.acceleration_agreement is None:
-        rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched)]
+        rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched_coordinates)]
         return rows + [f"  {difference.sentence(names)}" for difference in comparison.differences]
     agreement, influential = comparison.acceleration_agreement, comparison.influential
     head = "both files move alike" if comparison.alike else "the files do not move alike"
@@ -320,7 +320,7 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
         )
         rows.append(f"  {difference.sentence(names)} ({size})")
     if not comparison.alike:
-        rows.append(f"  {comparison.rest()}")
+        rows.append(f"  {comparison.remainder_text()}")
     rows += [
         f"  without influence{_at_which_controls(difference)}: {difference.sentence(names)}"
         for difference in comparison.silent_differences

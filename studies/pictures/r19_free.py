@@ -44,7 +44,7 @@ def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ..
     vehicle = vehicle_with_road_forces(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
     steps = int(np.ceil(duration / road.step))
-    table = road.table(steps + int(DRAWN_ROAD / SPEED / road.step), SEED)
+    table = road.wheel_heights_and_rates(steps + int(DRAWN_ROAD / SPEED / road.step), SEED)
     rows = np.rint(times / road.step).astype(int)
     motions = [_motion_of_engine(engine, vehicle, road, table[: 2 * steps + 1], rows) for engine in engines]
     return stage(vehicle, road, table), motions
@@ -123,7 +123,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     """Stage of the film: the car, seen from ahead and to its left, on a passing road."""
     front = [tyre for tyre in vehicle.tyres if tyre.axle == 0]
     columns = [vehicle.tyres.index(tyre) for tyre in front]
-    distances = front[0].point[0] + SPEED * road.half * np.arange(len(table))
+    distances = front[0].point[0] + SPEED * road.half_step * np.arange(len(table))
     tracks = front[0].point[1], front[1].point[1]
     passing = PassingRoad(distances, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
     rest_positions = {body.name: body.position for body in vehicle.bodies}

@@ -8,7 +8,7 @@ import numpy as np
 from models.core.discretisation import not_estimated
 from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.equations import ROLL, YAW, WheelsetPath, Y, Z
-from models.rail.joint_forces import JOINTS, to_joints
+from models.rail.joint_forces import JOINTS, joints_from_states
 from models.rail.profile_contact import Pose
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.of_scene import equations_and_start
@@ -57,7 +57,7 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
     path: WheelsetPath = run.detail
     rows = np.rint(times / STEP).astype(int)
     path_of_frames = WheelsetPath(path.times[rows], path.states[rows], contacts=path.contacts[rows])
-    joints = to_joints(path_of_frames.states)[:, :JOINTS]
+    joints = joints_from_states(path_of_frames.states)[:, :JOINTS]
     if engine == "mujoco":
         poses = mujoco_poses(equations.model.model, {"wheelset": 1}, joints)
     else:  # by a marker in the middle of the axle: the last link of its tree

@@ -12,7 +12,7 @@ from models.engines.protocol import guard
 from models.engines.spatial_protocol import INTEGRATORS, build
 from models.machine.timing import interleave, paired_ratio
 from models.ride.copies_kernel import POWERS_SUMMED, march
-from models.ride.nonlinear_copies import laws_of
+from models.ride.nonlinear_copies import force_laws
 from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.vehicles.spatial import SpatialVehicle
@@ -41,8 +41,8 @@ def ride_runs(engine: str, step_count: int) -> tuple[Job, Job]:
     """Two functions that simulate a ride without effects in an engine, by twinrig's model and by the hand-written car.
     Both return states (step_count + 1, 14) and check them in the same way."""
     vehicle, road = vehicle_and_road()
-    table, rest_state, duration = (
-        road.table(step_count, 0),
+    wheel_heights_and_rates, rest_state, duration = (
+        road.wheel_heights_and_rates(step_count, 0),
         np.zeros(len(vehicle.coordinates())),
         step_count * road.step,
     )
@@ -66,7 +66,11 @@ def copy_runs(step_count: int) -> tuple[Job, Job]:
     equations. Both return the final states (14, COPIES)."""
     vehicle, road = vehicle_and_road()
     plain, roads = linearise(vehicle, road.speed), next(road.blocks(step_count, COPIES, 0))
-    laws, car, heights = laws_of(vehicle, plain, (), road.speed), parameter_array(Car.of(vehicle)), roads[:, :4].copy()
+    laws, car, heights = (
+        force_laws(vehicle, plain, (), road.speed),
+        parameter_array(Car.of(vehicle)),
+        roads[:, :4].copy(),
+    )
     sums = np.zeros((POWERS_SUMMED, len(plain.outputs), COPIES))
 
     def run_twinrig() -> np.ndarray:

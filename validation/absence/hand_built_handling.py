@@ -24,8 +24,8 @@ from models.machine.records import records, size_of, stacked
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
 from models.multibody.tree import cross, dot, plus, three, times
-from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, net, shape_factor
-from models.vehicles.free_vehicle import SPECK
+from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, cornering_stiffness_factor, net
+from models.vehicles.free_vehicle import ROTOR_MASS
 
 COORDINATE_COUNT, CELLS = 23, 21
 GENERAL_NUMBERS, WHEEL_NUMBERS, MOUNT_NUMBERS, SEAT_NUMBERS = 14, 18, 15, 6
@@ -243,7 +243,7 @@ def parameter_table(handling: Handling) -> np.ndarray:
             tyre.point[2],
             radius,
             width,
-            shape_factor(CELLS) * radius * sunk * width / side,
+            cornering_stiffness_factor(CELLS) * radius * sunk * width / side,
             handling.tyres.friction,
         ]
     mounts = [
@@ -272,7 +272,7 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
         BODY_TEXT.format(
             name=name,
             joints="".join(JOINT_TEXTS[kind] for kind in kinds),
-            mass=car.body(name).mass + SPECK * (kinds == WHEELED_FREEDOMS),
+            mass=car.body(name).mass + ROTOR_MASS * (kinds == WHEELED_FREEDOMS),
             pos=_text(np.subtract(car.body(name).position, chassis.position)),
         )
         for name, kinds in BODIES_ON_CHASSIS.items()

@@ -59,7 +59,8 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
     head = model.numbers
     sample_inputs = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
     curved = (
-        not hub_inputs.held and np.abs(np.diff(sample_inputs, n=2, axis=0)).max() > 1e-9 * np.abs(sample_inputs).max()
+        not hub_inputs.constant_in_step
+        and np.abs(np.diff(sample_inputs, n=2, axis=0)).max() > 1e-9 * np.abs(sample_inputs).max()
     )
     noisy_forces, noisy_angles = _noisy_columns(measurement)
     counts = {
@@ -67,9 +68,9 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
         "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.uncut.tyres),
         "noisy forces": noisy_forces,
         "noisy angles": noisy_angles,
-        "held forces": hub_inputs.held * WRENCH * int(head[kernel.HUBS]),
-        "pulled angles": 2 * int(head[kernel.GUIDE] == kernel.PULLED),
-        "enforced angles": 2 * int(head[kernel.GUIDE] == kernel.HELD),
+        "held forces": hub_inputs.constant_in_step * WRENCH * int(head[kernel.HUBS]),
+        "pulled angles": 2 * int(head[kernel.STABILISER] == kernel.PULLED),
+        "enforced angles": 2 * int(head[kernel.STABILISER] == kernel.ENFORCED),
         "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
         "curves between samples": int(curved),
     }

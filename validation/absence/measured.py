@@ -79,7 +79,7 @@ def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], 
         exam: Examination = run(scene, engine).detail
     assert exam.outcome is not None
     path = b"".join(exam.outcome.samples(answer).tobytes() for answer in exam.outcome.answers)
-    guides, faulty = {int(table[kernel.GUIDE]) for table in tables}, np.zeros((2, 1), bool)
+    guides, faulty = {int(table[kernel.STABILISER]) for table in tables}, np.zeros((2, 1), bool)
     if scene.virtual is not None and exam.virtual is not None:
         samples, true = (
             exam.virtual.samples(faults, scene.virtual.seed) for faults in (scene.virtual.faults, Faults())
@@ -90,7 +90,7 @@ def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], 
         "faulty channels": int(faulty[0].sum()),
         "silent channels": int(faulty[1].sum()),
         "pulled angles": 2 * (guides == {kernel.PULLED}),
-        "enforced angles": 2 * (guides == {kernel.HELD}),
+        "enforced angles": 2 * (guides == {kernel.ENFORCED}),
         "moved clocks": sum(bool(file.offset or file.drift) for file in scene.files),
     }
     return counts, path

@@ -96,7 +96,7 @@ def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], byte
         "delays": sum(length > 0.0 for length in road.lengths),
         "drives": int(scene.drive is not None),
         "heights": len(np.unique(sum(road.heights), axis=0)),
-        "bent springs": sum(spring.bent for spring in vehicle.springs) if in_time else 0,
+        "bent springs": sum(spring.is_nonlinear for spring in vehicle.springs) if in_time else 0,
         "tyres that lift": sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
     result = run(scene, engine, **({"sampling": _with_fewest_copies()} if in_time else {}))

@@ -10,9 +10,9 @@ import numpy as np
 
 from models.machine.compiled import compiled
 from models.machine.stack import array, at, beyond, doubles
-from models.multibody.cut_mechanics import PER_JOINT, PER_MOTION, TURNS, add_wrench, column, locate, move
+from models.multibody.cut_mechanics import PER_JOINT, PER_MOTION, ROTATES, add_wrench, joint_velocity, locate, move
 from models.multibody.tree import dot, plus, three, times
-from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
 from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 from validation.adams_joints.mechanism import Spring
 
@@ -30,7 +30,7 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
     chain = joints(vehicle)
     kinds = chain[:, 0].astype(int)
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
-    last_body, origin = anchor(vehicle, vehicle.bodies[-1].name)
+    last_body, origin = last_coordinate_and_joint(vehicle, vehicle.bodies[-1].name)
     laws = [
         [
             last_body if spring.is_rotational else -1,
@@ -70,7 +70,7 @@ def spring_forces(table, t, q, v, force_sum):
             continue
         direction, speed = times(offset, 1.0 / length), 0.0
         for k in range(n):
-            speed += dot(direction, column(chain[k, TURNS], m[k + 1], tip)) * rate[k]
+            speed += dot(direction, joint_velocity(chain[k, ROTATES], m[k + 1], tip)) * rate[k]
         push = -law[STIFFNESS] * (length - law[FREE_LENGTH]) - law[DAMPING] * speed
         add_wrench(chain, m, n - 1, tip, times(direction, push), _NONE, force_view)
 

@@ -204,7 +204,7 @@ def _mirror_rows() -> list[Row]:
     """Rows: conicity and centre of the wave for wheels of 920 and 918 mm diameter, compared with the mirror image with
     both wheels exchanged."""
     profiles, y = Profiles(), np.arange(-8e-3, 8.0001e-3, 5e-4)
-    large, small = profiles.side(0.460), profiles.side(0.459)
+    large, small = profiles.wheel_on_rail(0.460), profiles.wheel_on_rail(0.459)
     there, back = (
         klingel_wave(rolling_radii_of(right, left, y), 3e-3) for right, left in ((large, small), (small, large))
     )

@@ -21,7 +21,7 @@ from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
-from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
+from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid_vehicle
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -132,7 +132,7 @@ def _gravity_rows(vehicle: CutVehicle) -> list[Row]:
     not change."""
     run = _tilted_run(vehicle, "hub", TILT_ANGLE, 1.0)
     fall = -0.5 * GRAVITY * np.array([np.sin(TILT_ANGLE), 1 - np.cos(TILT_ANGLE)]) * run.times[:, None] ** 2
-    preloads = np.array([element.held for element in vehicle.elements])
+    preloads = np.array([element.preload for element in vehicle.elements])
     return [
         Observed(
             "hub_forces.gravity_error",
@@ -158,7 +158,7 @@ def _gravity_rows(vehicle: CutVehicle) -> list[Row]:
 
 def _toppling_row(vehicle: CutVehicle) -> Row:
     """Row: under forces that keep their directions in space, the vehicle topples like an inverted pendulum."""
-    run, expected = _tilted_run(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
+    run, expected = _tilted_run(vehicle, "inertial", 1e-6, 2.0), float(rigid_vehicle(vehicle).toppling_rates()[0])
     late = np.abs(run.states[[1000, 2000], ROLL])
     return Observed(
         "hub_forces.toppling",
@@ -235,7 +235,7 @@ def _growth_rows(vehicle: CutVehicle) -> list[Row]:
             for path in range(PATH_COUNT)
         ]
     )
-    body, at = rigid(vehicle), np.array([NOISE_SECONDS])
+    body, at = rigid_vehicle(vehicle), np.array([NOISE_SECONDS])
     law = body.angle_variance(deviation, step, at)[0]
     sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
     low, high = chi2.ppf([5e-4, 1 - 5e-4], PATH_COUNT) / PATH_COUNT

@@ -16,7 +16,7 @@ from models.engines.protocol import build
 from models.engines.reference import derivative_of
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.vehicles.description import matrices
-from models.vehicles.pitch_plane_equations import numbers
+from models.vehicles.pitch_plane_equations import parameter_numbers
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, behaviour_row, not_run
 from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 from validation.hard_cases.prescribed_pitch import UncheckedExudyn
@@ -320,7 +320,7 @@ class IndexOne:
             np.block([[self._mass, -CONSTRAINT_JACOBIAN.T], [CONSTRAINT_JACOBIAN, np.zeros((1, 1))]])
         )
         self._free = derivative_of("force", assembly.vehicle.geometry)
-        self._p = numbers(assembly.parameters, assembly.vehicle)
+        self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
     def run(self, step: float, duration: float) -> np.ndarray:
         """States (n + 1, 8) by classical Runge-Kutta from the assembly's initial state, which may be off the

@@ -12,6 +12,7 @@ from models.core.time_series import write_time_series
 from models.drift.score import root_mean_square, section_forces
 from models.sensors.inertial_unit import (
     DEGREES_PER_HOUR,
+    angle_random_walk_of,
     angle_variance,
     bias_path,
     error_rotation,
@@ -22,10 +23,9 @@ from models.sensors.inertial_unit import (
     mean_scalar,
     mean_trace,
     measured_attitude,
-    random_walk,
     true_attitude,
 )
-from models.sensors.rotations import exponential, integrate, rotation_matrix, rotation_vector
+from models.sensors.rotations import integrate_attitude, quaternion_of_rotation_vector, rotation_matrix, rotation_vector
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import follower_builder, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
@@ -84,9 +84,12 @@ def _exact_rate_rows() -> list[Row]:
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
     attitudes = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START_ATTITUDE)
     rates, true = coning_motion(h * np.arange(10_001))
-    coned = integrate(rates, h, true[0])
+    coned = integrate_attitude(rates, h, true[0])
     off = float(np.abs(np.linalg.norm(coned, axis=1) - 1).max())
-    fixed, turned = "constant rate, 10 s at 1 kHz: largest error of the attitude", exponential(10 * rate)
+    fixed, turned = (
+        "constant rate, 10 s at 1 kHz: largest error of the attitude",
+        quaternion_of_rotation_vector(10 * rate),
+    )
     swept = "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error"
     order = "fourth order in the sampling period, without noise"
     return [
@@ -271,7 +274,7 @@ def _norm_rows(path_count: int) -> list[Row]:
 def _ten_minute_rows(path_count: int) -> CaseAnswer:
     """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
     gyro sample."""
-    walk = random_walk(RATE_DEVIATION, SAMPLING_RATE)
+    walk = angle_random_walk_of(RATE_DEVIATION, SAMPLING_RATE)
     axis = math.degrees(walk * TEN_MINUTES**0.5)
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
     rows = [

@@ -30,8 +30,8 @@ from models.systems.measured.virtual import (
     map_lines,
     virtual_measurement,
 )
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid
-from models.vehicles.vehicle_file import SHIPPED, load_vehicle
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid_vehicle
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, load_vehicle
 from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 from validation.measured import measured_car
 from validation.measured import recording as moving_car
@@ -87,7 +87,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def write_user_vehicle(folder: Path) -> str:
     """Write a vehicle file that differs from R19-free in every spring, damper and mass, without symmetry; returns its
     name."""
-    text, number = (SHIPPED / "r19_free.toml").read_text(encoding="utf-8"), count()
+    text, number = (SHIPPED_FOLDER / "r19_free.toml").read_text(encoding="utf-8"), count()
 
     def scaled(number_match: re.Match[str]) -> str:
         return f"{number_match[1]} = {float(number_match[2]) * (1.0 + 0.02 * (next(number) % 11 - 5))!r}"
@@ -377,7 +377,7 @@ def _quick_rows(folder: Path) -> list[Row]:
     run = march(stabilised_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
     wrong = errors_of_run(run, true)
     level = Level(8.0, 1.0)
-    law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
+    law = rigid_vehicle(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
     deviations = predicted_drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
     return [
         Observed(

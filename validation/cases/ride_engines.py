@@ -12,7 +12,7 @@ from models.core.noise import normal_samples
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
-from models.vehicles.linear_vehicle import LinearVehicle, OutputRows, poles, shift
+from models.vehicles.linear_vehicle import LinearVehicle, OutputRows, eigenvalue_shifts, eigenvalues
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -121,7 +121,7 @@ def _frequency_rows() -> list[Row]:
             SYSTEM,
             f"difference of the 19 eigenfrequencies of R19-ride in {engine} from the published ones",
             largest_relative_error(
-                np.abs(poles(build(engine, vehicle_of_name("r19_ride")).linearise()))[::2] / (2 * np.pi),
+                np.abs(eigenvalues(build(engine, vehicle_of_name("r19_ride")).linearise()))[::2] / (2 * np.pi),
                 R19_FREQUENCIES,
             ),
             "relative",
@@ -226,9 +226,9 @@ def _shift_rows() -> list[Row]:
     analytic matrices."""
     rows = []
     for name in VEHICLE_NAMES[1]:
-        analytic = shift(*(linearise(vehicle_of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
+        analytic = eigenvalue_shifts(*(linearise(vehicle_of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
         for engine in ENGINES:
-            shifted = shift(
+            shifted = eigenvalue_shifts(
                 *(build(engine, vehicle_of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
             )
             rows.append(

@@ -11,9 +11,9 @@ from scipy.integrate import quad
 
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
-from models.ride.gaussian_laws import of_curve, of_friction
+from models.ride.gaussian_laws import mean_force_and_slope, mean_friction_slope
 from models.ride.nonlinear_copies import copies_in_time
-from models.ride.statistical_linearisation import promised_error, statistically_linear
+from models.ride.statistical_linearisation import largest_error_seen, statistically_linear
 from models.vehicles.spatial_linear import linearise
 from validation.common.rows import Observed, Row, System, Table
 from validation.ride.in_engines import (
@@ -66,13 +66,13 @@ def _gain_rows() -> list[Row]:
             cut = [(x - mean) / deviation for x in curve.arguments[1:-1]]
             force = normal_expectation(lambda x: curve(mean + deviation * x), cut)  # noqa: B023
             gain = normal_expectation(lambda x: curve(mean + deviation * x) * x, cut) / deviation  # noqa: B023
-            gains = of_curve(curve, mean, deviation)
+            gains = mean_force_and_slope(curve, mean, deviation)
             scale = max(abs(force), abs(gain) * deviation, 1e-3)
             worst = max(worst, abs(gains[0] - force) / scale, abs(gains[1] - gain) * deviation / scale)
     for ratio in (0.1, 1.0, 10.0, 100.0):
         gain = normal_expectation(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio  # noqa: B023
-        dry = max(dry, abs(of_friction(1.0, 1.0, ratio) / gain - 1.0))
-    coulomb = of_friction(1.0, 1e-6, 1.0) / np.sqrt(2.0 / np.pi) - 1.0
+        dry = max(dry, abs(mean_friction_slope(1.0, 1.0, ratio) / gain - 1.0))
+    coulomb = mean_friction_slope(1.0, 1e-6, 1.0) / np.sqrt(2.0 / np.pi) - 1.0
     return [
         Observed(
             "ride_nonlinear.gains.curves",
@@ -170,7 +170,7 @@ def _level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
                 abs(error),
                 "",
             ).at_most(
-                promised_error(linear.left_out[i]) + 4.0 * spread,
+                largest_error_seen(linear.left_out[i]) + 4.0 * spread,
                 f"left out {100 * linear.left_out[i]:.2g} % of the variance: what its sentence promises, "
                 "and 4 standard errors",
                 "none",
@@ -188,7 +188,7 @@ def _level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
             abs(shift),
             "",
         ).at_most(
-            promised_error(linear.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
+            largest_error_seen(linear.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
             "as above: the damper pulls the body down",
             "none",
         )
@@ -229,7 +229,9 @@ def _single_law_rows() -> list[Row]:
         linear = statistically_linear(alone, road, SPEED)
         copies = copies_in_time(alone, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1] // 2, seed=SEED)
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
-        curve_kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
+        curve_kept = [
+            largest_error_seen(share) for share in linear.left_out
+        ] + 4.0 * copies.error / copies.variance / 2.0
         worst = int((error / curve_kept).argmax())
         rows.append(
             Observed(

@@ -10,10 +10,10 @@ from scipy.integrate import quad
 
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
-from models.ride.frequency import both_sides, output_densities, variances
+from models.ride.frequency import output_densities, signed_wavenumbers, variances_over_wavenumbers
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import Excitation
-from models.road.isotropic import DensityPart, IsotropicRoad, cross_spectrum_of, isotropic_like, spectral_matrix
+from models.road.isotropic import DensityTerm, IsotropicRoad, cross_spectrum_of, isotropic_road_like, spectral_matrix
 from models.road.two_track import (
     CORRELATION_CASES,
     TRACK_DENSITY_LEVEL,
@@ -159,9 +159,9 @@ def _isotropic_rows() -> list[Row]:
     """Rows: closed forms of an isotropic road by Bessel functions, compared with the integrals that define them; and
     effect of isotropy on accelerations."""
     road, apart, k = road_of_level(HALF_TRACK), 2.0 * HALF_TRACK, np.array([0.05, 0.3, 1.0, 3.0])
-    closed = isotropic_like(road, HALF_TRACK).cross_spectrum(k, apart)
+    closed = isotropic_road_like(road, HALF_TRACK).cross_spectrum(k, apart)
     along = cross_spectrum_of(lambda r: float(road.covariance(np.array(r), HALF_TRACK, HALF_TRACK)), list(k), apart)
-    density_part = DensityPart(1e-5, 0.3, 2.6)
+    density_part = DensityTerm(1e-5, 0.3, 2.6)
     across = np.array([_cross_density_of_surface(density_part, float(wavenumber), apart) for wavenumber in k])
     hankel = density_part.density(k, apart)
     return [
@@ -185,7 +185,7 @@ def _isotropic_rows() -> list[Row]:
     ]
 
 
-def _cross_density_of_surface(spectrum_part: DensityPart, k: float, track_distance: float) -> float:
+def _cross_density_of_surface(spectrum_part: DensityTerm, k: float, track_distance: float) -> float:
     """Cross spectral density S(k, d) of two tracks at the distance d, by the integral of Phi(sqrt(k^2 + l^2)) cos(l d)
     over l. Phi is the surface density, the Hankel transform of the track's autocovariance."""
     w = spectrum_part.waviness
@@ -215,7 +215,7 @@ def _acceleration_rows(road: TwoTrackRoad) -> list[Row]:
         vehicle,
     )
     by_frequency, isotropic = (
-        _accelerations_by_frequency(vehicle, road_model) for road_model in (road, isotropic_like(road, HALF_TRACK))
+        _accelerations_by_frequency(vehicle, road_model) for road_model in (road, isotropic_road_like(road, HALF_TRACK))
     )
     rows = [
         Observed(
@@ -253,7 +253,9 @@ def _acceleration_names(vehicle: LinearVehicle) -> list[str]:
 
 
 def _accelerations_by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
-    spectral = variances(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *WAVENUMBER_BAND)
+    spectral = variances_over_wavenumbers(
+        vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *WAVENUMBER_BAND
+    )
     return np.sqrt(_acceleration_values(spectral, vehicle))
 
 
@@ -304,7 +306,7 @@ def _weighted_rows() -> list[Row]:
     filters = {"left occupant": "Wk", "body centre": "Wd"}
     system = system_with_weightings(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED), filters)
     deviations = stationary_covariance(system).deviation[-len(filters) :]
-    k, weight = both_sides(vehicle, *WAVENUMBER_BAND)
+    k, weight = signed_wavenumbers(vehicle, *WAVENUMBER_BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
     rows = []
     for value, (output, name) in zip(deviations, filters.items(), strict=True):

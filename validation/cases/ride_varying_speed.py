@@ -13,8 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.ride.covariance import stationary_covariance
-from models.ride.monte_carlo import at_constant_speed, variances_along_drive
-from models.ride.road_in_path import at_speed
+from models.ride.monte_carlo import variances_along_drive, variances_at_constant_speed
+from models.ride.road_in_path import system_at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, quasi_stationary, varying_speed
 from models.road.excitation import Excitation
@@ -83,7 +83,7 @@ def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
     """Rows on limits: stationary covariance long after a change of speed and at constant speed, the road's own
     covariance, and effect of half the step."""
     vehicle, road = vehicle_and_road(vehicle_name)
-    system = at_speed(vehicle, road, STEADY_SPEED)
+    system = system_at_speed(vehicle, road, STEADY_SPEED)
     exact, settling = (
         stationary_covariance(system).deviation,
         -SETTLED_RATE_TIMES_TIME / np.linalg.eigvals(system.A).real.max(),
@@ -226,10 +226,10 @@ def _constant_speed_rows() -> list[Row]:
     """Rows: Monte Carlo copies at constant speed, and cost of an accurate standard deviation by Monte Carlo divided by
     that of the covariance."""
     vehicle, road = vehicle_and_road("r19_ride")
-    exact = stationary_covariance(at_speed(vehicle, road, STEADY_SPEED))
+    exact = stationary_covariance(system_at_speed(vehicle, road, STEADY_SPEED))
     fast = (
         _timed_call(
-            lambda: [stationary_covariance(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEATS)]
+            lambda: [stationary_covariance(system_at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEATS)]
         )[1]
         / TIMED_REPEATS
     )
@@ -287,11 +287,11 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
     Backward in time l' = -A' l from l = C: noise that axle i meets at t moves the output by l(t) . B_i. The drive
     begins in motion and is taken as even long before.
     """
-    at_1, two = (at_speed(vehicle, road, speed) for speed in (1.0, 2.0))
+    at_1, two = (system_at_speed(vehicle, road, speed) for speed in (1.0, 2.0))
     steady, per_speed = (2.0 * at_1.A - two.A).T, (two.A - at_1.A).T
     row = at_1.names.index(output)
     seen = at_1.C[row] + (profile.speeds[-1] - 1.0) * (two.C - at_1.C)[row]
-    slowest = -np.linalg.eigvals(at_speed(vehicle, road, float(profile.speeds[0])).A).real.max()
+    slowest = -np.linalg.eigvals(system_at_speed(vehicle, road, float(profile.speeds[0])).A).real.max()
     pieces, cuts = {}, [profile.times[0] - 10.0 / slowest, *profile.times]
     for start, stop in reversed(list(pairwise(cuts))):
         back = solve_ivp(

@@ -11,9 +11,9 @@ from models.own_model.certificate import (
     Agreement,
     agreement_of_build,
     certificate,
-    moved_at,
+    comparison_states,
+    motion_at,
     reference_of_file,
-    states_of,
 )
 from models.own_model.content import CONTENT_KINDS
 from models.own_model.explain import compare
@@ -95,9 +95,9 @@ def _soft_constraint_row(folder: Path, model_name: str, text: str) -> Row:
     """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation in
     independently written equations."""
     twin = _file_of_text(folder, model_name, text).twin
-    states = states_of(twin, QUICK_STATE_COUNT)
+    states = comparison_states(twin, QUICK_STATE_COUNT)
     apart = agreement_of_build(
-        "", reference_of_file(twin, states, SOFT_BUILD), moved_at(soft_constraint_equations(twin), states)
+        "", reference_of_file(twin, states, SOFT_BUILD), motion_at(soft_constraint_equations(twin), states)
     )
     return Observed(
         f"twin_files.soft_{model_name}",

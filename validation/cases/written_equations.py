@@ -3,7 +3,7 @@ simulations, and every force law."""
 
 from pathlib import Path
 
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial_linear import preloads
 from validation.common.checks import largest_relative_difference
@@ -60,7 +60,7 @@ def _law_rows(state_count: int) -> list[Row]:
     ]
     for name, car in rolling_cars().items():
         preloads_of = preloads(car.vehicle)
-        plain = held_at_rest(car.vehicle, CARRIER)
+        plain = preloads_at_rest(car.vehicle, CARRIER)
         gap = max(
             largest_relative_difference(other, list(known.values()))
             for known, other in zip(preloads_of, plain, strict=True)

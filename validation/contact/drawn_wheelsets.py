@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.rail.eigenvalues import free_wheelset, largest_growth
-from models.rail.linear import LOWEST_SPEED, critical_or_why
+from models.rail.linear import LOWEST_SPEED, critical_speed_or_reason
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, implementation
 
@@ -62,7 +62,7 @@ def critical_speeds(wheelset: Wheelset, search_nearby: bool) -> dict[str, float 
         speeds[engine] = (
             _critical_speed_near(partial(of, wheelset), first)
             if search_nearby and first
-            else critical_or_why(wheelset, of)[0]
+            else critical_speed_or_reason(wheelset, of)[0]
         )
     return speeds
 

@@ -77,7 +77,7 @@ def exact_on_contact_plane(contact: WheelsetContact, placed: WheelsetPlacement) 
             distance.at(x[None, :], s[:, None]) + LARGEST_PENETRATION,
             CELL_SIZE,
             CELL_SIZE,
-            contact.pair,
+            contact.material_pair,
             approach=LARGEST_PENETRATION,
         )
 
@@ -101,10 +101,10 @@ def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[fl
     def pressed(approach: float) -> np.ndarray:
         forces = np.zeros(2)
         while True:
-            before, sunk = forces, forces[::-1] / (math.pi * contact.pair.modulus * away)
+            before, sunk = forces, forces[::-1] / (math.pi * contact.material_pair.modulus * away)
             forces = np.array(
                 [
-                    _load_of_patch(touch.patch.distance, approach * cosine - by, contact.pair)
+                    _load_of_patch(touch.patch.distance, approach * cosine - by, contact.material_pair)
                     for touch, cosine, by in zip(touches, cosines, sunk, strict=True)
                 ]
             )

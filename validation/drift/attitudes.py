@@ -7,7 +7,7 @@ import numpy as np
 from models.sensors.inertial_unit import error_rotation, measured_attitude, true_attitude
 from models.sensors.rotations import (
     conjugate_quaternion,
-    exponential,
+    quaternion_of_rotation_vector,
     quaternion_product,
     rotation_matrix,
     rotation_vector,
@@ -33,8 +33,8 @@ def coning_motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     The rotation is S = Rz(W t) Rx(c) Rz(-W t) with W = 2 rad/s and c = 0.3, its angular velocity W (S^T e_z - e_z).
     """
     spin, half = 2.0, 0.3
-    turn_about_vertical = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
-    tilt = exponential(np.array([half, 0.0, 0.0]))
+    turn_about_vertical = quaternion_of_rotation_vector(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
+    tilt = quaternion_of_rotation_vector(np.array([half, 0.0, 0.0]))
     rates = spin * np.column_stack(
         [-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t), np.full_like(t, math.cos(half) - 1)]
     )

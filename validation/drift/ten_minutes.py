@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from models.sensors.inertial_unit import random_walk
+from models.sensors.inertial_unit import angle_random_walk_of
 from validation.common.rows import Drawn, Saved, Table
 
 TEN_MINUTES, SAMPLING_RATE, RATE_DEVIATION = 600.0, 1000.0, 0.1
@@ -16,7 +16,7 @@ def tables(case_data: Saved) -> list[Table]:
     """Table of the rms angle errors over time in the ten-minute example; none where it was not measured."""
     if not case_data["ten minutes"]:
         return []
-    rms, walk = case_data["ten minutes"]["rms"], math.degrees(random_walk(RATE_DEVIATION, SAMPLING_RATE))
+    rms, walk = case_data["ten minutes"]["rms"], math.degrees(angle_random_walk_of(RATE_DEVIATION, SAMPLING_RATE))
     rows = tuple((f"{t}", f"{rms[t]:.2f}", f"{walk * t**0.5:.2f}") for t in (1, 10, 60, 300, 600))
     note = (
         f"0.1 rad/s on each sample of 1 kHz, {case_data['ten minutes']['count']} paths; samples are held "
@@ -35,7 +35,7 @@ def draw(case_data: Saved) -> Drawn:
         figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.0), sharey=True)
         paths, walk = (
             np.array(case_data["ten minutes"]["paths"]),
-            math.degrees(random_walk(RATE_DEVIATION, SAMPLING_RATE)),
+            math.degrees(angle_random_walk_of(RATE_DEVIATION, SAMPLING_RATE)),
         )
         seconds = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):

@@ -14,8 +14,8 @@ from models.fatigue import counting, damage
 from models.measured import resampling, units
 from models.road import iso8608
 from models.sensors import rigid_body_motion as body
-from models.sensors.rotations import from_cardan, rotation_matrix
-from models.sensors.sensor_array import SensorArray, in_space, sensor_array
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
+from models.sensors.sensor_array import SensorArray, sensor_array, specific_forces_on_body
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
@@ -128,10 +128,15 @@ def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
     heave = 2.0 * np.cos(3 * t)
     no_angles = np.zeros(SAMPLE_COUNT)
-    S = rotation_matrix(from_cardan(no_angles, pitch, no_angles))
+    S = rotation_matrix(quaternion_from_cardan(no_angles, pitch, no_angles))
     felt = np.einsum("nji,nj->ni", S, np.column_stack([no_angles, no_angles, heave - 9.81]))
     w, alpha = (np.column_stack([no_angles, component, no_angles]) for component in (rate, turn))
-    return sensor_array(SENSOR_PLACES), in_space(np.array(list(SENSOR_PLACES.values())), felt, w, alpha), pitch, heave
+    return (
+        sensor_array(SENSOR_PLACES),
+        specific_forces_on_body(np.array(list(SENSOR_PLACES.values())), felt, w, alpha),
+        pitch,
+        heave,
+    )
 
 
 def _recovered_motion_error() -> float:

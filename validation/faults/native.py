@@ -128,7 +128,7 @@ FAULTS = (
     CampaignFault("a curve without its corner", "MuJoCo", _mujoco_model_patch(_shift_corner)),
     CampaignFault("a stiffness 1 % off", "Exudyn", _element_law_patch(stiffness=1.01)),
     CampaignFault("a damping 1 % off", "Exudyn", _element_law_patch(damping=1.01)),
-    CampaignFault("a preload 1 % off", "Exudyn", _element_law_patch(held=1.01)),
+    CampaignFault("a preload 1 % off", "Exudyn", _element_law_patch(preload=1.01)),
     CampaignFault(
         "a bar's factor 1 % off", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:Coordinates.add", _larger_bar_factor)
     ),

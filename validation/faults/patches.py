@@ -190,13 +190,13 @@ def no_reaction() -> Any:
 
 def damper_without_cosine() -> Any:
     """Fault: dampers use b beta' instead of b beta' cos(beta)."""
-    original = equations.suspension
+    original = equations.suspension_forces
     return lambda y, p, sine, cosine: original(y, p, sine, 1.0)
 
 
 def stale_state() -> Any:
     """Fault: suspension forces are computed from the state of the previous evaluation."""
-    original, states_seen = equations.suspension, []
+    original, states_seen = equations.suspension_forces, []
 
     def suspension(y: Any, p: Any, sine: float, cosine: float) -> Any:
         states_seen.append(y.copy())

@@ -16,7 +16,7 @@ from models.ride.weighting import WEIGHTINGS, weighting_of_standard
 from models.road import two_track
 from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, poles
+from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, eigenvalues
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
@@ -36,7 +36,7 @@ def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[Lin
 
 
 def _single_track_road(vehicle: LinearVehicle) -> Excitation:
-    return two_track.road_excitation(two_track.road_of_level(1.0), two_track.on_track(vehicle.wheels, 1.0))
+    return two_track.road_excitation(two_track.road_of_level(1.0), two_track.wheels_on_track(vehicle.wheels, 1.0))
 
 
 @cache
@@ -95,7 +95,7 @@ def _paper_road_error() -> float:
 
 def _eigenfrequency_errors() -> float:
     """Largest relative error of the 19 eigenfrequencies of R19-ride, against values computed from its data."""
-    rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
+    rates = eigenvalues(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
     return largest_relative_error(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
@@ -281,7 +281,7 @@ FAULTS = (
     CampaignFault(
         "sign of the anti-roll bar",
         "vehicle",
-        attribute_patch("models.vehicles.spatial_linear:_twist", _opposite_twist),
+        attribute_patch("models.vehicles.spatial_linear:_bar_twist_row", _opposite_twist),
     ),
     CampaignFault(
         "tyre stiffness per axle for per wheel",

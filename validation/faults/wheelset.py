@@ -115,7 +115,7 @@ def _linear_law_error() -> float:
     creepages."""
     report = _contact_report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
-    wanted = kalker(a, b, x, y, spin, CHOSEN_WHEELSET.pair)
+    wanted = kalker(a, b, x, y, spin, CHOSEN_WHEELSET.material_pair)
     return max(
         largest_relative_difference(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True)
     )
@@ -147,7 +147,9 @@ def plain_python_patch(**functions: Any) -> Patch:
         def context() -> Iterator[None]:
             faulty_patches = with_globals(wf.patch_by_patch.py_func, **functions)
             faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=faulty_patches)
-            plain = {name: getattr(eq, name).py_func for name in ("rates", "set_rates", "room_for", "rails_in")}
+            plain = {
+                name: getattr(eq, name).py_func for name in ("rates", "set_rates", "workspace_for", "rails_from_tuples")
+            }
             with mock.patch.multiple(eq, wheel_forces=faulty, **plain):
                 yield
 
@@ -223,13 +225,13 @@ def _swap_contacts(touches: Any) -> None:
 
 
 def _no_gyroscope(state: Any, body: Any, rates: Any) -> None:
-    whirl, cosine = body.along * state[eq.SPIN] / body.across, np.cos(state[eq.ROLL])
+    whirl, cosine = body.spin_inertia * state[eq.SPIN] / body.yaw_inertia, np.cos(state[eq.ROLL])
     rates[eq.ROLL_RATE] -= whirl * state[eq.YAW_RATE] * cosine
     rates[eq.YAW_RATE] += whirl * state[eq.ROLL_RATE] / cosine
 
 
 def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
-    rates[eq.ROLL_RATE] -= body.along * state[eq.SPIN] / body.across * state[eq.YAW_RATE]
+    rates[eq.ROLL_RATE] -= body.spin_inertia * state[eq.SPIN] / body.yaw_inertia * state[eq.YAW_RATE]
 
 
 def _doubled_damping(original: Any) -> Any:

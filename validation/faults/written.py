@@ -210,7 +210,7 @@ FAULTS = (
         attribute_patch(f"{TABLE_WRITER}:table", _towed_marks_cleared(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
     ),
     CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute_patch(f"{TABLE_WRITER}:_bars", _stiff_bars)),
-    CampaignFault("a bar turned round, cut", "bar", attribute_patch(f"{CUT_TABLE}:_element", _turned_bar)),
+    CampaignFault("a bar turned round, cut", "bar", attribute_patch(f"{CUT_TABLE}:_element_numbers", _turned_bar)),
     CampaignFault(
         "inertia of the chassis 1 % off, on tyres",
         "inertia",
@@ -229,12 +229,12 @@ FAULTS = (
     CampaignFault(
         "stiffness and damping swapped in the table, cut",
         "packing",
-        attribute_patch(f"{CUT_TABLE}:_element", _swapped_numbers(cut_at.STIFFNESS, cut_at.DAMPING)),
+        attribute_patch(f"{CUT_TABLE}:_element_numbers", _swapped_numbers(cut_at.STIFFNESS, cut_at.DAMPING)),
     ),
     CampaignFault(
         "cornering stiffness and roll steer swapped in the table, cut",
         "packing",
-        attribute_patch(f"{CUT_TABLE}:_hub", _swapped_numbers(cut_at.CORNERING, cut_at.ROLL_STEER)),
+        attribute_patch(f"{CUT_TABLE}:_hub_numbers", _swapped_numbers(cut_at.CORNERING, cut_at.ROLL_STEER)),
     ),
 )
 

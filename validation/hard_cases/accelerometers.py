@@ -15,7 +15,7 @@ from models.sensors.rigid_body_motion import (
     recovered_motion,
     spin_from_readings,
 )
-from models.sensors.rotations import from_cardan, rotation_matrix
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import sensor_array
 from models.systems.pitch_plane.effects.accelerometers import readings_of
 from models.systems.pitch_plane.run import run as simulate
@@ -174,7 +174,7 @@ def vertical_nose_error(engine: str, folder: Path) -> float:
     orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).orientation
     no_angles = np.zeros(len(states))
     return largest_magnitude(
-        rotation_matrix(orientation) - rotation_matrix(from_cardan(no_angles, states[:, 3], no_angles))
+        rotation_matrix(orientation) - rotation_matrix(quaternion_from_cardan(no_angles, states[:, 3], no_angles))
     )
 
 
@@ -189,7 +189,7 @@ def gimbal_lock_error(engine: str, folder: Path) -> float:
 
 def gimbal_lock_naive(folder: Path) -> str:
     """Result without the guard, as text: roll angle by the textbook's formula at gimbal lock."""
-    s = rotation_matrix(from_cardan(0.3, np.pi / 2, 0.0))
+    s = rotation_matrix(quaternion_from_cardan(0.3, np.pi / 2, 0.0))
     roll = np.arctan2(s[2, 1], s[2, 2])
     return f"the textbook's formula gives a roll of {roll:.2f} rad for 0.30, out of rounding errors"
 

@@ -19,7 +19,7 @@ from models.core.signals import signal_from_samples
 from models.core.smoothing import low_passed
 from models.fatigue.counting import level_crossings
 from models.rail.wheelset import CHOSEN_WHEELSET
-from models.sensors.rotations import integrate
+from models.sensors.rotations import integrate_attitude
 from models.systems.handling.run import principal_series, run
 from models.systems.handling.scene import HandlingScene, build
 from models.systems.hub_forces.run import run as run_on_hubs
@@ -262,12 +262,12 @@ CASES = (
             (
                 "body that turns 4 rad from sample to sample",
                 "nobody can tell the way it went",
-                lambda: integrate(SPINNING_RATES, 1e-2, NO_ROTATION),
+                lambda: integrate_attitude(SPINNING_RATES, 1e-2, NO_ROTATION),
             ),
             (
                 "body that turns from an orientation of length 2",
                 "its matrix would be four times a rotation",
-                lambda: integrate(0.1 * SPINNING_RATES, 1e-2, 2.0 * NO_ROTATION),
+                lambda: integrate_attitude(0.1 * SPINNING_RATES, 1e-2, 2.0 * NO_ROTATION),
             ),
             ("seed of -1", "the stream of 2^64 - 1 would answer", lambda: normal_samples(-1, 0, 1, 1)),
             ("seed of 1.7", "the stream of 1 would answer", lambda: normal_samples(1.7, 0, 1, 1)),  # type: ignore[arg-type]

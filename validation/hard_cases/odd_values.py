@@ -23,7 +23,7 @@ from models.drift.point_mass import euler_covariance
 from models.ensemble.statistics import deviation_with_error, quantile_with_interval
 from models.fatigue.damage import pseudo_damage
 from models.ride.covariance import lyapunov_solution
-from models.ride.measures import dynamic_load_factor, share_beyond
+from models.ride.measures import dynamic_load_factor, time_share_beyond
 from models.ride.nonlinear_copies import copies_in_time
 from models.road.excitation import Excitation
 from models.systems.hub_forces.measurement import Angles, HubForces
@@ -196,7 +196,7 @@ CASES = (
             ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded_profile),
             ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
             ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
-            ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
+            ("limit below 0", "a share of time above 1", lambda: time_share_beyond(1.0, -1.0)),
             ("deviation of two values", "its error would be 0", lambda: deviation_with_error(np.array([1.0, 2.0]))),
             (
                 "quantile of what is no number",

@@ -17,14 +17,14 @@ from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.road_path import RoadPath, road_path
 from models.road.excitation import Excitation
-from models.road.two_track import on_track, road_excitation, road_of_level
+from models.road.two_track import road_excitation, road_of_level, wheels_on_track
 from models.sensors.inertial_unit import (
+    angle_random_walk_of,
     error_rotation,
     euler_mean_square,
     euler_quaternions,
     mean_trace,
     measured_attitude,
-    random_walk,
 )
 from models.sensors.rotations import rotation_matrix
 from models.systems.ride.of_scene import linear_vehicle
@@ -104,7 +104,9 @@ def road_variance_error(implementation: str, folder: Path) -> float:
         keeps = np.exp(
             -2.0 * step_share
         )  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
-        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).table(20_000, seed=12)[:, 0]
+        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).wheel_heights_and_rates(20_000, seed=12)[
+            :, 0
+        ]
         error = (2.0 / len(road) * (1.0 + keeps) / (1.0 - keeps)) ** 0.5
         worst = max(worst, abs(float(np.mean(road**2)) / (Q / (2.0 * CORNER)) - 1.0) / error)
     return worst
@@ -123,9 +125,9 @@ def axle_delay_error(implementation: str, folder: Path) -> float:
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
         road = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
         steps = int(2.0 * length / (speed * road.step)) + 50
-        front, rear = road.table(steps, seed=3)[:, :2].T
+        front, rear = road.wheel_heights_and_rates(steps, seed=3)[:, :2].T
         lag = next((i for i in range(1, len(front)) if np.array_equal(rear[i : i + 20], front[:20])), 0)
-        worst = max(worst, abs(lag * road.half * speed / length - 1.0) if lag else np.inf)
+        worst = max(worst, abs(lag * road.half_step * speed / length - 1.0) if lag else np.inf)
     return worst
 
 
@@ -144,7 +146,7 @@ def attitude_error(implementation: str, folder: Path) -> float:
     attitudes = measured_attitude(rates, 1.0 / SAMPLING_RATE, deviation, start, range(PATHS), seed=5)[-1]
     true = measured_attitude(rates, 1.0 / SAMPLING_RATE, np.zeros(3), start, range(1))[-1]
     traces = np.trace(rotation_matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
-    wanted = mean_trace(random_walk(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
+    wanted = mean_trace(angle_random_walk_of(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
@@ -189,7 +191,9 @@ def negative_eigenvalue_share(implementation: str, folder: Path) -> float:
     for speed in (2.0, 7.0, 20.0, 60.0):
         half_car = vehicle(speed)
         P = stationary_covariance(
-            vehicle_with_road(half_car, road_excitation(road_of_level(1.0), on_track(half_car.wheels, 1.0)), speed)
+            vehicle_with_road(
+                half_car, road_excitation(road_of_level(1.0), wheels_on_track(half_car.wheels, 1.0)), speed
+            )
         ).P
         scale = np.sqrt(np.diag(P))
         values = np.linalg.eigvalsh(P / np.outer(scale, scale))

@@ -19,8 +19,8 @@ from models.ride.marginal import Unstable
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
-from models.vehicles.linear_vehicle import LinearVehicle, poles
-from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 from validation.ride.hard_rides import (
     QUARTER_CAR_NUMBERS,
@@ -138,7 +138,7 @@ def toppling_car(implementation: str, folder: Path) -> float:
 
 
 def _refused_by_growth(vehicle: LinearVehicle) -> float:
-    road, growing = paper_road(vehicle.wheels), float(poles(vehicle).real.max())
+    road, growing = paper_road(vehicle.wheels), float(eigenvalues(vehicle).real.max())
     for route in (
         lambda: stationary_covariance(vehicle_with_road(vehicle, road, SPEED)),
         lambda: variances_by_quadrature(vehicle, road, SPEED),
@@ -228,7 +228,7 @@ def wrong_entry_case(change: Change, expected_place: str) -> Callable[..., float
     """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
     def error(implementation: str, folder: Path) -> float:
-        table = parse(SHIPPED / "half_car.toml")
+        table = parse(SHIPPED_FOLDER / "half_car.toml")
         change(table)
         try:
             vehicle = build_vehicle(table, "half_car.toml")

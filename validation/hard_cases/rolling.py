@@ -73,7 +73,7 @@ def reversal_jump(implementation: str, folder: Path) -> float:
     """Case: the speed passes 0 and the limits of its regularisation. Error: largest jump of an acceleration divided by
     mu N / m."""
     jumps = []
-    for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
+    for middle in (-wf.REGULARISED_SPEED, 0.0, wf.REGULARISED_SPEED):
         rates_below, rates_above = (
             built_wheelset(implementation, CHOSEN_WHEELSET, middle + speed_offset) for speed_offset in (-1e-9, 1e-9)
         )

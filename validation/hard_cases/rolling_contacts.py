@@ -26,7 +26,7 @@ from models.multibody.plain.march import march
 from models.rail.energy import energy_ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
-from models.rail.wheel_forces import REGULAR
+from models.rail.wheel_forces import REGULARISED_SPEED
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.handling.energy import drive_energy
 from models.systems.handling.run import Drive, build, drive_run, read_run
@@ -81,7 +81,7 @@ def reversal_force_jump(implementation: str, folder: Path) -> float:
     """Case: the speed passes 0 and the limits of the regularisation. Error: largest change of a force divided by mu
     N."""
     shares = []
-    for middle in (-REGULAR, 0.0, REGULAR):
+    for middle in (-REGULARISED_SPEED, 0.0, REGULARISED_SPEED):
         backwards, forwards_wheels = (Wheels(cells=7, speed=middle + speed_offset) for speed_offset in (-1e-9, 1e-9))
         change = rig_forces(implementation, forwards_wheels, SLIDES) - rig_forces(implementation, backwards, SLIDES)
         shares.append(np.abs(change[:, :2]).max() / (backwards.mu * backwards.load))

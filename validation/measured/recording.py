@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from models.sensors.rotations import conjugate_quaternion, integrate, quaternion_product, rotation_vector
+from models.sensors.rotations import conjugate_quaternion, integrate_attitude, quaternion_product, rotation_vector
 from validation.common.scenes import data_folder
 
 RECORDING_FILE = "comma2k19_example_60s.npz"
@@ -46,5 +46,5 @@ def read_recording(path: Path) -> Recording:
 def gyro_error(recording: Recording) -> np.ndarray:
     """Angle (n,) in rad between the camera's attitude and the attitude integrated from the gyro, which starts at the
     camera's."""
-    attitudes = integrate(recording.rates, SAMPLE_PERIOD, recording.pose[0], "mean")
+    attitudes = integrate_attitude(recording.rates, SAMPLE_PERIOD, recording.pose[0], "mean")
     return np.linalg.norm(rotation_vector(quaternion_product(conjugate_quaternion(recording.pose), attitudes)), axis=1)

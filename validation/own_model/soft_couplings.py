@@ -10,10 +10,10 @@ bodies' means over three directions, of their centres' shifts or of their turns.
 import numpy as np
 
 from models.multibody.plain.constraints import turning_rows
-from models.multibody.plain.motion import FIRST
-from models.own_model.builds import Equations, Moved, plain_tree
+from models.multibody.plain.motion import FIRST_DERIVATIVE
+from models.own_model.builds import Equations, Motion, plain_tree
 from models.own_model.constraints import plain_constraints
-from models.own_model.equalities import tie_rows
+from models.own_model.equalities import coupling_rows
 from models.own_model.reading import TwinModel
 
 QUATERNION_RATE = 0.5
@@ -26,12 +26,12 @@ def soft_constraint_equations(twin: TwinModel) -> Equations:
     tree, constraints = plain_tree(twin), plain_constraints(twin)
     give, scale = _row_compliance(twin), _row_factors(twin)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         mass, force = tree.mass_and_force(0.0, q, v)
-        rows, rest = constraints.asked(q, v)
+        rows, rest = constraints.terms(q, v)
         rows, rest = scale[:, None] * rows, scale * rest
         acceleration = np.linalg.solve(mass + rows.T / give @ rows, force - rows.T / give @ rest)
-        return Moved(mass, mass @ acceleration, acceleration)
+        return Motion(mass, mass @ acceleration, acceleration)
 
     return move
 
@@ -48,7 +48,7 @@ def _row_compliance(twin: TwinModel) -> np.ndarray:
     driven, tree = twin.driven, plain_tree(twin)
     mass, _ = tree.mass_and_force(0.0, *np.zeros((2, twin.size)))
     inverse = np.linalg.inv(mass)
-    rows, _ = tie_rows(driven.couplings, twin.size)
+    rows, _ = coupling_rows(driven.couplings, twin.size)
     ties = np.array([_impedance_share(tie.solimp) for tie in driven.couplings]) * ((rows != 0.0) @ inverse.diagonal())
     light = [
         (_impedance_share(each.solimp) * _mean_inverse_inertia(twin, inverse, each.ends), each.axes)
@@ -69,6 +69,6 @@ def _mean_inverse_inertia(twin: TwinModel, inverse_mass: np.ndarray, ends: tuple
     motion = bodies.move(*np.zeros((2, twin.size)))
     for name in (name for name, _ in ends if name is not None):
         (shift,) = motion.at(bodies.points([(name, bodies.position[name])]))
-        for i, rows in enumerate((shift[FIRST:].T, turning_rows(motion.axes(bodies.row[name])))):
+        for i, rows in enumerate((shift[FIRST_DERIVATIVE:].T, turning_rows(motion.axes(bodies.row[name])))):
             total[i] += np.trace(rows @ inverse_mass @ rows.T) / 3.0
     return total

@@ -30,8 +30,8 @@ from models.multibody.cut_kernel import (
     FIRST_POINT,
     SECOND_BODY,
     joint_forces,
-    parts,
     set_joint_forces,
+    table_views,
 )
 from models.multibody.cut_table import HubInputs, table
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -135,7 +135,7 @@ def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
     tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UPWARD) for t in vehicle.tyres]
     cut_vehicle = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
     numbers = table(cut_vehicle, HubInputs(np.zeros((3, 0))), STEP)
-    rows, numbers[CHASSIS] = parts(numbers)[3], -1.0
+    rows, numbers[CHASSIS] = table_views(numbers)[3], -1.0
     rows[:, AXIS_JOINT] = -1.0
     for row, tyre in zip(rows[len(springs) :], vehicle.tyres, strict=True):
         row[FIRST_BODY], row[FIRST_POINT:SECOND_BODY] = -1.0, tyre.point

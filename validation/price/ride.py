@@ -19,7 +19,7 @@ from models.machine.timing import interleave
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.frequency import spectral_densities, variances_by_quadrature
-from models.ride.monte_carlo import VarianceEstimate, at_constant_speed
+from models.ride.monte_carlo import VarianceEstimate, variances_at_constant_speed
 from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -128,7 +128,9 @@ def measure_routes(quick: bool, round_count: int, minimum_seconds: float) -> tup
         points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - start_time))
         jobs.append(partial(deviations_on_grid, ride, count, highest_frequency, even))
     for copies, lasting in COPY_COUNTS[quick]:
-        jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
+        jobs.append(
+            partial(variances_at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED)
+        )
         start_time = time.perf_counter()
         estimate: VarianceEstimate = jobs[-1]()
         errors, z = ride.errors(np.sqrt(estimate.variance[0])), float(np.abs(estimate.z(ride.truth[None])).max())
@@ -154,7 +156,7 @@ def _lyapunov_point(ride: PricedRide) -> RoutePoint:
 def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
-    with mock.patch.object(module, "modes", wraps=module.modes) as watched_modes:
+    with mock.patch.object(module, "modes_of_matrix", wraps=module.modes_of_matrix) as watched_modes:
         deviations = swept_deviations(ride, speeds)
     return RoutePoint(
         f"sweep, one of {5 * speeds} points", "decompositions", watched_modes.call_count, ride.errors(deviations), 0.0

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from models.core.noise import normal_samples
 from models.road.fitted import FittedRoad, fit_road
 from models.road.iso8608 import level_of_class
-from models.road.isotropic import isotropic_like
+from models.road.isotropic import isotropic_road_like
 from models.road.measured_tracks import MeasuredTracks, read_tracks
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import road_of_level
@@ -160,7 +160,7 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)
-    isotropic = isotropic_like(road, half_track)
+    isotropic = isotropic_road_like(road, half_track)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.8))
     left.fill_between(
         k,

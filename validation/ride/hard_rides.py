@@ -15,7 +15,7 @@ from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper, TurnOutput, Tyre
-from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
 from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_track
 
 SPEED = 20.0
@@ -82,7 +82,7 @@ def single_body(mass: float, stiffness: float, damping: float) -> SpatialVehicle
 @cache
 def roll_steered_vehicle() -> SpatialVehicle:
     """The vehicle R19-free with roll steer at the front axle; outputs: heading and lateral position."""
-    table = parse(SHIPPED / "r19_free.toml")
+    table = parse(SHIPPED_FOLDER / "r19_free.toml")
     table["axles"][0]["roll_steer"] = 0.05
     vehicle = build_vehicle(table, "steered")
     outputs = (

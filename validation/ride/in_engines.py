@@ -8,9 +8,9 @@ import numpy as np
 
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
-from models.ride.frequency import one_sided, standard_errors
+from models.ride.frequency import one_sided_densities, standard_errors
 from models.ride.road_path import road_path
-from models.ride.statistical_linearisation import promised_error, statistically_linear
+from models.ride.statistical_linearisation import largest_error_seen, statistically_linear
 from models.road.excitation import Excitation
 from models.road.two_track import TRACK_DENSITY_LEVEL
 from models.systems.ride.nonlinear import Ride, drive_over_road
@@ -80,7 +80,7 @@ def nonlinear_engine_rows(quick: bool) -> list[Row]:
                 float(shift),
                 "",
             ).at_most(
-                promised_error(left[travel]) + 4.0 * float(error[travel] / size[travel]),
+                largest_error_seen(left[travel]) + 4.0 * float(error[travel] / size[travel]),
                 "what its sentence promises, and 4 standard errors",
                 "none",
             )
@@ -147,7 +147,7 @@ def _spectral_densities(runs: dict[str, Ride], linear_vehicle: LinearVehicle, ex
     """One-sided spectral densities (1/Hz) of SHOWN_OUTPUTS: of the linear vehicle in closed form, and by Welch's method
     of each engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)
-    sides = {"own": (frequency, one_sided(linear_vehicle, excitation, SPEED, frequency))}
+    sides = {"own": (frequency, one_sided_densities(linear_vehicle, excitation, SPEED, frequency))}
     sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
     return {
         side: {

@@ -101,7 +101,7 @@ def _free_rows() -> list[Row]:
     density = spectral_densities(turning, road, 20.0, np.array([omega]))[0, side]
     return [
         Observed(
-            "ride_covariance.free.zeros", SYSTEM, "number of zero eigenvalues of R19-free", split.zeros, ""
+            "ride_covariance.free.zeros", SYSTEM, "number of zero eigenvalues of R19-free", split.zero_count, ""
         ).within(3, 0, "place along and across, heading", "closed form"),
         behaviour_row(
             "ride_covariance.free.status",

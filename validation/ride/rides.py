@@ -18,9 +18,9 @@ from models.road.two_track import (
     TRACK_DENSITY_LEVEL,
     TwoTrackRoad,
     half_track,
-    on_track,
     road_excitation,
     road_of_level,
+    wheels_on_track,
 )
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
@@ -100,7 +100,7 @@ def paper_road(
     """The paper's road of two tracks under wheels, with the named kinds of correlation; one track for wheels without a
     track width."""
     y = half_track(wheels)
-    placed = wheels if y else on_track(wheels, 1.0)
+    placed = wheels if y else wheels_on_track(wheels, 1.0)
     return road_excitation(road_of_level(y or 1.0, level_factor, cutoff=cutoff), placed, *correlation_words)
 
 

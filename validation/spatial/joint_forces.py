@@ -134,7 +134,7 @@ class _LoadedModel:
             )
             travel = axis @ (second_position - from_point) - e.axis @ (e.second_point - e.first_point)
             rate = axis @ (fast_two - fast_one - np.cross(spin[:3], second_position - from_point))
-            force = (e.held + e.stiffness * travel + e.damping * rate) * axis
+            force = (e.preload + e.stiffness * travel + e.damping * rate) * axis
             for body, point_position, signed_force in (
                 (e.first_body, from_point, force),
                 (e.second_body, second_position, -force),

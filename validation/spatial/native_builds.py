@@ -68,7 +68,7 @@ def hand_written_equations(vehicle: CutVehicle) -> SpatialReference:
         replace(vehicle.tree, springs=full_vehicle.springs, bars=full_vehicle.bars, gravity=0.0)
     )
     equations.vehicle = replace(equations.vehicle, gravity=GRAVITY)
-    equations.held = equations.held._replace(parts={element.name: element.held for element in vehicle.elements})
+    equations.held = equations.held._replace(parts={element.name: element.preload for element in vehicle.elements})
     return equations
 
 

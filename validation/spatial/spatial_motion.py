@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.sensors.rigid_body_motion import StartState
-from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix, skew_matrix
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 SensorPositions = dict[str, tuple[float, float, float]]
@@ -51,7 +51,7 @@ def rigid_body_motion(sample_count: int = 2001, sample_period: float = 1e-3) -> 
     )
     rates = np.einsum("nij,nj->ni", turn, speeds)
     alpha = np.einsum("nij,nj->ni", change, speeds) + np.einsum("nij,nj->ni", turn, changes)
-    orientation = from_cardan(roll, pitch, yaw)
+    orientation = quaternion_from_cardan(roll, pitch, yaw)
     positions, velocities, accelerations = _sine_waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
     rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, positions))
     return RigidBodyMotion(alpha, rates, orientation, accelerations, positions, StartState(*rows), sample_period)
@@ -83,7 +83,7 @@ def tilted_sensors(height: float, rotation: np.ndarray) -> SensorPositions:
     return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ rotation.T)}
 
 
-TILT_ROTATION = rotation_matrix(from_cardan(0.3, 0.4, 0.5))
+TILT_ROTATION = rotation_matrix(quaternion_from_cardan(0.3, 0.4, 0.5))
 SENSOR_ARRANGEMENTS: dict[str, SensorPositions] = {
     "4": {"s1": (1, 0.6, 0), "s2": (1, -0.6, 0.5), "s3": (-1, 0.6, 0), "s4": (-1, -0.6, -0.5)},
     "5, one 1 m up": tilted_sensors(1.0, np.eye(3)),

@@ -33,7 +33,7 @@ DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 200.0, 600.0)
 
 def caravan() -> SpatialVehicle:
     """The shipped car with a caravan of one axle on its ball hitch."""
-    return load_vehicle("r19_caravan", towing=True)
+    return load_vehicle("r19_caravan", allows_towing=True)
 
 
 def train() -> SpatialVehicle:

@@ -67,7 +67,7 @@ def contact_of_wheel(wheelset: Wheelset, wheel_side: float, axle: PlainAxle) -> 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
     The generator of that plane runs from the apex; the place is where it crosses the head's axis as seen along n.
     """
-    w, (sine, cosine) = wheelset, wheelset.slant
+    w, (sine, cosine) = wheelset, wheelset.cone_sine_and_cosine
     outward = wheel_side * axle.axle
     size, phase = np.hypot(outward[1], outward[2]), np.arctan2(outward[1], outward[2])
     angle = phase - np.arccos(sine / size) if outward[1] > 0.0 else phase + np.arccos(sine / size)
@@ -113,9 +113,11 @@ def creep_forces(
     if a == 0.0:
         return np.zeros(3)
     if creep_law == "linear":
-        return np.array([float(force) for force in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
+        return np.array(
+            [float(force) for force in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.material_pair)]
+        )
     creep = fastsim(
-        RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.pair, cells=cells
+        RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.material_pair, cells=cells
     )
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
@@ -126,7 +128,7 @@ def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, creep_l
     across = np.cross(touch.normal, np.array([1.0, 0.0, 0.0]))
     velocity = axle.velocity + np.cross(axle.turning, touch.position)
     slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ touch.normal]), velocity @ touch.normal
-    elastic, a, b = hertz_force(touch.depth, touch.curvature_along, 0.5 / w.head_radius, w.pair.modulus)
+    elastic, a, b = hertz_force(touch.depth, touch.curvature_along, 0.5 / w.head_radius, w.material_pair.modulus)
     load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
     forwards, reference_speed = (
         float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)),
@@ -161,13 +163,13 @@ class PlainWheelset:
 
     def __init__(self, wheelset: Wheelset, speed: float, law: str, cells: int = 21, lean: float = 0.0) -> None:
         self.wheelset, self.speed, self.law, self.cells, self.lean = wheelset, speed, law, cells, lean
-        half = wheelset.load / (2.0 * wheelset.slant[1])
-        curvatures = wheelset.slant[1] / (2.0 * wheelset.radius), 0.5 / wheelset.head_radius
+        half = wheelset.load / (2.0 * wheelset.cone_sine_and_cosine[1])
+        curvatures = wheelset.cone_sine_and_cosine[1] / (2.0 * wheelset.radius), 0.5 / wheelset.head_radius
 
         def short(depth: float) -> float:
-            return hertz_force(depth, *curvatures, wheelset.pair.modulus)[0] - half
+            return hertz_force(depth, *curvatures, wheelset.material_pair.modulus)[0] - half
 
-        self.approach_at_rest = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.slant[1]
+        self.approach_at_rest = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.cone_sine_and_cosine[1]
 
     def patches(self, state: np.ndarray) -> list[PatchForces]:
         """Contact forces of both rails on the wheelset for a state (10,), right rail first."""

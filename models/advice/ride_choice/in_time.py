@@ -15,7 +15,7 @@ from pydantic import Field
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import absent_effects, with_effects
 from models.core.strict import LARGEST_QUANTITY, Strict, quantity
-from models.ride.gaussian_laws import of_curve, of_friction
+from models.ride.gaussian_laws import mean_force_and_slope, mean_friction_slope
 from models.ride.nonlinear_copies import STEPS_PER_READING, CopiesMarch, settling_time, usual_step
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import BentSpring, statistically_linear
@@ -189,7 +189,7 @@ def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
     """Time steps of the copies at a speed (m/s), each ``lasting`` (s) after settling."""
     excitation = scene.excitation()
     linear = statistically_linear(scene.vehicle.with_tyres(pushes_only=False), excitation, speed)
-    half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half
+    half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half_step
     unit = 2.0 * half * STEP_MULTIPLE
     settling, counted = (STEP_MULTIPLE * int(np.ceil(time / unit)) for time in (settling_time(linear.vehicle), lasting))
     return CopySteps(speed, half, settling, counted, linear.springs)
@@ -235,13 +235,13 @@ def _linearised_spring(
     if motion is None:
         return spring
     if "travel_force" in laws and spring.travel_force:
-        gain = of_curve(spring.travel_force, motion.travel, motion.deviation)[1]
+        gain = mean_force_and_slope(spring.travel_force, motion.travel, motion.deviation)[1]
         spring = replace(spring, stiffness=spring.stiffness + gain, travel_force=None)
     if "rate_force" in laws and spring.rate_force:
-        gain = of_curve(spring.rate_force, 0.0, motion.rate)[1]
+        gain = mean_force_and_slope(spring.rate_force, 0.0, motion.rate)[1]
         spring = replace(spring, damping=spring.damping + gain, rate_force=None)
     if "friction" in laws and spring.friction:
-        gain = of_friction(spring.friction, spring.friction_rate, motion.rate)
+        gain = mean_friction_slope(spring.friction, spring.friction_rate, motion.rate)
         spring = replace(spring, damping=spring.damping + gain, friction=0.0)
     return spring
 
@@ -255,7 +255,7 @@ def _road_heights(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     """
     road = path.excitation
     arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
-    of_run = path.speed, path.half, steps, samples.copies, samples.seed
+    of_run = path.speed, path.half_step, steps, samples.copies, samples.seed
     key = (*arrays, road.lengths, road.independent, *of_run)
     if key not in _stored_roads:
         while sum(roads.nbytes for roads in _stored_roads.values()) > ROADS_BYTES:

@@ -11,7 +11,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from models.advice.ride_choice.march import March
 from models.core.runge_kutta import RK4_STAGES, runge_kutta_step
-from models.ride.covariance import noise_of
+from models.ride.covariance import noise_intensity_of_system
 from models.ride.road_path import RoadPath
 
 STEP_REFINEMENT = 4
@@ -126,7 +126,7 @@ def _initial_states(march: March, road: np.ndarray) -> np.ndarray:
     A short run would not reach it from rest.
     """
     n, states, system = march.vehicle_state_count, march.reduced.states, march.reduced.system
-    P = solve_continuous_lyapunov(system.A, -noise_of(system))[:states, :states]
+    P = solve_continuous_lyapunov(system.A, -noise_intensity_of_system(system))[:states, :states]
     regression = P[:n, n:] @ np.linalg.pinv(P[n:, n:], hermitian=True)
     values, vectors = np.linalg.eigh(P[:n, :n] - regression @ P[n:, :n])
     chance = np.random.default_rng(SEED).standard_normal((n, road.shape[1]))

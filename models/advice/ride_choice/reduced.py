@@ -17,14 +17,14 @@ from scipy.linalg import block_diag
 from models.advice.ride_choice.modes import Modes, modes_of, modes_with_road, modes_with_weightings, stable_step
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
-from models.ride.covariance import noise_of
-from models.ride.excited import DelayedSystem, VehicleStates, first_order, vehicle_states
+from models.ride.covariance import noise_intensity_of_system
+from models.ride.excited import DelayedSystem, VehicleStates, first_order_system, vehicle_states
 from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import free, limited, linearise, massless
+from models.vehicles.spatial_linear import linearise, mass_matrix_without, reduced_vehicle, remaining_motions
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Reduced:
     @cached_property
     def noise(self) -> np.ndarray:
         """Rate (x, x) per second at which the noise of all axles adds to the covariance of the states."""
-        return noise_of(self.system, self.modes.propagated if self.modes else None)
+        return noise_intensity_of_system(self.system, self.modes.propagated if self.modes else None)
 
 
 class IndexNumbers:
@@ -177,7 +177,7 @@ class Vehicles:
     def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The reduced vehicle of a scene at a speed (m/s), newly computed."""
         N = self._free_directions(scene)
-        left = limited(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
+        left = reduced_vehicle(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
         states = vehicle_states(left)
         if not len(states.A):
             raise InputError("", "effects", None, "the reduced vehicle has no degree of freedom left")
@@ -190,7 +190,7 @@ class Vehicles:
         names = scene.limits.massless
         key = *self._numbers.indices_of_attributes(scene.vehicle, "bodies", "joint_elements"), names
         if key not in self._masses:
-            self._masses[key] = massless(scene.vehicle, names)
+            self._masses[key] = mass_matrix_without(scene.vehicle, names)
         return self._masses[key]
 
     def _free_directions(self, scene: ReducedScene) -> np.ndarray:
@@ -200,7 +200,7 @@ class Vehicles:
         limits = scene.limits
         key = *self._numbers.indices_of_attributes(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
         if key not in self._free:
-            self._free[key] = free(scene.vehicle, limits)
+            self._free[key] = remaining_motions(scene.vehicle, limits)
         return self._free[key]
 
 
@@ -245,7 +245,7 @@ class FullScene:
         """The linear system of the reduced scene before the weighting filters of outputs are added."""
         vehicle, (excitation, Tf, left_f) = self.vehicles.reduced_vehicle_of(scene, self.speed), self._heights(scene)
         states, N = vehicle.states, vehicle.N
-        system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
+        system, Tq = first_order_system(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
         inert, road = len(states.massless_part), len(states.A)
         q, f = N @ Tq, np.hstack([np.zeros((m, road)), Tf])

@@ -23,7 +23,7 @@ from models.ride.covariance import (
     FINITE,
     StationaryCovariance,
     lyapunov_solution,
-    noise_of,
+    noise_intensity_of_system,
     rounding_thresholds,
     stationary_covariance,
 )
@@ -60,7 +60,7 @@ def solve(system: DelayedSystem, rows: list[int]) -> StationarySolution:
     if split.count_of_marginal_states:
         raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
     V, W, C = split.V, split.W, system.C[rows]
-    P = V @ lyapunov_solution(split.S, W @ noise_of(system) @ W.T)[0] @ V.T
+    P = V @ lyapunov_solution(split.S, W @ noise_intensity_of_system(system) @ W.T)[0] @ V.T
     L = np.array([W.T @ lyapunov_solution(split.S.T, np.outer(c, c))[0] @ W for c in C @ V])
     return StationarySolution(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
 
@@ -112,7 +112,7 @@ class Screen:
         covariance = solve(system, self.rows)
         P = left @ self.extended_solution.P @ left.T
         half = system.A.astype(np.longdouble) @ P
-        excess_noise = half + half.T + noise_of(system)
+        excess_noise = half + half.T + noise_intensity_of_system(system)
         C = system.C[self.rows].astype(np.longdouble)
         variance = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", covariance.L, excess_noise)
         return variance.astype(float), covariance.variance.astype(float)

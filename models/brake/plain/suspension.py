@@ -12,9 +12,9 @@ import numpy as np
 
 from models.brake.sprung import Sprung
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of
 
 UPWARD = np.array([0.0, 0.0, 1.0])
@@ -57,7 +57,7 @@ class Suspension:
         free = vehicle.handling.vehicle
         self.bodies, self.tyres = Bodies(free), free.tyres
         self.parts = PlainParts(self.bodies, free, CARRIER)
-        preloads, self.loads = held_at_rest(free, CARRIER)
+        preloads, self.loads = preloads_at_rest(free, CARRIER)
         self.held, self._joint_held = np.split(preloads, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, free)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(free)
@@ -97,7 +97,10 @@ class Suspension:
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
         rolling_direction = heading @ (np.cos(steer), np.sin(steer), 0.0)
         height = max(float(hub[PLACE, 2]), 0.0)
-        hub_turning, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._carrying[i])
+        hub_turning, carrying = (
+            motion.angular_velocity(int(self._hubs.rows[i])),
+            motion.angular_velocity(self._carrying[i]),
+        )
         turning = hub_turning + axle * (
             axle @ (carrying - hub_turning)
         )  # the rim does not turn beside what carries the wheel about its axle
@@ -137,7 +140,7 @@ class Suspension:
         """
         centre, forward = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
         speed = float(centre[RATE] @ forward)
-        forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * forward)
+        forces: np.ndarray = centre[FIRST_DERIVATIVE:] @ (-self._drag * abs(speed) * speed * forward)
         return forces
 
     def _by_tyres(self, motion: PlainMotion, constant: WheelForces) -> np.ndarray:
@@ -149,9 +152,9 @@ class Suspension:
             creep = contact.along * constant.forces[i, 0] + contact.axle * constant.forces[i, 1]
             moment = -contact.height * round_the_vertical(creep)
             rolling = contact.axle * (contact.axle @ moment)
-            total += hubs[i, FIRST:] @ (creep + contact.load * UPWARD)
-            total += motion.by_moment(int(self._hubs.rows[i]), moment - rolling)
-            total += motion.by_moment(self._carrying[i], rolling - contact.axle * constant.spin_moments[i])
+            total += hubs[i, FIRST_DERIVATIVE:] @ (creep + contact.load * UPWARD)
+            total += motion.moment_forces(int(self._hubs.rows[i]), moment - rolling)
+            total += motion.moment_forces(self._carrying[i], rolling - contact.axle * constant.spin_moments[i])
         return total
 
     def liveliness(self) -> float:

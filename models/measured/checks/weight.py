@@ -16,7 +16,7 @@ from models.measured.checks.spectra import windowed_means
 from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, cause_and_sentence, missing_load_sentence
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
-from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid_vehicle
 
 NAME = "weight"
 LOAD_ERROR = 1e-3
@@ -123,7 +123,7 @@ def _balance_of_means(
 ) -> EquilibriumResidual:
     """Equilibrium from mean signals (k,), or (k + 2,) with the mean angular accelerations of roll and pitch, whose
     inertia moments are then taken into account."""
-    whole, hubs = rigid(vehicle), len(vehicle.hubs)
+    whole, hubs = rigid_vehicle(vehicle), len(vehicle.hubs)
     unit = np.eye(WRENCH * hubs)[numbers]
     turning = whole.moments(unit)[:, :2].T
     vertical = unit[:, 2::WRENCH].T

@@ -1,4 +1,4 @@
-"""The independent reference: a vehicle in space from its description, in plain numpy that no engine shares.
+"""Independent reference in plain numpy: a vehicle in space from its description, without any code that an engine uses.
 
 ``motion`` differentiates the product of the joints' matrices (Lagrange's equations by pseudo-inertia matrices, Uicker
 1965), ``parts`` has springs, dampers and bars, ``statics`` what holds the design position, ``march`` the classical

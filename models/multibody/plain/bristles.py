@@ -1,4 +1,5 @@
-"""An elliptic patch of bristles that roll through it, in plain numpy: tractions as complex numbers, strip by strip.
+"""Creep forces of a tyre as an elliptic patch of bristles, in plain numpy: tractions as complex numbers, strip by
+strip.
 
 The law of ``models.tyre.bristles`` (Kalker's simplified theory, marched to second order) on a net that is made anew
 here. Pressure is parabolic. In a strip's own scale, tractions by the bound in its middle, a bristle runs from 1 to -1;
@@ -13,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 FADING_SPEED = 0.1
-"""Speed (m/s) of the tread below which slip is relative to it, and forces of both directions are mixed."""
+"""Speed (m/s) of the tread below which slip is taken relative to this speed, and the forces of both rolling directions
+are mixed."""
 MARGIN = 1.0 + 2e-15
-"""A bound is a little more than itself where a traction on it is projected."""
+"""Factor by which a traction bound is enlarged where a traction is projected onto it."""
 NEGLIGIBLE_SLIP = 1e-60
-"""Square of a rigid slip that is too small to change the direction of a traction."""
+"""Square of a rigid slip below which it does not change the direction of a traction."""
 LARGEST_EXPONENT = 50.0
 
 
@@ -38,7 +40,8 @@ class Net(NamedTuple):
 
 @cache
 def net(cells: int) -> Net:
-    """Grid with an even number of strips, at least ``cells``, of equal width, and ``cells`` cells in each."""
+    """Grid of a contact patch with an even number of strips of equal width, at least ``cells``, and ``cells`` cells in
+    each."""
     count = cells + cells % 2
     y = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     centre = 1.0 - (2.0 * np.arange(cells) + 1.0) / cells
@@ -51,7 +54,8 @@ def net(cells: int) -> Net:
 
 
 class Patch(NamedTuple):
-    """Patches of tyres, (w,) each: half length and half width (m), load (N), mu, bristles' stiffness (N/m^3)."""
+    """Contact patches of w tyres, each (w,): half length and half width (m), load (N), friction coefficient, stiffness
+    of the bristles (N/m^3)."""
 
     half_length: np.ndarray
     half_width: np.ndarray
@@ -60,36 +64,39 @@ class Patch(NamedTuple):
     stiffness: np.ndarray
 
 
-def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
-    """fx, fy (N) and mz (N m) on tyres (w, 3).
+def tyre_forces(patch: Patch, sliding: np.ndarray, cells: int) -> np.ndarray:
+    """Creep forces fx, fy (N) and moments mz (N m) on w tyres, (w, 3).
 
-    slides (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
+    sliding (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
     """
-    tread = slides[:, 3]
-    ahead = _rolling(patch, slides[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cells)
+    tread = sliding[:, 3]
+    ahead = _forward_rolling_forces(patch, sliding[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cells)
     if (tread >= FADING_SPEED).all():
         return ahead
-    mirrored = slides[:, :3] * np.array([-1.0, 1.0, -1.0])
-    behind = _rolling(patch, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cells) * np.array([-1.0, 1.0, -1.0])
+    mirrored = sliding[:, :3] * np.array([-1.0, 1.0, -1.0])
+    behind = _forward_rolling_forces(patch, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cells) * np.array(
+        [-1.0, 1.0, -1.0]
+    )
     part = np.clip(0.5 + 0.5 * tread / FADING_SPEED, 0.0, 1.0)[:, None]
     mixed: np.ndarray = part * ahead + (1.0 - part) * behind
     return mixed
 
 
 def cornering_factor(cells: int) -> float:
-    """Ratio, near 8/3, of the cornering stiffness without sliding to a^2 b k, as the grid of cells sums it up."""
+    """Ratio, near 8/3, of the cornering stiffness without sliding to a^2 b k (half length a, half width b, bristle
+    stiffness k) on the grid of cells."""
     ones = np.ones(1)
     return -float(tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cells)[0, 1])
 
 
-def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
-    """Forces fx, fy and moments mz (w, 3) of tyres that roll forwards."""
+def _forward_rolling_forces(patch: Patch, sliding: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
+    """Creep forces fx, fy (N) and moments mz (N m), (w, 3), of tyres that roll forwards."""
     of = net(cells)
     a, b = patch.half_length[:, None], patch.half_width[:, None]
     grip, area = patch.mu * patch.load, patch.half_length * patch.half_width
     stretch = 2.0 / cells * patch.stiffness * patch.half_length * area
     gain = np.divide(stretch, of.peak * grip, out=np.zeros(len(a)), where=grip > 0.0)  # of a slip per bound and cell
-    x, y, spin = (slides / speed[:, None] * gain[:, None]).T[:, :, None]
+    x, y, spin = (sliding / speed[:, None] * gain[:, None]).T[:, :, None]
     across = of.half / (1.0 - of.y**2)
     slip = (across * (x - spin * b * of.y) + 1j * across * y).ravel()
     turning = 1j * (across * spin * a * of.half).ravel()
@@ -99,50 +106,53 @@ def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) ->
     return np.column_stack([(force * pulled.real).sum(1), (force * pulled.imag).sum(1), moment.sum(1)])
 
 
-def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sums over the cells of each strip: of tractions (complex), and of position times lateral traction.
+def _march(net: Net, slip: np.ndarray, slip_slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums over the cells of each strip, from the leading edge on: of tractions (complex), and of position times
+    lateral traction.
 
-    slip, turning : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
+    slip, slip_slope : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
     """
-    traction, slides = _cut(-0.5 * (slip + turning * net.middle[0]), net.bound[0])
-    pulled, twisted, turn = traction.copy(), net.centre[0] * traction.imag, -2.0 * turning / len(net.centre)
+    traction, slides = _limited(-0.5 * (slip + slip_slope * net.middle[0]), net.bound[0])
+    pulled, twisted, turn = traction.copy(), net.centre[0] * traction.imag, -2.0 * slip_slope / len(net.centre)
     for i in range(1, len(net.centre)):
-        w = slip + turning * net.middle[i]
-        traction, slides = _advance(traction, slides, w, turn, (net.bound[i], net.bound[i - 1], net.bound_between[i]))
+        w = slip + slip_slope * net.middle[i]
+        traction, slides = _next_tractions(
+            traction, slides, w, turn, (net.bound[i], net.bound[i - 1], net.bound_between[i])
+        )
         pulled += traction
         twisted += net.centre[i] * traction.imag
     return pulled, twisted
 
 
-def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions limited to a bound, and flags of those that exceeded it."""
+def _limited(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+    """Tractions limited to the friction bound, and flags of those that exceeded it."""
     size = np.abs(traction)
     beyond = size > bound
     return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond
 
 
-def _advance(
+def _next_tractions(
     tractions_before: np.ndarray,
     slides: np.ndarray,
-    w: np.ndarray,
-    turn: np.ndarray,
+    slip: np.ndarray,
+    slip_change: np.ndarray,
     bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions in the next cell, and which bristles slide there; bounds: in that cell, in the one before, and between
-    them."""
+    """Tractions in the next cell, and flags of the bristles that slide there. bounds: in that cell, in the one before,
+    and between them."""
     bound, last, between = bounds
-    stuck = tractions_before - w
-    after, beyond = _cut(stuck, bound)
+    stuck = tractions_before - slip
+    after, beyond = _limited(stuck, bound)
     if not (slides & beyond).any():
         return after, beyond
-    z = (np.abs(w.real) + np.abs(w.imag)) / (8.0 * between)
-    w = w + turn * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
-    size = np.abs(w)
+    z = (np.abs(slip.real) + np.abs(slip.imag)) / (8.0 * between)
+    slip = slip + slip_change * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
+    size = np.abs(slip)
     turns = slides & beyond & (size * size > NEGLIGIBLE_SLIP)
     size = np.where(turns, size, 1.0)
     h = np.minimum(size / (8.0 * between), LARGEST_EXPONENT)
     grown = (1.0 + h * (1.0 + h * (0.5 + h / 6.0))) ** 8
-    angle = tractions_before * np.conj(-w)
+    angle = tractions_before * np.conj(-slip)
     half = grown * (last * MARGIN * size + angle.real) + 1j * angle.imag
-    turned = bound * (-w / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
+    turned = bound * (-slip / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
     return np.where(turns, turned, after), beyond

@@ -1,4 +1,4 @@
-"""Rigid constraints of a tree of bodies in plain numpy: what they ask of its coordinates, at a state.
+"""Rigid constraints of a tree of bodies in plain numpy: their Jacobian, acceleration terms and violation at a state.
 
 A constraint g(q) = 0 has rows J = dg/dq, and asks J q'' + J' q' = 0 of accelerations. Points kept together: g is the
 vector between them. Axes kept parallel: g are the products of three pairs of axes of both bodies, which must be square
@@ -11,29 +11,31 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, REST, Bodies, PlainMotion
+from models.multibody.plain.motion import BIAS, FIRST_DERIVATIVE, GROUND, PLACE, RATE, Bodies, PlainMotion
 from models.vehicles.spatial import Vector
 
 Axes = tuple[np.ndarray, np.ndarray]
-"""(3, 3) each: axes of two bodies as columns, as they lie in the design position."""
+"""Axes of two bodies as columns in the design position, (3, 3) each."""
 Joint = tuple[tuple[tuple[str | None, Vector], ...], Axes | None]
-"""Two points of bodies (None: the ground) in the design position, m, and axes that must be parallel."""
-SQUARE = ((2, 1), (2, 0), (0, 1))
-"""Axes of the first and of the second body that are square to each other where both turn alike."""
+"""Two points of bodies (None: the ground) in the design position, m, that must coincide; and axes that must be
+parallel, or None."""
+PERPENDICULAR_AXES = ((2, 1), (2, 0), (0, 1))
+"""Pairs of axes, one of the first and one of the second body, that are perpendicular where both bodies are oriented
+alike."""
 
 
 class ConstraintTerms(NamedTuple):
-    """Acceleration-level terms of constraints at a state: Jacobian J (c, n), and J' q' (c,)."""
+    """Acceleration-level terms of constraints at a state, J q'' = -J' q': Jacobian J (c, n), and J' q' (c,)."""
 
-    rows: np.ndarray
-    rest: np.ndarray
+    jacobian: np.ndarray
+    bias: np.ndarray
 
 
 class Gap(NamedTuple):
-    """Violation (c,) of constraints in m and rad at some coordinates, and its derivative (c, n)."""
+    """Violation (c,) of constraints in m and rad at given coordinates, and its derivative (c, n)."""
 
     size: np.ndarray
-    rows: np.ndarray
+    jacobian: np.ndarray
 
 
 class PlainConstraints:
@@ -45,59 +47,63 @@ class PlainConstraints:
         turns = [(ends, axes) for ends, axes in joints if axes is not None]
         self._turns = [([bodies.row[name] if name else GROUND for name, _ in ends], axes) for ends, axes in turns]
 
-    def asked(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
-        """``ConstraintTerms`` at coordinates and rates (n,)."""
+    def terms(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
+        """``ConstraintTerms`` of all constraints at coordinates and rates (n,)."""
         motion = self._bodies.move(q, v)
-        terms = np.hstack((self._apart(motion), *(_products(*each).T for each in self._turned(motion))))
-        rest = np.concatenate((np.zeros(len(self._rows)), terms[REST]))
-        return ConstraintTerms(np.vstack((self._rows, terms[FIRST:].T)), rest)
+        terms = np.hstack((self._point_distances(motion), *(_products(*each).T for each in self._joint_axes(motion))))
+        rest = np.concatenate((np.zeros(len(self._rows)), terms[BIAS]))
+        return ConstraintTerms(np.vstack((self._rows, terms[FIRST_DERIVATIVE:].T)), rest)
 
     def gap(self, q: np.ndarray) -> Gap:
-        """``Gap`` at coordinates (n,). Between axes it is the rotation vector, which vanishes only where the axes
-        coincide."""
+        """Violation of all constraints at coordinates (n,). Between axes it is the rotation vector, which vanishes only
+        where the axes coincide."""
         motion = self._bodies.move(q, np.zeros_like(q))
-        apart, turned = self._apart(motion), [rotation(*each) for each in self._turned(motion)]
+        apart, turned = self._point_distances(motion), [rotation_gap(*each) for each in self._joint_axes(motion)]
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
-        return Gap(size, np.vstack((self._rows, apart[FIRST:].T, *(each.rows for each in turned))))
+        return Gap(size, np.vstack((self._rows, apart[FIRST_DERIVATIVE:].T, *(each.jacobian for each in turned))))
 
-    def _apart(self, motion: PlainMotion) -> np.ndarray:
-        """Vectors between the points of p constraints, with their rates and derivatives, (3 + n, 3 p), rows as in a
-        ``PlainMotion``."""
+    def _point_distances(self, motion: PlainMotion) -> np.ndarray:
+        """Vectors between the two points of each of p constraints, with their rates and derivatives, (3 + n, 3 p), rows
+        as in a ``PlainMotion``."""
         ends = motion.at(self._ends)
         apart: np.ndarray = (ends[1::2] - ends[::2]).transpose(1, 0, 2).reshape(len(motion.matrices[0]), -1)
         return apart
 
-    def _turned(self, motion: PlainMotion) -> Iterator[list[np.ndarray]]:
-        """Axes of both bodies of each joint as columns, with their rates and derivatives, (3 + n, 3, 3) each."""
+    def _joint_axes(self, motion: PlainMotion) -> Iterator[list[np.ndarray]]:
+        """Axes of both bodies of each joint as columns, with their rates and derivatives, (3 + n, 3, 3) for each
+        body."""
         for rows, axes in self._turns:
             yield [motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
 
 
-def _products(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _products(first_axes: np.ndarray, second_axes: np.ndarray) -> np.ndarray:
     """Scalar products (3, 3 + n) of three pairs of axes of two bodies, with rates and derivatives by the product
     rule."""
-    terms = np.empty((len(SQUARE), len(first)))
-    for term, (i, j) in zip(terms, SQUARE, strict=True):
-        axis, other = first[:, :, i], second[:, :, j]
+    terms = np.empty((len(PERPENDICULAR_AXES), len(first_axes)))
+    for term, (i, j) in zip(terms, PERPENDICULAR_AXES, strict=True):
+        axis, other = first_axes[:, :, i], second_axes[:, :, j]
         term[:] = axis @ other[PLACE] + other @ axis[PLACE]
         term[PLACE] /= 2.0
-        term[REST] += 2.0 * axis[RATE] @ other[RATE]
+        term[BIAS] += 2.0 * axis[RATE] @ other[RATE]
     return terms
 
 
-def rotation(first: np.ndarray, second: np.ndarray) -> Gap:
+def rotation_gap(first_axes: np.ndarray, second_axes: np.ndarray) -> Gap:
     """Rotation vector (3,) from the first to the second axes, given in the first, and its derivative (3, n)."""
-    turn = first[PLACE].T @ second[PLACE]
-    change = first[FIRST:].transpose(0, 2, 1) @ second[PLACE] + first[PLACE].T @ second[FIRST:]
-    return Gap(Rotation.from_matrix(turn).as_rotvec(), _spins(change @ turn.T))
+    turn = first_axes[PLACE].T @ second_axes[PLACE]
+    change = (
+        first_axes[FIRST_DERIVATIVE:].transpose(0, 2, 1) @ second_axes[PLACE]
+        + first_axes[PLACE].T @ second_axes[FIRST_DERIVATIVE:]
+    )
+    return Gap(Rotation.from_matrix(turn).as_rotvec(), _rotation_vectors(change @ turn.T))
 
 
 def turning_rows(axes: np.ndarray) -> np.ndarray:
-    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space, from the body's axes in a
-    motion."""
-    return _spins(axes[FIRST:] @ axes[PLACE].T)
+    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space; ``axes`` : the body's axes in
+    a ``PlainMotion``."""
+    return _rotation_vectors(axes[FIRST_DERIVATIVE:] @ axes[PLACE].T)
 
 
-def _spins(rates: np.ndarray) -> np.ndarray:
+def _rotation_vectors(rates: np.ndarray) -> np.ndarray:
     """Rotation vectors (3, n) of n skew-symmetric matrices (3, 3)."""
     return np.array((rates[:, 2, 1], rates[:, 0, 2], rates[:, 1, 0]))

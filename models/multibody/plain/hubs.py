@@ -1,4 +1,4 @@
-"""A vehicle that is cut at its wheels, driven by hub forces or by its tyres on a road, in plain numpy.
+"""A vehicle without its wheels, loaded by hub forces or by its tyres on a road, in plain numpy.
 
 The laws of ``models.multibody.cut_kernel`` anew: springs and bars from the vehicle that was cut, not from its
 elements; preloads from ``statics``; moments as couples; what enforces roll and pitch from one linear system.
@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.motion import FIRST_DERIVATIVE, GROUND, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL, CutVehicle
 
 if TYPE_CHECKING:
     from models.multibody.cut_table import HubInputs
 
-LEANS = [ROLL, PITCH]
+ROLL_AND_PITCH = [ROLL, PITCH]
 WRENCH = 6
 REPORTED = ("inside", "wrenches", "moments")
 
 
 class HubState(NamedTuple):
-    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the frame of the hub inputs, moments (2,)
-    that hold roll and pitch, at one state."""
+    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the frame of the hub inputs and moments
+    (2,) that stabilise roll and pitch, at one state."""
 
     acceleration: np.ndarray
     inside: np.ndarray
@@ -32,8 +32,8 @@ class HubState(NamedTuple):
 
 
 class PlainHubs:
-    """A cut vehicle driven by its hub inputs, in plain numpy. ``step`` (s) covers two intervals between rows of the
-    inputs.
+    """Equations of motion of a vehicle loaded at its wheel hubs, in plain numpy. ``step`` (s) covers two intervals
+    between rows of the inputs.
 
     any_time : whether the hub inputs are read between its rows, too, for methods that pick their own steps.
     """
@@ -42,7 +42,7 @@ class PlainHubs:
         self.vehicle, self.hub_inputs, self.step, self.any_time = vehicle, hub_inputs, step, any_time
         self.bodies = Bodies(vehicle.tree)
         self.parts = PlainParts(self.bodies, vehicle.uncut, vehicle.chassis)
-        self.held, self.loads = held_at_rest(vehicle.uncut, vehicle.chassis)
+        self.held, self.loads = preloads_at_rest(vehicle.uncut, vehicle.chassis)
         self._weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         tyres = vehicle.uncut.tyres
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
@@ -55,21 +55,21 @@ class PlainHubs:
         self._frames = frames.get(hub_inputs.frame, np.full(len(tyres), GROUND))
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> HubState:
-        """State, forces and accelerations at a time (s), coordinates and rates (n,)."""
+        """Accelerations, forces and moments at a time (s), coordinates and rates (n,)."""
         hubs, guide = self._inputs(t)
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._weight)
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
         inside = spring + other
-        by_hubs, wrenches = self._act(motion, hubs, q)
+        by_hubs, wrenches = self._hub_forces(motion, hubs, q)
         force += by_hubs - inside @ travels.gradient
         acceleration, moments = self._guide_accelerations(mass, force, guide, q, v)
         return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Inputs of the hubs and of the guide at a time (s): the nearest rows, or a parabola through the three rows of
-        a step."""
+        """Rows of the hub inputs and of the prescribed roll and pitch at a time (s): the nearest rows, or a parabola
+        through the three rows of a step."""
         last, place = len(self.hub_inputs.hubs) - 1, 2.0 * t / self.step
         if not self.any_time:
             nearest = min(max(round(place), 0), last)
@@ -95,24 +95,25 @@ class PlainHubs:
         rows = [self.at(float(t), *np.split(state, 2)) for t, state in zip(times, states, strict=True)]
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
-    def _act(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of all hubs for one row of the inputs, and the hubs' wrenches (h, 6)."""
+    def _hub_forces(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Generalised forces (n,) of all hubs for one row of the hub inputs, and the hubs' wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
             if self.hub_inputs.road:
-                force, moment = self._tyre(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
+                force, moment = self._tyre_wrench(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
                 wrenches[i] = np.concatenate((force @ axes, moment @ axes))
             else:
                 wrenches[i] = hubs[WRENCH * i : WRENCH * (i + 1)]
                 force, moment = axes @ wrenches[i, :3], axes @ wrenches[i, 3:]
-            total += point[FIRST:] @ force + motion.by_moment(int(self._hubs.rows[i]), moment)
+            total += point[FIRST_DERIVATIVE:] @ force + motion.moment_forces(int(self._hubs.rows[i]), moment)
         return total, wrenches
 
-    def _tyre(
+    def _tyre_wrench(
         self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Force (N) and moment (N m) in space on a hub from its tyre, on a road with height (m) and rate (m/s)."""
+        """Force (N) and moment (N m), in space, on hub i from its tyre, on a road with height (m) and vertical velocity
+        (m/s)."""
         tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
         height, rising = road
         down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
@@ -129,19 +130,19 @@ class PlainHubs:
     def _guide_accelerations(
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its guide or hold
-        it there."""
+        """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its prescribed
+        angles or enforce them."""
         hub_inputs, moments = self.hub_inputs, np.zeros(2)
         if guide is None:
             return np.linalg.solve(mass, force), moments
         wanted, rates, accelerations = guide.reshape(3, 2)
-        off, late = wanted - q[LEANS], rates - v[LEANS]
+        off, late = wanted - q[ROLL_AND_PITCH], rates - v[ROLL_AND_PITCH]
         if hub_inputs.pull:
             moments = np.array(hub_inputs.pull[0::2]) * off + np.array(hub_inputs.pull[1::2]) * late
-            force[LEANS] += moments
+            force[ROLL_AND_PITCH] += moments
             return np.linalg.solve(mass, force), moments
-        wanted = accelerations + 2.0 * hub_inputs.holding * late + hub_inputs.holding**2 * off
-        picks = np.eye(len(force))[LEANS]
+        wanted = accelerations + 2.0 * hub_inputs.enforcing_rate * late + hub_inputs.enforcing_rate**2 * off
+        picks = np.eye(len(force))[ROLL_AND_PITCH]
         system = np.block([[mass, -picks.T], [picks, np.zeros((2, 2))]])
         both = np.linalg.solve(system, np.concatenate((force, wanted)))
         return both[:-2], both[-2:]

@@ -1,4 +1,4 @@
-"""Bodies on joints by products of matrices: where they are, how they move, their mass matrix and what inertia asks.
+"""Kinematics of bodies on joints by products of matrices, with the mass matrix and the inertia forces.
 
 The place of a body is a matrix T (3, 4): rotation and centre. It is the product of its parent's, of the arm to its
 own centre, and of one factor exp(q G) per freedom, G the constant generator of a shift or a turn. The product rule
@@ -18,13 +18,13 @@ import numpy as np
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Freedom, SpatialVehicle, Vector
 
 GROUND = 0
-"""Row of the space among the bodies."""
-PLACE, RATE, REST, FIRST = range(4)
-"""Rows of a body's matrices: T, T', T'' without q'', then dT/dq of every coordinate."""
+"""Index of the ground, which is at rest in space, among the bodies."""
+PLACE, RATE, BIAS, FIRST_DERIVATIVE = range(4)
+"""Row indices of a body's matrices: T, T', T'' without q'', and the first of the derivatives dT/dq_i."""
 
 
 def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) -> np.ndarray:
-    """Generator matrix G (4, 4) of a freedom: translation along, or rotation about, one of the axes (rows)."""
+    """Generator matrix G (4, 4) of a translation along, or a rotation about, one of the axes (rows)."""
     kind, matrix = FREEDOMS.index(freedom), np.zeros((4, 4))
     x, y, z = axes[kind % 3]
     if kind < 3:
@@ -45,41 +45,41 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class PlainMotion:
-    """Motion of all bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the first body being the
-    space."""
+    """Motion of all bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above; the first body is the
+    ground."""
 
     matrices: np.ndarray
 
     def at(self, points: Points) -> np.ndarray:
-        """For each point in space: position (m), velocity, acceleration without the q'' terms, then derivatives by q;
-        (p, 3 + n, 3)."""
+        """Motion (p, 3 + n, 3) of points in space: position (m), velocity, acceleration without the q'' terms, then
+        derivatives by q."""
         rows = self.matrices[points.rows]
         count = rows.shape[1]
         return np.matmul(rows.reshape(len(rows), 3 * count, 4), points.arms[:, :, None]).reshape(len(rows), count, 3)
 
     def axes(self, row: int) -> np.ndarray:
-        """A body's axes as columns, their rates, second derivatives without the q'' terms, and derivatives by q: (3 +
+        """Axes of a body as columns, their rates, second derivatives without the q'' terms, and derivatives by q: (3 +
         n, 3, 3), in this order."""
         axes: np.ndarray = self.matrices[row, :, :, :3]
         return axes
 
-    def turning(self, row: int) -> np.ndarray:
+    def angular_velocity(self, row: int) -> np.ndarray:
         """Angular velocity (3,) in rad/s of a body in space: half the sum of the products axis x rate of axis."""
         axes = self.axes(row)
         spin = axes[RATE] @ axes[PLACE].T
         return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2.0
 
-    def by_moment(self, row: int, moment: np.ndarray) -> np.ndarray:
+    def moment_forces(self, row: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a moment M (N m, in space) on a body, applied as couples of forces M x axis / 2 at
-        its axes."""
+        the body's axes."""
         axes = self.axes(row)
         x, y, z = moment.tolist()
         couples = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ axes[PLACE] / 2.0
-        return axes[FIRST:].reshape(-1, 9) @ couples.ravel()
+        return axes[FIRST_DERIVATIVE:].reshape(-1, 9) @ couples.ravel()
 
 
 class Bodies:
-    """The bodies of a vehicle (kg, m, kg m^2) on their joints."""
+    """Masses, inertias and joints of a vehicle's bodies (kg, m, kg m^2), from which their motion follows."""
 
     def __init__(self, vehicle: SpatialVehicle) -> None:
         self.places = vehicle.coordinates()
@@ -97,25 +97,26 @@ class Bodies:
         self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])
 
     def _arm(self, vehicle: SpatialVehicle, name: str) -> np.ndarray:
-        """Translation (4, 4) from the parent's centre, or from the origin, to the centre of a body."""
+        """Translation (4, 4) from the centre of the parent body, or from the origin, to the centre of a body."""
         parent, arm = vehicle.body(name).parent, np.eye(4)
         arm[:3, 3] = self.position[name] - (self.position[parent] if parent else 0.0)
         return arm
 
     def index(self, body: str, freedom: str) -> int:
-        """Index of a body's coordinate; -1 if the body does not have it."""
+        """Index of a body's coordinate; -1 if the body does not have this freedom."""
         place = (body, freedom)
         return self.places.index(place) if place in self.places else -1
 
     def points(self, places: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
-        """``Points`` of this vehicle, from pairs of body (None for space) and position in the design position (m)."""
+        """``Points`` of this vehicle, from pairs of a body (None for space) and a position in the design position
+        (m)."""
         rows = [self.row[body] if body else GROUND for body, _ in places]
         arms = [[*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in places]
         return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
 
     def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
-        """Motion of all bodies at coordinates and rates (n,): m, rad, per s."""
-        matrices = np.zeros((len(self._parent) + 1, FIRST + self.size, 3, 4))
+        """Motion of all bodies at coordinates (m, rad) and rates (per s), (n,)."""
+        matrices = np.zeros((len(self._parent) + 1, FIRST_DERIVATIVE + self.size, 3, 4))
         matrices[GROUND, PLACE, :, :3] = np.eye(3)
         first, second = np.where(self._turns, np.sin(q), q), np.where(self._turns, 1.0 - np.cos(q), 0.0)
         steps = np.eye(4) + first[:, None, None] * self._generators + second[:, None, None] * self._squares
@@ -127,28 +128,29 @@ class Bodies:
         return PlainMotion(matrices)
 
     def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
-        """Rows of the matrices behind joint j, from those before the joint, by the product rule."""
+        """Rows of the matrices of the body behind joint j, from those before the joint, by the product rule."""
         rows = (below.reshape(-1, 4) @ step).reshape(-1, 3, 4)
-        turned = (rows[:REST].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
-        rows[FIRST + j] = turned[PLACE]
+        turned = (rows[:BIAS].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
+        rows[FIRST_DERIVATIVE + j] = turned[PLACE]
         rows[RATE] += rate * turned[PLACE]
-        rows[REST] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
+        rows[BIAS] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
         return rows
 
     def inertia(self, motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mass matrix (n, n), and forces (n,): weights by gravity (3,) in m/s^2, less inertia forces without the q''
         terms."""
-        columns = motion.matrices[1:, FIRST:]
+        columns = motion.matrices[1:, FIRST_DERIVATIVE:]
         count = self.size
         weighted = (columns.reshape(len(columns), -1, 4) @ self._inertia).reshape(columns.shape)
         flat = weighted.transpose(1, 0, 2, 3).reshape(count, -1)
         mass = flat @ columns.transpose(1, 0, 2, 3).reshape(count, -1).T
         weights = np.tensordot(self._mass, columns[:, :, :, 3], 1) @ gravity
-        return mass, weights - flat @ motion.matrices[1:, REST].ravel()
+        return mass, weights - flat @ motion.matrices[1:, BIAS].ravel()
 
 
 def _pseudo_inertia(mass: float, inertia: np.ndarray) -> np.ndarray:
-    """P (4, 4): second moments of mass about the centre (kg m^2), from the inertia tensor, and the mass."""
+    """Pseudo-inertia matrix (4, 4) of a body: second moments of mass about its centre (kg m^2), from the inertia
+    tensor, and its mass."""
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     matrix[3, 3] = mass

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion, Points
+from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion, Points
 from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDamper
 
 
 def frame_of(element: SpringDamper | AntiRollBar, default: str | None) -> str | None:
-    """Body in which the axis of a spring or bar is fixed (None for space): the part's own choice, or ``default``."""
+    """Body in which the axis of a spring or bar is fixed (None for space): the ``frame`` that it names, or
+    ``default``."""
     return getattr(element, "frame", None) or default
 
 
@@ -29,7 +30,7 @@ class Travels:
 
 
 class PlainParts:
-    """The springs, then the bars, of a vehicle; ``default`` is the frame of those that name none."""
+    """The springs, then the bars, of a vehicle; ``default`` is the frame of those that name no frame."""
 
     def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default: str | None) -> None:
         springs, bars = vehicle.springs, vehicle.bars
@@ -38,10 +39,10 @@ class PlainParts:
         self.stiffness, self.damping = (np.array([getattr(p, k) for p in both]) for k in ("stiffness", "damping"))
         self.friction = np.array([s.friction for s in springs] + [0.0] * len(bars))
         self.friction_rate = np.array([s.friction_rate for s in springs] + [1.0] * len(bars))
-        self._one = bodies.points(
+        self._first_points = bodies.points(
             [*((s.first_body, s.first_point) for s in springs), *((b.left, b.point_left) for b in bars)]
         )
-        self._two = bodies.points(
+        self._second_points = bodies.points(
             [*((s.second_body, s.second_point) for s in springs), *((b.right, b.point_right) for b in bars)]
         )
         axes = [s.axis for s in springs] + [(0.0, 0.0, 1.0 / bar.track) for bar in bars]
@@ -58,17 +59,17 @@ class PlainParts:
         self._design = self.travels(bodies.move(still, still), still, still).travel
 
     def travels(self, motion: PlainMotion, q: np.ndarray, v: np.ndarray) -> Travels:
-        """Travels of all springs and bars at coordinates and rates (n,), for which ``motion`` holds the motion of the
-        bodies."""
-        axes, apart = motion.at(self._axes), motion.at(self._two) - motion.at(self._one)
+        """Travels of all springs and bars at coordinates and rates (n,); ``motion`` is the motion of the bodies
+        there."""
+        axes, apart = motion.at(self._axes), motion.at(self._second_points) - motion.at(self._first_points)
         axis, way = axes[:, PLACE, :, None], apart[:, PLACE, :, None]
         all_ways = ((apart @ axis) + (axes @ way))[:, :, 0]
         travel = 0.5 * all_ways[:, PLACE] + self._rolls @ q - self._design
-        return Travels(travel, all_ways[:, RATE] + self._rolls @ v, all_ways[:, FIRST:] + self._rolls)
+        return Travels(travel, all_ways[:, RATE] + self._rolls @ v, all_ways[:, FIRST_DERIVATIVE:] + self._rolls)
 
     def forces(self, travels: Travels, preloads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (p,) that pull both ends together, N or N m: from springs with preloads ``preloads`` (p,), dampers,
-        friction and curves."""
+        """Forces (p,) that pull both ends together, N or N m: those of the springs with preloads ``preloads`` (p,); and
+        those of dampers, friction and curves."""
         other = self.damping * travels.rate + self.friction * np.tanh(travels.rate / self.friction_rate)
         for i, on_travel, on_rate in self._curves:
             other[i] += on_travel(float(travels.travel[i])) if on_travel else 0.0

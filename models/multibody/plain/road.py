@@ -1,15 +1,16 @@
-"""The surface under a vehicle that may leave its lane, and what its driver does over time, in plain numpy."""
+"""Road surface under a vehicle that may leave its lane, and the driver's controls over time, in plain numpy."""
 
 from itertools import pairwise
 
 import numpy as np
 
 Knots = tuple[tuple[float, float], ...]
-"""Times (s) and values."""
+"""Knots of a control: pairs of time (s) and value."""
 
 
 def surface(waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Heights (m) and slopes along x and y, (w,) each, at places (m): the real part of a sum of plane waves.
+    """Heights (m) and slopes along x and y, (w,) each, of the road at positions x, y (m): the real part of a sum of
+    plane waves.
 
     waves (k, 4) : wave numbers along x and y (rad/m), amplitudes of cosine and sine (m).
     """
@@ -18,9 +19,9 @@ def surface(waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray
     return each.real.sum(1), (1j * each).real @ waves[:, 0], (1j * each).real @ waves[:, 1]
 
 
-def driven(knots: Knots, t: float) -> tuple[float, float]:
-    """Value and rate of a control at a time (s): at rest at knots; between knots it changes by the fraction 6 u^5 - 15
-    u^4 + 10 u^3."""
+def control_value(knots: Knots, t: float) -> tuple[float, float]:
+    """Value and rate (per s) of a control at a time (s): at rest at knots; between knots it changes by the fraction 6
+    u^5 - 15 u^4 + 10 u^3 of its rise."""
     for (start, low), (end, high) in pairwise(knots):
         if start < t < end:
             u = (t - start) / (end - start)

@@ -1,4 +1,5 @@
-"""A car on brush tyres in plain numpy: what ``models.multibody.forces`` computes, all in the axes of space.
+"""A car on brush tyres in plain numpy, the independent reference to ``models.multibody.forces``; all vectors in the
+axes of space.
 
 Vectors of tyres are rows (w, 3). Everything comes from the vehicle, its tyres, controls, road and pushes; no table of
 numbers is read. The laws are those of the compiled forces, written down anew; the motion is that of ``motion``.
@@ -10,10 +11,10 @@ import numpy as np
 
 from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.road import driven, surface
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.road import control_value, surface
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
 from models.vehicles.spatial import Tyre
 
@@ -25,9 +26,9 @@ NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
 class TyreReport(NamedTuple):
-    """Report of every tyre (w,): load (N), creep forces (N) and moment (N m) in its axes, slip along and across (m/s),
-    speed of the tread (m/s), turning (1/s), power (W), moment about the steering axis (N m), steer angle (rad), torque
-    on the wheel by brake and drive (N m)."""
+    """Report of all w tyres, each (w,): load (N), creep forces (N) and moment (N m) in the tyre's axes, slip along and
+    across (m/s), speed of the tread (m/s), rate of turning (1/s), power (W), moment about the steering axis (N m),
+    steer angle (rad), torque on the wheel by brake and drive (N m)."""
 
     press: np.ndarray
     fx: np.ndarray
@@ -44,8 +45,8 @@ class TyreReport(NamedTuple):
 
 
 class Ledger(NamedTuple):
-    """Energy of springs and tyres (J); powers (W) of dampers, friction, drag and pushes; of brakes and drive; of the
-    steering on the wheels."""
+    """Energy ledger of a car on tyres: energy of springs and tyres (J); powers (W) of dampers, friction, drag and
+    pushes; of brakes and drive; of the steering on the wheels."""
 
     potential: float
     dissipated: float
@@ -54,7 +55,7 @@ class Ledger(NamedTuple):
 
 
 class State(NamedTuple):
-    """Accelerations (n,) at one state, with the report of the tyres and the ledger of energy."""
+    """Accelerations (n,) of a car on tyres at one state, with the report of the tyres and the energy ledger."""
 
     acceleration: np.ndarray
     tyres: TyreReport
@@ -62,7 +63,7 @@ class State(NamedTuple):
 
 
 class TyreContact(NamedTuple):
-    """Where tyres touch the road, and how they press on it.
+    """Contact points, axes and loads of w tyres on the road.
 
     down (w, 3) : arms from the wheels' centres to the contacts (m); along, across, normal (w, 3) : axes on the road;
     axle (w, 3); loading (w, 3) : forces of the loads; load (w,) along the normal, N; elastic (w,) : its spring's part
@@ -81,13 +82,13 @@ class TyreContact(NamedTuple):
 
 
 class PlainRolling:
-    """A car on the road, driven by its controls."""
+    """Equations of motion of a car on brush tyres, with steering, brake and drive over time."""
 
     def __init__(self, handling: "Handling") -> None:
         self.handling, vehicle = handling, handling.vehicle
         self.bodies = Bodies(vehicle)
         self.parts = PlainParts(self.bodies, vehicle, CARRIER)
-        held, self.loads = held_at_rest(vehicle, CARRIER)
+        held, self.loads = preloads_at_rest(vehicle, CARRIER)
         self.held, self._joint_held = np.split(held, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, vehicle)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(vehicle)
@@ -123,16 +124,16 @@ class PlainRolling:
         self._steered = front.astype(float)
         self._braked = np.where(front, controls.front_brake, (1.0 - controls.front_brake) / behind) / beside
         behind = max(axles[~self._towed].max(), 1)
-        driven = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
-        self._driven = np.where(self._towed, 0.0, driven)
+        drive_share = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
+        self._driven = np.where(self._towed, 0.0, drive_share)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
-        """State, forces and accelerations at a time (s), positions and rates (n,)."""
+        """Accelerations, tyre report and energy ledger at a time (s), coordinates and rates (n,)."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self.handling.gravity)
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
-        by_tyres, report, ledger = self._roll(t, motion, v)
+        by_tyres, report, ledger = self._wheel_forces(t, motion, v)
         outside, power = self._drag_and_pushes(t, motion)
         travel, rate = self._joints @ q, self._joints @ v
         along, damped = self._joint_held + self._joint_stiffness * travel, self._joint_damping * rate
@@ -146,22 +147,24 @@ class PlainRolling:
         return State(np.linalg.solve(mass, force), report, whole)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
         return self.at(t, q, v).acceleration
 
     def report(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Reports (m, w, 12) of tyres and ledgers (m, 4), fields in their order, of states (m, n) at times (m,)."""
+        """Reports (m, w, 12) of the tyres and energy ledgers (m, 4), fields in their order, of states (m, n) at times
+        (m,)."""
         states = [self.at(float(t), *state) for t, *state in zip(times, q, v, strict=True)]
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _roll(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
-        """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
-        steer, steering = driven(self.handling.controls.steer, t)
+    def _wheel_forces(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+        """Generalised forces (n,) of tyres, brakes and drive; the tyres' report; and the energy ledger of these
+        forces."""
+        steer, steering = control_value(self.handling.controls.steer, t)
         points, angle = motion.at(self._points), self._steered * steer
         contact = self._loads_and_points(motion, points, angle)
-        slides, beside = self._slide(motion, points, contact, self._steered * steering, v)
-        creep = self._creep(contact, slides)
+        slides, beside = self._sliding_velocities(motion, points, contact, self._steered * steering, v)
+        creep = self._creep_forces(contact, slides)
         force, moments = self._tyre_forces(motion, points, contact, creep)
         torques = self._torques(t, beside)
         force += self._turn_wheels(motion, contact.axle, torques)
@@ -186,7 +189,7 @@ class PlainRolling:
         return force, report, ledger
 
     def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
-        """``TyreContact`` with the tyres' loads and contact points on the road; steer (w,), rad."""
+        """Loads, contact points and axes of all tyres on the road; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
@@ -204,18 +207,18 @@ class PlainRolling:
         across = _cross(normal, along)
         return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
-    def _slide(
-        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
+    def _sliding_velocities(
+        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steer_rates: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Sliding velocities (w, 4) as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
+        """Sliding velocities (w, 4), as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
         bodies that carry them, rad/s.
 
-        steering (w,) : rates of steering, rad/s.
+        steer_rates (w,) : rates of steering, rad/s.
         """
-        axle, turning = contact.axle, np.array([motion.turning(row) for row in self._points.rows])
-        locked = ((np.array([motion.turning(row) for row in self._carrying]) - turning) * axle).sum(1)
+        axle, angular_velocity = contact.axle, np.array([motion.angular_velocity(row) for row in self._points.rows])
+        locked = ((np.array([motion.angular_velocity(row) for row in self._carrying]) - angular_velocity) * axle).sum(1)
         spin = np.where(self._rotors >= 0, v[self._rotors], locked)
-        whole = turning + axle * spin[:, None] + np.multiply.outer(steering, UP)
+        whole = angular_velocity + axle * spin[:, None] + np.multiply.outer(steer_rates, UP)
         sliding = points[:, RATE] + _cross(whole, contact.down)
         tread = -spin * (_cross(axle, contact.down) * contact.along).sum(1)
         on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
@@ -231,33 +234,35 @@ class PlainRolling:
         axles: np.ndarray = level * sideways + np.multiply.outer(np.sin(self._leans), UP)
         return axles
 
-    def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
-        """Creep forces along and across (N) and moments (N m), (w, 3), from sliding velocities ``slides`` (w, 4)."""
-        of, ones = self.handling.tyres, np.ones(len(slides))
+    def _creep_forces(self, contact: TyreContact, sliding: np.ndarray) -> np.ndarray:
+        """Creep forces along and across (N) and moments (N m), (w, 3), of all tyres from sliding velocities ``sliding``
+        (w, 4)."""
+        of, ones = self.handling.tyres, np.ones(len(sliding))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
-        return tyre_forces(patch, slides, of.cells)
+        return tyre_forces(patch, sliding, of.cells)
 
     def _tyre_forces(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of creep about the wheels'
-        centres."""
+        """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of the creep forces about the
+        wheels' centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
         moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
-        total = np.tensordot(points[:, FIRST:], force + contact.loading, ((0, 2), (0, 1)))
+        total = np.tensordot(points[:, FIRST_DERIVATIVE:], force + contact.loading, ((0, 2), (0, 1)))
         for row, moment in zip(self._points.rows, moments, strict=True):
-            total += motion.by_moment(int(row), moment)
+            total += motion.moment_forces(int(row), moment)
         about = (moments * contact.axle).sum(1)
         fixed = self._rotors < 0
         np.add.at(total, self._rotors[~fixed], about[~fixed])
         for i in np.flatnonzero(fixed).tolist():
-            total += self._hold(motion, i, about[i] * contact.axle[i])
+            total += self._transferred_moment(motion, i, about[i] * contact.axle[i])
         return total, moments
 
-    def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) when the body that carries wheel i takes over a moment from the wheel's body."""
-        return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
+    def _transferred_moment(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) when the body that carries wheel i takes over a moment (N m) from the wheel's own
+        body."""
+        return motion.moment_forces(self._carrying[i], moment) - motion.moment_forces(int(self._points.rows[i]), moment)
 
     def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
         """Torques (w,) of brake and drive on wheels (N m).
@@ -265,7 +270,7 @@ class PlainRolling:
         relative_spin (w,) : beside what carries each wheel, rad/s.
         """
         controls, of = self.handling.controls, self.handling.tyres
-        braking, driving = driven(controls.brake, t)[0], driven(controls.drive, t)[0]
+        braking, driving = control_value(controls.brake, t)[0], control_value(controls.drive, t)[0]
         torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
@@ -275,22 +280,22 @@ class PlainRolling:
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
             total[self._rotors[i]] += torques[i]
-            total -= self._hold(motion, i, torques[i] * axles[i])
+            total -= self._transferred_moment(motion, i, torques[i] * axles[i])
         return total
 
     def _drag_and_pushes(self, t: float, motion: PlainMotion) -> tuple[np.ndarray, float]:
-        """Generalised forces (n,) of drag and pushes, and their power (W)."""
+        """Generalised forces (n,) of aerodynamic drag and external pushes, and their power (W)."""
         heading = motion.axes(self._carrier)[PLACE]
         total, power = np.zeros(self.bodies.size), 0.0
         if self._drag:
             (middle,) = motion.at(self._middle)
             ahead = float(middle[RATE] @ heading[:, 0])
             force = -self._drag * abs(ahead) * ahead
-            total += middle[FIRST:] @ (force * heading[:, 0])
+            total += middle[FIRST_DERIVATIVE:] @ (force * heading[:, 0])
             power += force * ahead
         for push, point in zip(self.handling.pushes, motion.at(self._pushed), strict=True):
-            pushed = heading @ (driven(push.size, t)[0] * np.array(push.axis))
-            total += point[FIRST:] @ pushed
+            pushed = heading @ (control_value(push.size, t)[0] * np.array(push.axis))
+            total += point[FIRST_DERIVATIVE:] @ pushed
             power += float(point[RATE] @ pushed)
         return total, power
 

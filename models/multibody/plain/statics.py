@@ -8,18 +8,18 @@ another way to the derivatives).
 import numpy as np
 
 from models.multibody.plain.joint_elements import joint_rows
-from models.multibody.plain.motion import FIRST, Bodies
+from models.multibody.plain.motion import FIRST_DERIVATIVE, Bodies
 from models.multibody.plain.parts import PlainParts
 from models.vehicles.spatial import SpatialVehicle, SpringDamper
 
 
-def held_at_rest(vehicle: SpatialVehicle, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """Preloads (p,) of springs, then bars, then joint elements (N, N m; positive in compression), and loads (w,) of
-    tyres (N)."""
+def preloads_at_rest(vehicle: SpatialVehicle, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """Preloads (p,) of springs, then bars, then joint elements (N, N m; positive in compression), and static loads (w,)
+    of tyres (N)."""
     bodies = Bodies(vehicle)
     still = np.zeros(bodies.size)
     motion, parts = bodies.move(still, still), PlainParts(bodies, vehicle, frame)
-    risen = motion.at(bodies.points([(tyre.body, tyre.point) for tyre in vehicle.tyres]))[:, FIRST:, 2]
+    risen = motion.at(bodies.points([(tyre.body, tyre.point) for tyre in vehicle.tyres]))[:, FIRST_DERIVATIVE:, 2]
     rows = np.vstack([parts.travels(motion, still, still).gradient, joint_rows(bodies, vehicle), risen])
     springs = [_stiffness_at_rest(spring) for spring in vehicle.springs]
     bars, joints = ([each.stiffness for each in kind] for kind in (vehicle.bars, vehicle.joint_elements))

@@ -22,7 +22,7 @@ from models.core.strict import read
 from models.systems.braking.march import BrakedVehicle, on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
 from models.systems.braking.scene import MOST_SUBSTEPS, BrakeTable, BrakingScene, Procedure, Stretch
-from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, from_file, named_tyre
+from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, table_from_file, table_of_named_tyre
 from models.tyre.tyre_table import TyreTable
 
 SPRUNG_ENGINE = "mujoco"
@@ -101,7 +101,7 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
     from models.own_model.scene_vehicle import scene_vehicle
 
     name = scene.vehicle.file
-    return None if name is None else scene_vehicle(name, scene.folder, scene.file, "vehicle.file", towing=True)
+    return None if name is None else scene_vehicle(name, scene.folder, scene.file, "vehicle.file", allows_towing=True)
 
 
 def sprung_of(scene: BrakingScene) -> Any:
@@ -194,9 +194,9 @@ def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
     if not SCALE_BOUNDS[0] < scale <= SCALE_BOUNDS[1]:
         raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
     if name in scene.tyres.files:
-        table = from_file(scene.path(scene.tyres.files[name], f"tyres.files.{name}"))
+        table = table_from_file(scene.path(scene.tyres.files[name], f"tyres.files.{name}"))
     elif name in SURFACE_NAMES:
-        table = named_tyre(name, rear)
+        table = table_of_named_tyre(name, rear)
     else:
         raise InputError(scene.file, "road.stretches", name, "no such surface", (*SURFACE_NAMES, *scene.tyres.files))
     return table if scale == 1.0 else table.scaled(scale)

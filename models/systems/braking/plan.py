@@ -13,7 +13,14 @@ from models.systems.braking.of_scene import braked_vehicle, controller_of, sprun
 from models.systems.braking.procedures import engines_of, port_of, vehicle_and_start
 from models.systems.braking.scene import BrakingScene
 from models.tyre.tyre_source import SURFACE_NAMES
-from models.vehicles.plausible import GYRATION, HEIGHT, MASS, TRACK, WHEELBASE, plausible
+from models.vehicles.plausible import (
+    LARGEST_HEIGHT,
+    USUAL_GYRATION_RATIOS,
+    USUAL_MASS,
+    USUAL_TRACK,
+    USUAL_WHEELBASE,
+    plausible,
+)
 
 PROCEDURE_TEXTS = {
     "straight": "straight braking",
@@ -82,16 +89,19 @@ USUAL_RADIUS_RANGE = 0.1, 1.5
 
 def _implausible_parameters(truck: Truck) -> Iterator[Finding]:
     """Doubts about implausible parameters of a vehicle that brakes in the plane."""
-    gyration, span = (truck.yaw_inertia / truck.mass) ** 0.5, tuple(g * truck.wheelbase for g in GYRATION["rz"])
+    gyration, span = (
+        (truck.yaw_inertia / truck.mass) ** 0.5,
+        tuple(g * truck.wheelbase for g in USUAL_GYRATION_RATIOS["rz"]),
+    )
     looks = [
-        ("mass", "mass", truck.mass, MASS),
-        ("size", "wheelbase", truck.wheelbase, WHEELBASE),
-        ("size", "height", truck.height, (0.0, HEIGHT)),
+        ("mass", "mass", truck.mass, USUAL_MASS),
+        ("size", "wheelbase", truck.wheelbase, USUAL_WHEELBASE),
+        ("size", "height", truck.height, (0.0, LARGEST_HEIGHT)),
         ("inertia", "radius of gyration by yaw_inertia", gyration, span),
     ]
     for name, axle in (("front", truck.front), ("rear", truck.rear)):
         looks += [
-            ("size", f"{name}.track", axle.track, TRACK),
+            ("size", f"{name}.track", axle.track, USUAL_TRACK),
             ("size", f"{name}.radius", axle.radius, USUAL_RADIUS_RANGE),
         ]
     for check, parameter_name, value, usual in looks:

@@ -398,7 +398,7 @@ def _reports_of_run(handling: Handling, run: Trajectory, engine: str) -> tuple[n
     at.reports(handling.numbers, run.times, *states, report, ledger)
     for element in handling.vehicle.joint_elements:
         travel, rate = (joint_travel(handling, element, values) for values in states)
-        ledger[:, at.POTENTIAL] += (element.held + 0.5 * element.stiffness * travel) * travel
+        ledger[:, at.POTENTIAL] += (element.preload + 0.5 * element.stiffness * travel) * travel
         ledger[:, at.DISSIPATED] -= element.damping * rate**2
     return report, ledger
 

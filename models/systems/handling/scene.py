@@ -167,7 +167,7 @@ class HandlingScene(SceneFile):
 
     def given(self) -> SpatialVehicle:
         """The vehicle of the file and the bodies that it tows, with its cornering stiffness scaled as in [tyres]."""
-        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
+        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", allows_towing=True)
         if not (ratios := self.tyres.cornering):
             return vehicle
         axles = len({tyre.axle for tyre in vehicle.tyres})

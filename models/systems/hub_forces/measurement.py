@@ -29,7 +29,7 @@ class HubForces:
     def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
         """Hub forces as a run's inputs, sampled at half steps."""
         signal = signal_from_samples(self.samples, self.period, interpolation)
-        return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
+        return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, constant_in_step=signal.held)
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
@@ -77,7 +77,7 @@ def element_travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     """Travel (m,) of every spring, mount and bar over a run, by name: from the design position in m, rad of a bar,
     positive in compression.
     """
-    gauges = tuple(element.gauge() for element in vehicle.elements)
+    gauges = tuple(element.travel_gauge() for element in vehicle.elements)
     still = HubInputs(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
     values = run_with_forces(gauged, table(gauged, still, float(run.times[1])), run.times, run.states).elements

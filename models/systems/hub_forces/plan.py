@@ -16,7 +16,7 @@ from models.engines.free_vehicle import ENGINES as FREE_ENGINES
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
 from models.systems.hub_forces.scene import Frame, HubScene
-from models.vehicles.cut_vehicle import CutVehicle, rigid
+from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 from models.vehicles.plausible import plausible
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
     if fixed := [engine for engine in engines if engine not in scene.engines]:
         check_step(fixed[-1], vehicle, scene.run.step, scene.run.duration)
     if scene.forces.frame == "inertial":
-        growth = float(rigid(vehicle).toppling().max()) / (2 * np.pi)
+        growth = float(rigid_vehicle(vehicle).toppling_rates().max()) / (2 * np.pi)
         if scene.stabilise.bandwidth <= growth:
             raise InputError(
                 scene.file,
@@ -60,7 +60,7 @@ def findings(scene: HubScene) -> tuple[Finding, ...]:
 def describe(scene: HubScene) -> str:
     """The scene's plan as text."""
     vehicle, forces = scene.cut_vehicle(), scene.forces
-    body = rigid(vehicle)
+    body = rigid_vehicle(vehicle)
     source = f"file {forces.file}" if forces.file else f"virtual measurement at {forces.sampling_rate:g} Hz"
     lines = [
         scene.title,

@@ -18,7 +18,7 @@ from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.scene import Frame
 from models.systems.hub_forces.tilt_march import Noise, march
-from models.vehicles.cut_vehicle import CutVehicle, rigid
+from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 
 INNOVATION_LIMIT = 4.0
 """Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
@@ -85,7 +85,7 @@ class TiltFilter:
         self, vehicle: CutVehicle, frame: str, sample_period: float, deviations: Deviations, file: str = ""
     ) -> None:
         _check_measurement(frame, sample_period, deviations)
-        self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, sample_period, file
+        self.rigid, self.frame, self.period, self.file = rigid_vehicle(vehicle), frame, sample_period, file
         self.forces_noise = self.rigid.turning(deviations.forces)[:2, :2]
         push = np.vstack([np.eye(2) * sample_period**2 / 2, np.eye(2) * sample_period])
         process = push @ (self.forces_noise + deviations.model**2 * np.eye(2)) @ push.T
@@ -242,6 +242,6 @@ def inputs_with_moments(
     """
     rows, corner = len(hub_inputs.hubs), 2 * math.pi * bandwidth
     wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)
-    roll, pitch, _ = np.diag(rigid(vehicle).inertia)
+    roll, pitch, _ = np.diag(rigid_vehicle(vehicle).inertia)
     pull = (roll * corner**2, 2 * ratio * roll * corner, pitch * corner**2, 2 * ratio * pitch * corner)
     return replace(hub_inputs, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)

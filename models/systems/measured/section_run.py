@@ -27,7 +27,7 @@ from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid_vehicle
 
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import TiltFilter
@@ -294,7 +294,10 @@ class _March:
             return free
         tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first, used))
         guide = np.hstack([grid.rows(tilt, rows), np.zeros((rows, 2))])
-        corner, (roll, pitch, _) = 2 * math.pi * self.job.hold.bandwidth, np.diag(rigid(self.job.vehicle).inertia)
+        corner, (roll, pitch, _) = (
+            2 * math.pi * self.job.hold.bandwidth,
+            np.diag(rigid_vehicle(self.job.vehicle).inertia),
+        )
         pull = (
             roll * corner**2,
             2 * PULL_DAMPING * roll * corner,

@@ -15,7 +15,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.measured.signal import HUB_COMPONENTS, Quantity, Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, FeltPlaces, section_answers
+from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, SectionPlaces, section_results
 from models.multibody.cut_table import Joints, joints
 from models.vehicles.cut_vehicle import CutVehicle
 
@@ -78,7 +78,7 @@ class Sections:
     wanted: tuple[str, ...] | None = None
     answers: tuple[SectionChannel, ...] = field(init=False)
     columns: np.ndarray = field(init=False)
-    _places: FeltPlaces = field(init=False, repr=False, compare=False)
+    _places: SectionPlaces = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.wanted is not None:
@@ -94,20 +94,20 @@ class Sections:
         object.__setattr__(self, "answers", tuple(answer for _, answer in channel_of_column))
         object.__setattr__(self, "columns", np.array([column for column, _ in channel_of_column]))
         rows = [
-            [joined.last[p.body], *np.subtract(p.position, joined.origin[p.body]), float(p.gravity)]
+            [joined.last_joint[p.body], *np.subtract(p.position, joined.joint_position[p.body]), float(p.gravity)]
             for p in self.points
         ]
         points = np.array(rows, float).reshape(len(rows), 5)
-        object.__setattr__(self, "_places", FeltPlaces(*_guide_arrays(self.vehicle, joined), points))
+        object.__setattr__(self, "_places", SectionPlaces(*_guide_arrays(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, stride: int) -> np.ndarray:
         """Values (n, answers) of the channels at states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in
         ``HubModel``.
         """
-        wrenches, points = len(self._places.guides) + len(self.vehicle.hubs), len(self._places.points)
+        wrenches, points = len(self._places.guide_joints) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
-        section_answers(numbers, float(stride), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
+        section_results(numbers, float(stride), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
         return out[:, self.columns]
 
 
@@ -181,7 +181,7 @@ def _guide_arrays(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.n
     def behind(name: str | None, guide: str) -> bool:
         return name is not None and (name == guide or behind(parents[name], guide))
 
-    last = np.array([joined.last[name] for name in guided_bodies(vehicle)], np.int64)
+    last = np.array([joined.last_joint[name] for name in guided_bodies(vehicle)], np.int64)
     rows = [[float(behind(owner, name)) for owner in owners] for name in guided_bodies(vehicle)]
     return last, np.array(rows).reshape(len(last), len(owners))
 

@@ -24,7 +24,7 @@ import numpy as np
 from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.multibody.cut_kernel import WRENCH
 from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
-from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, Rigid, rigid
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, RigidVehicle, rigid_vehicle
 
 SUMMED_TIMES = 2000
 """Times at which the laws are summed."""
@@ -104,7 +104,10 @@ def predicted_drift(vehicle: CutVehicle, level: Level, period: float, duration: 
     """Drift of a free run under hub forces that are given in a frame and sampled every ``period`` (s), over a duration
     (s).
     """
-    body, law = rigid(vehicle), _AngleResponse(rigid(vehicle), frame, np.linspace(0.0, duration, SUMMED_TIMES + 1))
+    body, law = (
+        rigid_vehicle(vehicle),
+        _AngleResponse(rigid_vehicle(vehicle), frame, np.linspace(0.0, duration, SUMMED_TIMES + 1)),
+    )
     noise = period * body.turning(level.deviations(vehicle))
     spread = np.sqrt(
         np.diagonal(law.time_integral(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2)
@@ -126,7 +129,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
     noise and bias of the forces. The result combines one standard deviation of the noise with the means of the other
     errors.
     """
-    body, deviation = rigid(vehicle), level.deviations(vehicle)
+    body, deviation = rigid_vehicle(vehicle), level.deviations(vehicle)
     mean = np.zeros((len(times), 3))
     bias = np.zeros(len(deviation)) if level.bias is None else np.asarray(level.bias, float)
     mean += np.outer(times**2 / 2, bias.reshape(-1, WRENCH)[:, :3].sum(axis=0) / body.mass)
@@ -142,7 +145,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 class _AngleResponse:
     """Response of the rigid vehicle's angles to errors, at times (n,), equally spaced from 0."""
 
-    rigid: Rigid
+    rigid: RigidVehicle
     frame: str
     times: np.ndarray
     _modes: tuple[np.ndarray, np.ndarray] = field(init=False)

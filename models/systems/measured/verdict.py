@@ -32,7 +32,7 @@ from models.measured.signal import Signal
 from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
 
 RUN_LIMITS = Limits(artificial_share=0.1)
 """From where on a run is not good enough. A pull of 5 Hz, whose moment is 12 % of what turns the chassis, takes 5 % off
@@ -251,7 +251,7 @@ def _in_space(verdict: Verdict) -> Verdict:
 
 def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
     """Figures of a run that need no true run, for roll or pitch, whichever is worse; the cost is left at 0."""
-    inertia, chassis = np.diag(rigid(vehicle).inertia), vehicle.chassis
+    inertia, chassis = np.diag(rigid_vehicle(vehicle).inertia), vehicle.chassis
     tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
     figures = list[RunFigures]()
     for i, name in enumerate(("roll", "pitch")):
@@ -283,7 +283,9 @@ def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float
     if hold.method == "prescribed":
         return 2.0 * hold.angle * math.sqrt(min(2.0 * hold.smoothing * period, 1.0))
     corner = 2.0 * math.pi * hold.bandwidth
-    pushed = np.diag(rigid(vehicle).turning(np.tile(np.repeat([hold.force, hold.moment], 3), len(vehicle.hubs))))[:2]
+    pushed = np.diag(
+        rigid_vehicle(vehicle).turning(np.tile(np.repeat([hold.force, hold.moment], 3), len(vehicle.hubs)))
+    )[:2]
     each = (
         hold.angle**2 * corner / (4 * PULL_DAMPING)
         + hold.rate**2 * PULL_DAMPING / corner

@@ -24,8 +24,8 @@ from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
 from models.measured.recording import Recording
 from models.measured.signal import HUB_COMPONENTS, Quantity, Signal
-from models.sensors.rotations import from_cardan, rotation_matrix
-from models.sensors.sensor_array import in_space
+from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
+from models.sensors.sensor_array import specific_forces_on_body
 from models.systems.hub_forces.measurement import element_travels
 from models.systems.hub_forces.run import on_road
 from models.systems.hub_forces.scene import Frame, Road
@@ -180,9 +180,9 @@ def _chassis_motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[flo
     slopes = make_interp_spline(run.times, np.hstack([run.states[:, [n + X, n + Y, n + Z]], rates]), k=5).derivative()
     felt, alpha = np.split(np.asarray(slopes(run.times)), 2, axis=1)
     felt[:, 2] += GRAVITY
-    turn = rotation_matrix(from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
+    turn = rotation_matrix(quaternion_from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
     arms = np.array(list(places.values())) - np.array(vehicle.tree.body(vehicle.chassis).position)
-    readings = in_space(arms, np.einsum("nji,nj->ni", turn, felt), rates, alpha)
+    readings = specific_forces_on_body(arms, np.einsum("nji,nj->ni", turn, felt), rates, alpha)
     return np.hstack([angles, rates, readings.reshape(len(readings), -1)])
 
 

@@ -25,7 +25,7 @@ from models.engines.assembly import Assembly
 from models.engines.reference import compiled_closure
 from models.machine.compiled import named_closure
 from models.vehicles.pitch_plane import STATES, Parameters
-from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
+from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension_forces
 
 LONGEST_STEP = 1e-3
 """Longest step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs one below 4 ms."""
@@ -61,7 +61,7 @@ def jacobian_product(y, u, p, body, flat, x, dx):
     turn = cosine * x[7] - rate * sine * x[3]
     df3 = p[8] * (x[2] - x[0] - b * cosine * x[3]) + p[12] * (x[6] - x[4] - b * turn)
     df4 = p[9] * (x[2] - x[1] + a * cosine * x[3]) + p[13] * (x[6] - x[5] + a * turn)
-    f3, f4 = suspension(y, p, sine, cosine)
+    f3, f4 = suspension_forces(y, p, sine, cosine)
     for i in range(4):
         dx[i] = x[4 + i]
     dx[4], dx[5], dx[6] = df3 / p[2], df4 / p[3], -(df3 + df4) / p[4]

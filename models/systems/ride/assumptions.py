@@ -55,7 +55,7 @@ def assumptions(
     for spring in vehicle.springs:
         assumptions_of_vehicle += (
             _curve_assumptions(scene, spring, values_of)
-            if spring.bent
+            if spring.is_nonlinear
             else _travel_assumptions(scene, vehicle, spring, values_of)
         )
     assumptions_of_vehicle += [*_wave_assumptions(scene, vehicle), *_seat_assumptions(scene)]

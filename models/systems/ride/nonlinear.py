@@ -215,7 +215,7 @@ def in_engine(
     ``Ride``.
 
     error : whether the error of the steps is estimated, by runs in longer ones on the same road; table : a road in
-    place of the drawn one, as ``RoadPath.table`` has it.
+    place of the drawn one, as ``RoadPath.wheel_heights_and_rates`` has it.
     """
     assert scene.speeds is not None
     speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
@@ -226,7 +226,7 @@ def in_engine(
         sampling.skipped,
     )
     if table is None:
-        table = path.table(int(np.ceil(sampling.driven / path.step)), sampling.seed)
+        table = path.wheel_heights_and_rates(int(np.ceil(sampling.driven / path.step)), sampling.seed)
     ride = ride_over(engine, vehicle, path, table, skipped=skipped, every=row_interval)
     labelled = result(
         scene,
@@ -271,7 +271,7 @@ def _with_error_of_steps(
 
     def rerun(step_factor: float, share: float) -> Series:
         longer, stride = (
-            replace(path, half=step_factor * path.half),
+            replace(path, half_step=step_factor * path.half_step),
             max(1, round(ROWS_APART / step_factor) if step_factor <= 2.0 else 8),
         )
         count = int(REPEATED_SHARE * share * steps / step_factor)
@@ -344,7 +344,7 @@ def drive_over_road(
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
-    table = road.table(int(np.ceil(duration / road.step)), seed)
+    table = road.wheel_heights_and_rates(int(np.ceil(duration / road.step)), seed)
     return ride_over(engine, vehicle, road, table, skipped=skipped, every=stride)
 
 
@@ -389,7 +389,7 @@ def _outputs_at_steps(
         [accelerations, run.rates[step_numbers], run.positions[step_numbers], table[2 * step_numbers]]
     )
     outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
-    bent = {spring.name for spring in vehicle.springs if spring.bent}
+    bent = {spring.name for spring in vehicle.springs if spring.is_nonlinear}
     pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
     for spec, output, values in zip(vehicle.outputs, linear.outputs, outputs.T, strict=True):
         if spec.kind == "force" and spec.part in bent:

@@ -12,7 +12,7 @@ from models.own_model.scene_vehicle import scene_vehicle
 from models.road.excitation import Excitation
 from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
-from models.road.two_track import TwoTrackRoad, half_track, on_track, road_excitation, road_of_level
+from models.road.two_track import TwoTrackRoad, half_track, road_excitation, road_of_level, wheels_on_track
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
@@ -63,7 +63,7 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 def _built_vehicle(scene: RideScene) -> Built:
     file, reduced = scene.vehicle.file, scene.study == CLOSED_FORM_STUDY
     return extended_by_effects(
-        Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", reduced=reduced)), scene
+        Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", allows_reduced=reduced)), scene
     )
 
 
@@ -78,7 +78,7 @@ def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
             None,
             "has no covariance: use the study ride_nonlinear, whose copies and engines run in time, or leave it out",
         )
-    bent = [spring.name for spring in vehicle.springs if spring.bent]
+    bent = [spring.name for spring in vehicle.springs if spring.is_nonlinear]
     if bent and not scene.vehicle.small_motion:
         raise InputError(
             scene.file,
@@ -98,7 +98,7 @@ def goes_in_time(scene: RideScene) -> bool:
 
 def in_time_only(vehicle: SpatialVehicle) -> bool:
     """Whether springs are nonlinear or tyres may lift, so that no linear vehicle is equivalent."""
-    return vehicle.lifts or any(spring.bent for spring in vehicle.springs)
+    return vehicle.lifts or any(spring.is_nonlinear for spring in vehicle.springs)
 
 
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
@@ -188,7 +188,7 @@ def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[
     A vehicle without a width runs on one of the tracks where the road is given by their level.
     """
     if not any(wheel.y for wheel in wheels):
-        return on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
+        return wheels_on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
     if scene.road.wheels == "own":
         return wheels
     if half_track(wheels) == 0.0:

@@ -56,7 +56,9 @@ def describe(scene: RideScene) -> str:
             ", ".join(f"{name} by {weighting_name}" for name, weighting_name in scene.weighting.items()) or "none",
         ),
     ]
-    replaced = any(spring.bent for spring in vehicle.springs) and not (vehicle.lifts or scene.vehicle.small_motion)
+    replaced = any(spring.is_nonlinear for spring in vehicle.springs) and not (
+        vehicle.lifts or scene.vehicle.small_motion
+    )
     assumed = assumption_lines(assumptions(scene, vehicle, replaced=replaced))
     return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in lines), *effect_lines(scene), *assumed])
 

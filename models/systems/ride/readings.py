@@ -33,8 +33,8 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
 
     Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
     """
-    from models.ride.frequency import variances
-    from models.road.isotropic import isotropic_like, spectral_matrix
+    from models.ride.frequency import variances_over_wavenumbers
+    from models.road.isotropic import isotropic_road_like, spectral_matrix
 
     placed = placed_wheels(scene, wheels(vehicle))
     road, y = road_of(scene, placed), half_track_of(scene, placed)
@@ -48,8 +48,8 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
         else 0.01
     )
     of_road, of_isotropic = (
-        variances(linear, partial(spectral_matrix, road_model, placed), speed, low, HIGHEST_WAVENUMBER)
-        for road_model in (road, isotropic_like(road, y))
+        variances_over_wavenumbers(linear, partial(spectral_matrix, road_model, placed), speed, low, HIGHEST_WAVENUMBER)
+        for road_model in (road, isotropic_road_like(road, y))
     )
     pairs = zip(linear.names, of_road, of_isotropic, strict=True)
     return {name: float(np.sqrt(isotropic / plain) - 1.0) for name, plain, isotropic in pairs if plain > 0}

@@ -110,7 +110,7 @@ def _deviations_by_speed(
         return labelled
     digit = (
         MATRIX_ACCURACY
-        if engine == "reference" or not any(spring.bent for spring in vehicle.springs)
+        if engine == "reference" or not any(spring.is_nonlinear for spring in vehicle.springs)
         else CORNERED_LAW_ACCURACY
     )
     return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, digit)

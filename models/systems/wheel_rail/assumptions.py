@@ -61,7 +61,7 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
     """Assumption on the distance (mm) from a patch to the nearer end of the rail's profile or to the wheel's outer
     face.
     """
-    side = scene.profiles.side(scene.wheelset.radius)
+    side = scene.profiles.wheel_on_rail(scene.wheelset.radius)
 
     def free(patch: PatchReport) -> float:
         ends = patch.y - side.rail.y[0], side.rail.y[-1] - patch.y, side.wheel.y[-1] - patch.wheel_centre

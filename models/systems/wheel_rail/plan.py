@@ -8,7 +8,7 @@ from models.systems.wheel_rail.scene import WheelRailScene
 def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
     """Refuse, before any file is written, files that hold no profiles, which reading the scene does not find."""
     for case in scene.cases.values():
-        _ = scene.contact(case).pair.G
+        _ = scene.contact(case).material_pair.G
 
 
 def describe(scene: WheelRailScene) -> str:

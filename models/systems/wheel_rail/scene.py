@@ -70,7 +70,7 @@ class WheelRailScene(SceneFile):
 
     def contact(self, case: Case) -> WheelsetContact:
         """Contact of the wheelset with the track in a case; raises InputError for files that are no profiles."""
-        side = self.profiles.side(self.wheelset.radius)
+        side = self.profiles.wheel_on_rail(self.wheelset.radius)
         return WheelsetContact(
             side,
             self.wheelset.load,
@@ -119,4 +119,4 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
     profiles = scene.profiles
     if profiles.smoothing and not any(Path(name).suffix for name in (profiles.wheel, profiles.rail)):
         raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
-    return scene.model_copy(update={"profiles": profiles.located(scene)})
+    return scene.model_copy(update={"profiles": profiles.with_full_paths(scene)})

@@ -39,7 +39,7 @@ def assumptions(equations: Equations) -> list[Assumption]:
     ]
     listed += [_elastic_assumption()] if yield_is_known(wheelset.material) else []
     listed += [_no_slip_assumption(wheelset)] if equations.law == "linear" else []
-    listed += [_travel_assumption(wheelset)] if equations.body.held else []
+    listed += [_travel_assumption(wheelset)] if equations.body.has_suspension else []
     if wheelset.profiles is not None:
         return [*listed, _within_profiles(wheelset)]
     return [*listed, _climbing_assumption(wheelset), _flange_way(wheelset)]
@@ -125,10 +125,10 @@ def _rolling_assumption(equations: Equations) -> Assumption:
     return Assumption(
         "speed",
         "the wheelset rolls so fast that creepage is by its speed",
-        f"travel at {wf.REGULAR:g} m/s or more",
+        f"travel at {wf.REGULARISED_SPEED:g} m/s or more",
         lambda run: {"wheelset": np.array([abs(equations.speed)])},
         "m/s",
-        lower_limit=wf.REGULAR,
+        lower_limit=wf.REGULARISED_SPEED,
     )
 
 
@@ -167,7 +167,7 @@ def _elastic_assumption() -> Assumption:
 
 
 def _slow_slip(equations: Equations) -> Assumption:
-    speed = max(abs(equations.speed), wf.REGULAR)
+    speed = max(abs(equations.speed), wf.REGULARISED_SPEED)
     return Assumption(
         "constant friction",
         "friction is the same however fast the wheels slip",
@@ -241,7 +241,7 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
     on the rail.
     """
     assert wheelset.profiles is not None
-    side = wheelset.profiles.side(wheelset.radius)
+    side = wheelset.profiles.wheel_on_rail(wheelset.radius)
     tip, outer = float(side.wheel.y[np.argmax(side.wheel.z)]), float(side.wheel.y[-1])
 
     def watched(path: WheelsetPath) -> Watched:

@@ -96,7 +96,7 @@ def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles
         for key, value in (("wheel", conicity_table.left_wheel), ("rail", conicity_table.left_rail))
         if value is not None
     }
-    return profiles.model_copy(update=named).located(scene) if named else profiles
+    return profiles.model_copy(update=named).with_full_paths(scene) if named else profiles
 
 
 def _table(
@@ -117,7 +117,7 @@ def _table(
     displacements = conicity_table.reach * np.arange(-count, count + 1) / count
     sides = f"{profiles.wheel} on {profiles.rail}"
     sides += f", left {of_left.wheel} on {of_left.rail}" if of_left != profiles else ""
-    table = rolling_radii_of(profiles.side(right), of_left.side(left), displacements, report_progress)
+    table = rolling_radii_of(profiles.wheel_on_rail(right), of_left.wheel_on_rail(left), displacements, report_progress)
     return replace(table, source=sides), f"{sides}, {radii}"
 
 

@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
 from models.core.scene_file import existing_file, parse
 from models.rail.equations import YAW, Equations
-from models.rail.linear import critical_or_why
+from models.rail.linear import critical_speed_or_reason
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -37,7 +37,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
     if base is None:
         path = existing_file(name, Path(scene.folder), scene.file, "wheelset.parameters")
         base = _checked_wheelset(parse(path), path.name, "")
-    profiles = base.profiles if scene.profiles is None else scene.profiles.located(scene)
+    profiles = base.profiles if scene.profiles is None else scene.profiles.with_full_paths(scene)
     if profiles is not None and FLANGE_KEY in override:
         raise InputError(
             scene.file,
@@ -95,5 +95,5 @@ def path_speeds(scene: WheelsetScene) -> list[float]:
     """
     if scene.run.speeds:
         return list(scene.run.speeds)
-    critical, _ = critical_or_why(wheelset_of(scene))
+    critical, _ = critical_speed_or_reason(wheelset_of(scene))
     return [round(share * critical, 2) for share in SPEED_SHARES] if critical else [float(scene.speeds.all()[-1])]

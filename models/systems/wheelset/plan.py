@@ -3,7 +3,7 @@
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.scene_effects import effect_lines as effect_lines
-from models.rail.linear import critical_or_why, klingel_wavelength
+from models.rail.linear import critical_speed_or_reason, klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.assumptions import assumptions, of_linear
 from models.systems.wheelset.conicity import check as check_conicity
@@ -31,7 +31,7 @@ def describe(scene: WheelsetScene) -> str:
     wheelset = wheelset_of(scene)
     changed = ", ".join(f"{name} = {value:g}" for name, value in scene.wheelset.override.items())
     ellipse, run, speeds = wheelset.ellipse, scene.run, scene.speeds.all()
-    critical, why = critical_or_why(wheelset)
+    critical, why = critical_speed_or_reason(wheelset)
     lines = {
         "scene": f"{scene.file}, study {scene.study}",
         "wheelset": scene.wheelset.parameters + (f", but {changed}" if changed else ""),

@@ -28,7 +28,7 @@ from models.rail.limit_cycle import (
     refined_orbit,
     solved_orbit,
 )
-from models.rail.linear import NoCriticalSpeed, critical_or_why
+from models.rail.linear import NoCriticalSpeed, critical_speed_or_reason
 from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
 from models.systems.wheelset.of_scene import (
     SPEED_SHARES,
@@ -137,7 +137,7 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
         speeds,
         root_locus(kind, wheelset, speeds),
         wavelength(kind, wheelset),
-        *critical_or_why(wheelset, partial(largest_growth, kind)),
+        *critical_speed_or_reason(wheelset, partial(largest_growth, kind)),
     )
     channels = {
         name: Channel(("speed", "eigenvalue"), part_of_values, "1/s")
@@ -145,7 +145,7 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
     }
     labelled = result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
     with_assumptions(labelled, of_linear(wheelset))
-    left = uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
+    left = hunting_uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
     if math.isfinite(left):
         estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
         with_stated_errors(
@@ -197,7 +197,7 @@ def _on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: Sought
     """The limit cycle solved on half the cells, in twice the step; None where there is none."""
     if scene.contact.cells < FEWEST_CELLS:
         return None
-    coarse = replace(limit_cycle, steps=limit_cycle.steps // 2)
+    coarse = replace(limit_cycle, step_count=limit_cycle.step_count // 2)
     try:
         return solved_orbit(
             guess_from_orbit(coarse, replace(limit_cycle.equations, cells=coarser_cells(scene.contact.cells))),

@@ -168,7 +168,7 @@ def with_error_of_cycles(
         size = reference_size(np.array([getattr(orbit, name) for orbit in orbits]))
         changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]
         error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED_ORDER - 1.0)
-        steps = [orbit.period / orbit.steps for orbit in orbits]
+        steps = [orbit.period / orbit.step_count for orbit in orbits]
         estimates[name] = Estimate(error, unit, error / size, KINKED_ORDER, float(min(steps)))
         if coarse_orbits:
             gaps = [getattr(orbits[k], name) - getattr(coarse_orbit, name) for k, coarse_orbit in coarse_orbits.items()]

@@ -1,1 +1,2 @@
-"""Parameter sets: one file each, named after its source, holding ``SOURCE`` and ``PARAMETERS``."""
+"""Parameter sets of the pitch-plane vehicle: one file each, named after its source, with ``SOURCE`` and
+``PARAMETERS``."""

@@ -1,4 +1,5 @@
-"""A twin of the published vehicle without its symmetry: every front value differs from its rear one."""
+"""Parameters of a twin of the published pitch-plane vehicle without its symmetry: every front value differs from its
+rear one."""
 
 from models.vehicles.pitch_plane import Parameters
 

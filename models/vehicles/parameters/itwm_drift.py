@@ -1,4 +1,5 @@
-"""The published vehicle: symmetric about its centre of mass, which hides a swap of a and b."""
+"""Parameters of the published pitch-plane vehicle: symmetric about its centre of mass, which hides a swap of a and
+b."""
 
 from models.vehicles.pitch_plane import Parameters
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.sensors.rotations import (
-    Rule,
+    IntegrationRule,
     conjugate_quaternion,
-    from_cardan,
-    integrate,
+    integrate_attitude,
+    quaternion_from_cardan,
     quaternion_product,
     rotation_vector,
 )
@@ -33,7 +33,7 @@ ANGLE_SINES = {
 """Amplitude (rad), circular frequency (rad/s) and phase (rad) of the sines of each angle of the car."""
 STEADY_YAW_RATE = 0.02
 """Steady part of the yaw rate, rad/s: two turns in ten minutes."""
-INTEGRATION_RULES: dict[str, tuple[Rule, int]] = {
+INTEGRATION_RULES: dict[str, tuple[IntegrationRule, int]] = {
     "held rates": ("held", 1),
     "mean rates": ("mean", 2),
     "cubic rates": ("cubic", 4),
@@ -73,7 +73,7 @@ def car_angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def car_attitude(times: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) of the car's attitude at times (n,) in s, in closed form."""
-    return from_cardan(*car_angles(times)[0].T)
+    return quaternion_from_cardan(*car_angles(times)[0].T)
 
 
 def gyro(times: np.ndarray) -> np.ndarray:
@@ -104,7 +104,7 @@ def magnus_attitudes(step: float) -> np.ndarray:
     second_commutator = np.cross(middle, 2 * bend + odd) / 60
     turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + second_commutator) / 240
     # a chain of rotations is what rates that are held for one second each make
-    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, car_attitude(np.zeros(1))[0], "held")
+    return integrate_attitude(np.concatenate([turn, turn[-1:]]), 1.0, car_attitude(np.zeros(1))[0], "held")
 
 
 def largest_angle(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
@@ -130,7 +130,7 @@ class AttitudeSolver:
             return (attitudes_in_exudyn if engine == "exudyn" else attitudes_in_mujoco)(
                 method, period, count, stride, start, gyro
             )
-        attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, INTEGRATION_RULES[method][0])
+        attitudes = integrate_attitude(gyro(period * np.arange(count + 1)), period, start, INTEGRATION_RULES[method][0])
         return Attitudes(attitudes[::stride], {"steps": count, "force calls": count})
 
 

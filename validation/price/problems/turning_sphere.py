@@ -20,7 +20,7 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_system import items, solve, solver_counts
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import without_warnings
-from models.sensors.rotations import from_matrix, quaternion_product, rotation_vector
+from models.sensors.rotations import quaternion_from_matrix, quaternion_product, rotation_vector
 
 OUTPUT_TYPES = exu.OutputVariableType
 Gyro = Callable[[np.ndarray], np.ndarray]
@@ -93,7 +93,7 @@ def attitudes_in_exudyn(
     stored = mbs.GetSensorStoredData(sensor)[:, 1:]
     if note or len(stored) != step_count // steps_per_row + 1:
         raise RunFailed("exudyn", "the solver reported failure", sample_period * steps_per_row * len(stored))
-    attitudes = start_attitude + stored[:, 3:] if implicit else from_matrix(stored.reshape(-1, 3, 3))
+    attitudes = start_attitude + stored[:, 3:] if implicit else quaternion_from_matrix(stored.reshape(-1, 3, 3))
     return _normalised_attitudes("exudyn", attitudes, solver_counts(mbs))
 
 

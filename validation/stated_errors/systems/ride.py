@@ -200,8 +200,8 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     sampling = Sampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
     road = excitation_of(scene, wheels(vehicle))
     path = _road_path_of_run(scene, engine, vehicle, sampling, road, speed)
-    steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER_STEPS)
-    table = finer.table(steps * FINER_STEPS, sample_number)
+    steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half_step=path.half_step / FINER_STEPS)
+    wheel_heights_and_rates = finer.wheel_heights_and_rates(steps * FINER_STEPS, sample_number)
     try:
         result = in_engine(scene, engine, vehicle, sampling, True, table[::FINER_STEPS].copy())
     except RunFailed as failure:

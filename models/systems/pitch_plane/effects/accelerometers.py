@@ -93,7 +93,7 @@ class Accelerometers:
 
     def _readings(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
         """Readings (samples, sensors, 3) at ``rows``, the run's rows at the sensors' sampling times."""
-        from models.sensors.sensor_array import on_bracket, sensor_readings
+        from models.sensors.sensor_array import reading_on_bracket, sensor_readings
 
         p, y = self.parameters, run.states[rows]
         accelerations = np.array(
@@ -105,7 +105,7 @@ class Accelerometers:
         )
         for i, sensor in enumerate(p.sensors.values()):
             if sensor.bracket is not None:
-                values[:, i] = on_bracket(
+                values[:, i] = reading_on_bracket(
                     values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
                 )
         noise = normal_samples(p.seed, p.path, len(values), 3 * len(sensor_positions), source=ACCELEROMETERS)

@@ -116,16 +116,16 @@ def _road_profile(scene: Any, parameters: Parameters, distance: float) -> tuple[
     faded_in = profile.window_length
     if parameters.grade is None:
         return profile, (0.0, faded_in)
-    from models.road.grade import TRANSITION_LENGTH, Graded
+    from models.road.grade import TRANSITION_LENGTH, GradedRoad
 
-    return Graded(profile, parameters.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
+    return GradedRoad(profile, parameters.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
 
 
 def _measured_road(scene: Any, parameters: Parameters, distance: float) -> Any:
-    from models.road.continuation import RUN_IN, continued_road, run_in
+    from models.road.continuation import RUN_IN_LENGTH, continued_road, run_in
 
     path, track = scene.path(parameters.file, "effects.road.file"), parameters.track or "mean"
-    length = RUN_IN if parameters.run_in is None else parameters.run_in
+    length = RUN_IN_LENGTH if parameters.run_in is None else parameters.run_in
     if parameters.source == "opencrg":
         from models.road.opencrg import read_opencrg
 
