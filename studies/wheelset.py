@@ -18,7 +18,7 @@ from models.rail.linear import critical_or_why, kinematic_wavelength, klingel_wa
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset import conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
-from models.systems.wheelset.run import Linear, at_speeds, linearised_result, over_speeds
+from models.systems.wheelset.run import LinearisedMotion, linearised_result, over_speeds, results_by_speed_text
 from models.systems.wheelset.run import run as run_path
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -33,7 +33,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
 
     wheelset, failed, eigenvalues, paths = wheelset_of(scene), dict[str, str](), dict[str, Result](), Paths()
-    conicities = conicity.run(scene) if conicity.told_conicity(scene) else None
+    conicities = conicity.run(scene) if conicity.reports_conicity(scene) else None
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
@@ -78,11 +78,11 @@ def _results(paths: Paths) -> dict[str, Result]:
     return {
         f"{engine}, {speed_text}": path
         for engine, paths_of_engine in paths.items()
-        for speed_text, path in at_speeds(paths_of_engine).items()
+        for speed_text, path in results_by_speed_text(paths_of_engine).items()
     }
 
 
-def _save_table(linear: dict[str, Linear], folder: Path) -> None:
+def _save_table(linear: dict[str, LinearisedMotion], folder: Path) -> None:
     """Save a CSV table of damping and frequency over speed."""
     columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
     for engine, linear_run in linear.items():
@@ -92,7 +92,7 @@ def _save_table(linear: dict[str, Linear], folder: Path) -> None:
     write_table(folder / "over_speed.csv", columns)
 
 
-def _answer_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
+def _answer_of_paths(wheelset: Wheelset, linear: dict[str, LinearisedMotion], paths: Paths) -> dict[str, Any]:
     """Critical speed (None if there is none) and figures of the paths, as plain numbers in SI."""
     return {
         "klingel": klingel_wavelength(wheelset),
@@ -105,7 +105,7 @@ def _answer_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths
     }
 
 
-def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
+def _wavelength_lines(wheelset: Wheelset, linear: dict[str, LinearisedMotion]) -> list[str]:
     """Lines on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each engine's
     eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
@@ -124,7 +124,7 @@ def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str
     return lines
 
 
-def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
+def _stability_lines(wheelset: Wheelset, linear: dict[str, LinearisedMotion]) -> list[str]:
     """Lines on the critical speed and frequency in every engine, or that there is no critical speed."""
     lines = [
         "  critical speed with linear creep",

@@ -31,7 +31,7 @@ def _stability_text(scene: BicycleScene) -> str:
 
 
 def describe(scene: BicycleScene) -> str:
-    """The scene's plan as text."""
+    """Returns the plan of a bicycle scene as text: bicycle, stability, run, tyres, engines, effects, assumptions."""
     bicycle, run, speeds, tyres = scene.whipple, scene.run, scene.speeds, scene.tyres
     rear, front = scene.rolling().loads()
     critical = {"weave": bicycle.weave_speed, "capsize": bicycle.capsize_speed}
