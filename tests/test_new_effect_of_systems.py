@@ -16,7 +16,7 @@ from models.core.scene_effects import effect_sentences, own_table, rebuilt_scene
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
-from models.systems.contact.cases_table import answer_table
+from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built, solved_contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
@@ -310,7 +310,7 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
         folder=tmp_path,
     )
     run_contact(scene, answers=tmp_path / "a.csv")
-    answer_table(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
+    solve_table(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
     assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
 
 

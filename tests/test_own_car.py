@@ -22,7 +22,7 @@ from models.systems.braking import plan as braking_plan
 from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.energy import unaccounted
-from models.systems.handling.export import of_handling
+from models.systems.handling.export import export_handling
 from models.systems.handling.run import REFERENCE, build, drive_run
 from models.systems.ride.run import run as run_ride
 from models.tyre.magic_formula import table_of_surface
@@ -194,7 +194,7 @@ def test_what_is_no_car_of_a_scene_is_refused_by_name(tmp_path, fault):
 
 def exported(handling: Handling) -> str:
     """A car as ``twinrig export`` writes it, with the sites that its user adds."""
-    text = of_handling("mujoco", handling, ExportSubject("car", "car.toml", ""), []).text
+    text = export_handling("mujoco", handling, ExportSubject("car", "car.toml", ""), []).text
     for tyre in handling.given.tyres:
         cornering = next(side.stiffness for side in handling.given.side_forces if side.name == tyre.name)
         site = f'<site name="tyre {tyre.name}" user="{tyre.stiffness} {tyre.damping} {cornering}"/>'

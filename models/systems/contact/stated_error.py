@@ -1,4 +1,4 @@
-"""Stated errors of a contact's results: errors of the cells and of the theory."""
+"""Stated errors of the creep forces of a contact: errors of the finite cells and of the theory."""
 
 from collections.abc import Sequence
 
@@ -16,10 +16,10 @@ BAND_TEXT = "which 95 % of such contacts keep to"
 
 
 def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: Sequence[Error]) -> Result:
-    """The result with the errors of force and moment, each as the root mean square over the result's motions.
+    """Returns the result with the stated errors of force and moment, each as the root mean square over all creepages.
 
-    Relative errors refer to the root mean square of the force; for the moment, which may vanish, to that times the
-    contact's lever. Raises RunFailed where the cells are too few.
+    Relative errors of the force refer to its root mean square. Those of the moment, which may vanish, refer to that
+    force times the contact's lever. Raises RunFailed where the cells are too few.
     """
     force = finite_rms(np.hypot(run["fx"], run["fy"]))
     sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
@@ -33,12 +33,12 @@ def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: S
     else:
         with_stated_errors(run, estimates, HALVED_CELLS)
     theory = finite_rms(run["error_of_theory"])
-    return of_theory(run, {"force": _of_theory(theory, force)}, BAND_TEXT) if theory > 0.0 else run
+    return of_theory(run, {"force": _theory_estimate(theory, force)}, BAND_TEXT) if theory > 0.0 else run
 
 
 def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
-    """The result of a table of cases with the errors of the rows that it keeps: root mean squares of the error of the
-    cells and of that of the theory, which at least 95 % of cases keep to.
+    """Returns the result of a table of cases with its stated errors, as root mean squares over the rows in the result:
+    the error of the cells, and the error of the theory, which 95 % of cases do not exceed.
     """
     force = finite_rms(np.hypot(table["fx"], table["fy"]))
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
@@ -47,8 +47,8 @@ def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
         {"force": by_cells(finite_rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)},
         HALVED_CELLS,
     )
-    return of_theory(table, {"force": _of_theory(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
+    return of_theory(table, {"force": _theory_estimate(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
 
 
-def _of_theory(error: float, force: float) -> Estimate:
+def _theory_estimate(error: float, force: float) -> Estimate:
     return Estimate(error, "N", error / force if force > 0.0 else 0.0, 0.0, 0.0)
