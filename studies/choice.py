@@ -140,9 +140,9 @@ def has_closed_form(scene: Any) -> bool:
     """Whether a scene's choice needs no runs in time."""
     if scene.system != "ride":
         return False
-    from models.systems.ride.of_scene import goes_in_time
+    from models.systems.ride.of_scene import needs_run_in_time
 
-    return not goes_in_time(scene)
+    return not needs_run_in_time(scene)
 
 
 def engine_of(scene: Any, engines: tuple[str, ...]) -> str:

@@ -71,7 +71,7 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
     lines += [f"  doubt: {text}" for text in tilt.objections]
     lines += [f"  {name}: {text}" for name, text in comparison.failed.items()]
     if len(comparison.runs) > len(METHOD_OF_RUN):
-        lines.append(f"  engines before drift-off: {comparison.engines_apart():.1e}")
+        lines.append(f"  engines before drift-off: {comparison.largest_engine_difference():.1e}")
     return lines
 
 

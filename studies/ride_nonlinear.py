@@ -17,7 +17,7 @@ from models.ride.road_path import check_rates
 from models.road.excitation import Excitation
 from models.systems import run as run_scene
 from models.systems.ride.nonlinear import Nonlinear, Ride, Sampling
-from models.systems.ride.of_scene import excitation_of, in_time_only, vehicle_of
+from models.systems.ride.of_scene import excitation_of, has_no_linear_equivalent, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
@@ -35,7 +35,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     vehicle = vehicle_of(scene)
-    if not in_time_only(vehicle):
+    if not has_no_linear_equivalent(vehicle):
         allowed = "has neither curves nor friction, nor tyres that lift: use ride, which is exact for it"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
     for name, weighting_name in scene.weighting.items():

@@ -13,7 +13,7 @@ from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded_measurement, true_run, two_tracks
-from models.systems.hub_forces.run import run, with_angles
+from models.systems.hub_forces.run import inputs_with_angles, run
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate, inputs_with_moments
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
@@ -70,7 +70,7 @@ def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
     car, true, forces, angles = measured
     less = replace(forces, samples=forces.samples - np.eye(24)[3] * 200.0)  # 200 N m about x at one hub
     hub_input_sets = [
-        with_angles(own.hub_inputs(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)
+        inputs_with_angles(own.hub_inputs(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)
     ]
     whole, run = (build("mujoco", car, hub_inputs, 2e-3, 1.0).run() for hub_inputs in hub_input_sets)
     assert np.abs(run.states[:, [ROLL, PITCH]] - true.states[:, [ROLL, PITCH]]).max() < 1e-6

@@ -16,7 +16,7 @@ from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import FILTERED_RUN, Comparison, compare
 from models.systems.hub_forces.measurement import HubForces, hub_model, recorded_measurement, true_run, two_tracks
-from models.systems.hub_forces.run import with_angles
+from models.systems.hub_forces.run import inputs_with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
@@ -270,7 +270,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
             f"hub_forces.engines_{frame}",
             SYSTEM,
             f"largest difference between the engines before drift-off, noisy road run of 8 s, frame {frame!r}",
-            comparison.engines_apart(),
+            comparison.largest_engine_difference(),
             "m, rad, 1/s",
         ).at_most(1e-9, "same tableau, same step", "shared kernel"),
         *(
@@ -310,8 +310,8 @@ def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
     """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
     measurement = comparison.measurement
     assert measurement.truth is not None
-    steps = measurement.scene.steps
-    hub_inputs = with_angles(
+    steps = measurement.scene.step_count
+    hub_inputs = inputs_with_angles(
         measurement.forces.hub_inputs(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP
     )
     run = build("mujoco", measurement.vehicle, hub_inputs, STEP, steps * STEP).run()

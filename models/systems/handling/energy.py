@@ -1,5 +1,4 @@
-"""Energy of a simulated drive, from the velocities of its rigid bodies, and the energy that its work does not explain.
-"""
+"""Energy of a simulated drive from the velocities of its bodies, and the energy that its work does not explain."""
 
 import numpy as np
 

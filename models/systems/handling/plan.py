@@ -14,8 +14,7 @@ from models.vehicles.towing import hitch_line
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
-    """Raise InputError, before any file is written, for a vehicle, tyres or road of a manoeuvre that cannot be built.
-    """
+    """Raise InputError, before any file is written, for vehicles, tyres or roads that cannot be built."""
     for name in scene.manoeuvres:
         scene.car(name)
 

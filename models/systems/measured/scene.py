@@ -107,7 +107,7 @@ class Deviations(Strict):
     rate: float | None = quantity("rad/s", "of every angular rate", default=None)
 
 
-class Stabilise(Strict):
+class Stabiliser(Strict):
     """[stabilise]: how roll and pitch are held."""
 
     method: Literal["kalman", "prescribed", "none"] = Field(default="kalman", description="what holds roll and pitch")
@@ -147,7 +147,7 @@ class MeasuredScene(SceneFile):
     sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
     clock: Clock = Clock()
     noise: Deviations = Deviations()
-    stabilise: Stabilise = Stabilise()
+    stabilise: Stabiliser = Stabiliser()
     run: Run = Run()
     limits: Limits = Field(default=RUN_LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()

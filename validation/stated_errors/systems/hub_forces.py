@@ -68,7 +68,7 @@ def _sample_of_run(scene: HubScene, engine: str) -> Sample:
     """Run a scene with its stated error, and compute its true error by a finer run."""
     with counted_forces() as calls:
         stated_run = _run_with_error(scene, engine)
-    errors, plain = errors_of(stated_run), 2 * scene.steps
+    errors, plain = errors_of(stated_run), 2 * scene.step_count
     names = list(errors)
     title = f"{scene.title}, {scene.stabilise.method}, {scene.vehicle.file}"
     return Sample(

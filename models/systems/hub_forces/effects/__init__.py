@@ -1,4 +1,6 @@
-"""Effects of scenes of hub forces: see ``models.core.scene_effects``."""
+"""Effects of hub forces scenes: noise, interpolation, frame, stabilisers, virtual measurement (see
+``models.core.scene_effects``).
+"""
 
 from typing import Any
 
@@ -15,11 +17,11 @@ def _selected_effect(
     instead: str | None,
     **entry_fields: Any,
 ) -> Entry:
-    """An effect that a word of the scene selects: ``usual_value`` with the effect, ``instead`` without it, None for the
-    default.
+    """Returns an effect that is selected by the value of a scene key: ``usual_value`` with the effect, ``instead``
+    without it; None removes the key.
 
-    An effect that needs the virtual measurement is absent where the scene has files. Stated deviations of noise stay
-    without the effect: the filter gets the same ones as before.
+    An effect that needs the virtual measurement is absent where the scene has files. Without an effect of noise its
+    stated deviations stay, so that the filter uses the same values.
     """
     name, key = key_path.split(".")
 
