@@ -92,7 +92,7 @@ def rim_speed_differences(
     computed rim speeds of the W wheels in m/s."""
     if measured_pressures is None or measured_pressures.speeds is None:
         return {}
-    return {"rim less measured, rms [m/s]": measured_pressures.rms(stop.times, rims)}
+    return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, rims)}
 
 
 def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:

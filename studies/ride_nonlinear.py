@@ -94,7 +94,7 @@ def _answer_of_ride(nonlinear: Nonlinear) -> dict[str, Any]:
     tyres that lift they are those of the Monte Carlo copies, at the copies' speeds."""
     copies = list(nonlinear.copies.values())
     table: dict[str, Any] = {"speed": list(nonlinear.copies) if nonlinear.tyres_may_lift else nonlinear.speeds.tolist()}
-    for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.of("mean"))):
+    for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.quantity_by_speed("mean"))):
         values = (
             np.array([getattr(copies_at_speed, key) for copies_at_speed in copies])
             if nonlinear.tyres_may_lift

@@ -84,7 +84,9 @@ def test_measured_speeds_differ_from_rims_by_their_rms(tmp_path):
     file.write_text(HEAD + SPEEDS + "\n0, 0, 0, 1, 1, 36, 10, 10, 10\n1, 2, 200, 1, 1, 18, 5, 5, 5\n")
     found = read_pressures(file, 4)
     rims = np.array([[10.0, 10, 10, 10], [7.5, 8.5, 7.5, 5.5], [0, 0, 0, 0]])  # the last row is after the file's end
-    assert found.rms(np.array([0.0, 0.5, 2.0]), rims) == pytest.approx([0.0, 0.5**0.5, 0.0, 2.0**0.5], abs=1e-12)
+    assert found.wheel_speed_error(np.array([0.0, 0.5, 2.0]), rims) == pytest.approx(
+        [0.0, 0.5**0.5, 0.0, 2.0**0.5], abs=1e-12
+    )
 
 
 @pytest.mark.parametrize(

@@ -180,8 +180,8 @@ def test_deviations_of_parts_are_those_of_outputs_that_ask_for_the_same():
     spectral = Spectral(CAR, lambda speed: linearise(CAR, speed), road, speeds, {"load fl": np.array([0.5, 0.75])})
     sweep = variance_sweep(lambda speed: linearise(CAR, speed), {"c": road}, speeds)
     for name, output in (("load fl", "tyre force front left"), ("travel rear right", "travel rear right")):
-        assert spectral.of(name).deviation == pytest.approx(sweep.of("c", output), rel=1e-9)
-    assert spectral.of("load fl").mean.tolist() == [0.5, 0.75]
+        assert spectral.motion_of_part(name).deviation == pytest.approx(sweep.of("c", output), rel=1e-9)
+    assert spectral.motion_of_part("load fl").mean.tolist() == [0.5, 0.75]
 
 
 def test_pressure_of_a_grid_falls_along_its_ellipse_and_sums_up_to_the_load():

@@ -1,4 +1,4 @@
-"""The vehicle of a braking scene as a file of its engine: bodies and joints of one on its suspension."""
+"""Export of the suspended vehicle of a braking scene as a model file of an engine: bodies and joints."""
 
 from models.core.errors import InputError
 from models.engines.export import Exported, ExportSubject
@@ -8,7 +8,9 @@ from models.systems.handling.export import AXES, export_handling
 
 
 def exported(scene: BrakingScene, engine: str) -> Exported:
-    """Export the vehicle on its suspension; InputError for a vehicle in the plane, of which engines have no model."""
+    """Export the vehicle on its suspension as a model file of "mujoco" or "exudyn". Raises InputError for a vehicle in
+    the plane, of which engines have no model.
+    """
     if scene.vehicle.file is None:
         allowed = "is in the plane, by equations of twinrig's: give vehicle.file, a vehicle on its suspension"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)

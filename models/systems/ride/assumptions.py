@@ -49,7 +49,7 @@ def assumptions(
 
     def values_of(name: str) -> np.ndarray | Gaussian:
         assert motion is not None
-        return motion.of(name)
+        return motion.motion_of_part(name)
 
     assumptions_of_vehicle = [
         *_tyre_assumptions(vehicle, values_of),

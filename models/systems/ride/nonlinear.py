@@ -76,7 +76,7 @@ class Nonlinear:
     shown: StatisticallyLinear
     tyres_may_lift: bool = False
 
-    def of(self, name: str) -> np.ndarray:
+    def quantity_by_speed(self, name: str) -> np.ndarray:
         """Returns a quantity of the statistically linearised vehicles, by its name, shape (speeds, outputs)."""
         return np.array([getattr(linearised, name) for linearised in self.linearised_vehicles])
 
@@ -108,7 +108,7 @@ def linearised_result(
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
-    by_speed |= {field_name: linear_runs.of(field_name) for field_name in ("mean", "left_out")}
+    by_speed |= {field_name: linear_runs.quantity_by_speed(field_name) for field_name in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
     channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
     channels |= {
@@ -320,7 +320,7 @@ class Ride:
     outputs: np.ndarray
     rows: np.ndarray
 
-    def of(self, name: str) -> np.ndarray:
+    def output_values(self, name: str) -> np.ndarray:
         """Returns the values (m,) of an output, by its name."""
         return self.outputs[:, self.names.index(name)]
 

@@ -27,7 +27,7 @@ JUDGED_SPEEDS = 5
 class WatchedMotion(Protocol):
     """Protocol of the motion of a vehicle's parts in a run; motions have the names of ``watched_outputs``."""
 
-    def of(self, name: str) -> np.ndarray | Gaussian:
+    def motion_of_part(self, name: str) -> np.ndarray | Gaussian:
         """Returns the values of a part's motion at every row of the run, or its Gaussian statistics."""
         ...
 
@@ -96,7 +96,7 @@ class Spectral:
     speeds: Sequence[float]
     means: Mapping[str, np.ndarray]
 
-    def of(self, name: str) -> Gaussian:
+    def motion_of_part(self, name: str) -> Gaussian:
         """Returns the Gaussian statistics of a part's motion at every speed."""
         mean = self.means.get(name, np.zeros(len(self.speeds)))
         return Gaussian(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
@@ -125,12 +125,12 @@ class MotionAlongDrive:
     deviations: Mapping[str, np.ndarray]
     speed_by_speed: Spectral
 
-    def of(self, name: str) -> Gaussian:
+    def motion_of_part(self, name: str) -> Gaussian:
         """Returns the Gaussian statistics of a part's motion at every instant of the drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)
-        return self.speed_by_speed.of(name)
+        return self.speed_by_speed.motion_of_part(name)
 
 
 def watched_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
@@ -157,7 +157,7 @@ class MotionInRun:
     rates: np.ndarray
     heights: np.ndarray
 
-    def of(self, name: str) -> np.ndarray:
+    def motion_of_part(self, name: str) -> np.ndarray:
         """Returns the values of a part's motion at every row of the run."""
         row = {output.name: output for output in self.watched_vehicle.outputs}[name]
         road = np.concatenate([row.road_factors, row.road_rate_factors])
