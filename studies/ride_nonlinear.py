@@ -163,7 +163,8 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[s
     ]
     for spec in (spec for spec in vehicle.outputs if isinstance(spec, TyreOutput) and spec.kind == "tyre force"):
         shares = [
-            f"{engine} {100 * np.mean(run.of(spec.name) <= -loads[spec.tyre]):.2g} %" for engine, run in runs.items()
+            f"{engine} {100 * np.mean(run.output_values(spec.name) <= -loads[spec.tyre]):.2g} %"
+            for engine, run in runs.items()
         ]
         pulls = float(ndtr(-loads[spec.tyre] / largest_deviations[names.index(spec.name)]))
         air_text = f"; in the air {', '.join(shares)}" if shares else ""

@@ -61,9 +61,9 @@ class StartState(NamedTuple):
 class BrakedVehicle:
     """A vehicle with brakes and tyres on a road, ready to run.
 
-    kind (W,) : index of the tyre of each wheel; slope : largest cornering stiffness divided by load among the tyres; steer
-    (W,) : steer angles (rad), or in their place steering : function from time (s) to steer angles, evaluated in the
-    middle of each sample; switch_time : time (s) at which the brake switch closes; engine :
+    kind (W,) : index of the tyre of each wheel; slope : largest cornering stiffness divided by load among the tyres;
+    steer (W,) : steer angles (rad), or in their place steering : function from time (s) to steer angles, evaluated in
+    the middle of each sample; switch_time : time (s) at which the brake switch closes; engine :
     ``models.engines.braking.CarriedChassis`` if an engine carries the chassis; sprung : ``models.brake.sprung.Sprung``
     of a vehicle on its suspension, which its engine then integrates.
     """

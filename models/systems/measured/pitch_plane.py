@@ -158,7 +158,7 @@ def trusted_time(scene: Scene, deviation: float) -> Trust | None:
     bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
         return bounds
-    noise = drift_trust.noise(assembly, deviation).passing_time(bounds.angle)
+    noise = drift_trust.noise_error_curve(assembly, deviation).passing_time(bounds.angle)
     return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
 
 
