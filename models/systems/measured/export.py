@@ -1,4 +1,4 @@
-"""The vehicle of a recording as a file of its engine."""
+"""Export of the vehicle of a recording's scene as a model file of an engine."""
 
 from models.core.errors import InputError
 from models.engines.export import Exported, ExportSubject
@@ -7,7 +7,9 @@ from models.systems.measured.scene import MeasuredScene
 
 
 def exported(scene: MeasuredScene, engine: str) -> Exported:
-    """Export the cut vehicle; InputError for the pitch plane, which a scene of that system exports."""
+    """Export the vehicle without wheels as a model file of "mujoco" or "exudyn". Raises InputError for the pitch plane,
+    which a scene of that system exports.
+    """
     vehicle = scene.rig().vehicle
     if vehicle is None:
         allowed = "is driven in the pitch plane: export a scene of that system with the same parameters"
