@@ -1,6 +1,4 @@
-"""Effect lift_off: tyres of the virtual measurement that only push. A wheel may leave the road, and the road then
-exerts no force on its hub.
-"""
+"""Tyres of the virtual measurement that only push, so that a wheel may leave the road without a force on its hub."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Effect accelerometers: tri-axial accelerometers on the chassis, on rigid mounts or on a compliant bracket.
+"""Tri-axial accelerometers on the chassis, on rigid mounts or on a compliant bracket.
 
 They read the engine's accelerations at their sampling times and have no effect on the motion. Between samples the
 reading is constant.

@@ -1,4 +1,4 @@
-"""Effect contact_points: motion of the massless tyre contact points of a force-excited vehicle (rows 9, 10 of eq. 37).
+"""Motion of the massless tyre contact points of a force-excited vehicle (rows 9, 10 of eq. 37).
 
 With e = z - zeta each contact point obeys d e' + k e = f alone: it follows the wheel force and has no effect on the
 vehicle. So it is no state of any engine but an exact filter over the force samples, whatever the run's steps.

@@ -1,4 +1,4 @@
-"""Effect force_noise: white measurement noise on the samples of the wheel forces, drawn before the run.
+"""White measurement noise on the samples of the wheel forces, drawn before the run.
 
 It belongs to the samples and their rate, never to the integrator's step: the same seed gives the same
 forces in every engine and at every step.

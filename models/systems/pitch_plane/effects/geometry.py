@@ -1,4 +1,4 @@
-"""Effect geometry: exact sine and cosine of the pitch; without it the equations are linear in the pitch."""
+"""Exact sine and cosine of the pitch; without it the equations are linear in the pitch."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Effect gyro: a gyro reads the chassis' pitch rate with white noise on each sample, so a random walk of the angle.
+"""A gyro that reads the chassis' pitch rate with white noise on each sample, so a random walk of the angle.
 
 It has no effect on the motion. Between samples the reading is constant.
 """

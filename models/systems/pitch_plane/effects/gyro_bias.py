@@ -1,4 +1,4 @@
-"""Effect gyro_bias: a bias of the gyro, with a constant turn-on part and a slow first-order Gauss-Markov instability.
+"""A bias of the gyro, with a constant turn-on part and a slow first-order Gauss-Markov instability.
 
 The grade of an inertial unit, 0.001 to 10 degrees per hour, is a statement on this bias, not on its white noise.
 """

@@ -1,4 +1,4 @@
-"""Effect high_pass: the paper's high-pass filter against drift, which removes slow pitch during the run.
+"""The paper's high-pass filter against drift, which removes slow pitch during the run.
 
 Integrating the pitch acceleration through a second-order high-pass, s^2 / (s^2 + 2 zeta wc s + wc^2) in place of
 1, is algebraically a rotational spring and damper to the ground. The inertia that it works against is that of the

@@ -1,4 +1,4 @@
-"""Effect kalman_filter: a moment that pulls the pitch towards a Kalman filter's estimate from measured angle and rate.
+"""A moment that pulls the pitch towards a Kalman filter's estimate from measured angle and rate.
 
 The filter runs before the simulation, on the scene's parameters and forces (``pitch_filter``), also across gaps of the
 measurement. Two moments then act in the simulation. The first corrects the error of the model's inertia by the filter's

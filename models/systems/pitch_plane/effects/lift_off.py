@@ -1,4 +1,4 @@
-"""Effect lift_off: tyres that only push, so that a wheel may leave the road; the paper's linear tyre would pull.
+"""Tyres that only push, so that a wheel may leave the road; the paper's linear tyre would pull.
 
 A tyre of stiffness k (N/m) and damping d (N s/m) that is compressed by e (m, the static deflection included) has
 

@@ -1,4 +1,4 @@
-"""Effect pitch_sensor: a sensor reads the chassis' pitch with white noise on each sample, as an inertial unit does.
+"""A sensor that reads the chassis' pitch with white noise on each sample, as an inertial unit does.
 
 It has no effect on the motion. Between samples the reading is constant.
 """

@@ -1,4 +1,4 @@
-"""Effect pitch_spring: a rotational spring and damper between chassis and ground, the usual remedy against drift."""
+"""A rotational spring and damper between chassis and ground, the usual remedy against drift."""
 
 from typing import Any
 

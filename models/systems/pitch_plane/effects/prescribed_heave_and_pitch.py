@@ -1,4 +1,4 @@
-"""Effect prescribed_heave_and_pitch: heave and pitch of the chassis follow a file, by an enforced force and moment.
+"""Heave and pitch of the chassis prescribed from a file, by an enforced force and moment.
 
 The enforced force and moment show errors of the model. With true motion and true wheel forces, a chassis that is too
 light by dm takes a mean force dm g (down), and a centre of mass that lies x too far forward a mean moment m3 g x (nose

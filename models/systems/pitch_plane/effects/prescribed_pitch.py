@@ -1,4 +1,4 @@
-"""Effect prescribed_pitch: the pitch follows a file (eq. 39), by an enforced moment that is a result.
+"""Pitch prescribed from a file (eq. 39), by an enforced moment that is a result.
 
 A measured pitch is differentiated twice: white noise of 0.1 degrees at 1 kHz would take 1e6 N m. So the pitch is
 smoothed to ``bandwidth`` before.

@@ -1,4 +1,4 @@
-"""Effect road: a road under the wheels (eq. 38), from a formula, an ISO 8608 class, or a measured file."""
+"""A road under the wheels (eq. 38), from a formula, an ISO 8608 class, or a measured file."""
 
 from dataclasses import replace
 from functools import partial

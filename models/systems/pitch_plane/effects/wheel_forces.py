@@ -1,4 +1,4 @@
-"""Effect wheel_forces: the vehicle has no tyres and is driven by wheel forces from a file (eq. 37)."""
+"""Wheel forces prescribed from a file (eq. 37), in place of tyres on a road."""
 
 from dataclasses import replace
 from functools import partial

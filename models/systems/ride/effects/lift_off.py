@@ -1,6 +1,4 @@
-"""Effect lift_off: tyres that only push, so that a wheel may leave the road. Such a vehicle has no linear covariance
-and is run in time.
-"""
+"""Tyres that only push, so that a wheel may leave the road. Such a vehicle has no covariance and is run in time."""
 
 from dataclasses import replace
 from typing import Any
