@@ -37,7 +37,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": comparison.answer(),
+        "answer": comparison.figures(),
         "results": comparison.results,
         "doubts": list(comparison.measurement.tilt.objections),
         "table": _table(scene, comparison),

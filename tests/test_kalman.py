@@ -138,7 +138,7 @@ def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     n, own = 12, assembly_of_scene(scene(folder, duration=0.06, geometry="linear", interpolation="held"))
     measured = Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,))
     step = PitchStep(own, PERIOD, n)
-    mean, start = pitch_filter._start(own, 0.05, 0.0)
+    mean, start = pitch_filter._initial_state_and_covariance(own, 0.05, 0.0)
     means, roots = [mean], [np.linalg.cholesky(start)]
     for i in range(n):
         after, transition, first, _ = step.advance(means[-1], i)

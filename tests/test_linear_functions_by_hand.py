@@ -27,7 +27,7 @@ from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, _both_filters, half_track
 from models.systems.bicycle.run import assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels
-from models.systems.ride.watched import Spectral, few_speeds, static_loads
+from models.systems.ride.watched import Spectral, checked_speeds, static_loads
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import CARRIER
@@ -170,7 +170,7 @@ def test_a_car_stands_on_loads_that_balance_its_weight():
 
 
 def test_a_few_of_many_speeds_are_evenly_among_them():
-    assert few_speeds([30.5, 10.5, *np.linspace(11.5, 29.5, 19)]) == [10.5, 15.5, 20.5, 25.5, 30.5]
+    assert checked_speeds([30.5, 10.5, *np.linspace(11.5, 29.5, 19)]) == [10.5, 15.5, 20.5, 25.5, 30.5]
 
 
 @pytest.mark.grounds("plain counterpart")

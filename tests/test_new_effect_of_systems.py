@@ -20,7 +20,7 @@ from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built, solved_contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
-from models.systems.handling.energy import unaccounted
+from models.systems.handling.energy import unaccounted_energy
 from models.systems.handling.run import drive_run
 from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
@@ -199,7 +199,7 @@ def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
         pushes=(Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))),)
     )
     drive = drive_run("mujoco", handling, 25.0, 0.5)
-    assert np.abs(unaccounted(drive)).max() < 1e-6
+    assert np.abs(unaccounted_energy(drive)).max() < 1e-6
     assert drive.path[-1, 1] > 0.04  # m, to the left
     with pytest.raises(InputError, match="no such body"):
         handling.changed(pushes=(Push("sail", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((0.0, 1.0),)),))

@@ -21,7 +21,7 @@ from models.own_model.car import vehicle_of_file
 from models.systems.braking import plan as braking_plan
 from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
-from models.systems.handling.energy import unaccounted
+from models.systems.handling.energy import unaccounted_energy
 from models.systems.handling.export import export_handling
 from models.systems.handling.run import REFERENCE, build, drive_run
 from models.systems.ride.run import run as run_ride
@@ -94,7 +94,7 @@ def test_it_drives_a_lane_change_in_both_engines(drives):
     assert np.abs(exudyn["fy"] - other["fy"]).max() < 1e-10 * np.abs(other["fy"]).max()
     assert np.abs(other["fy"]).max() > 1500.0
     assert np.ptp(other.path[:, 1]) > 0.5
-    assert np.abs(unaccounted(other)).max() < 1e-5 * np.ptp(other.ledger[:, 0])
+    assert np.abs(unaccounted_energy(other)).max() < 1e-5 * np.ptp(other.ledger[:, 0])
 
 
 def test_engines_accelerate_it_as_the_plain_equations_do(saloon, drives):

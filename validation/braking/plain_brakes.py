@@ -29,8 +29,8 @@ BY_LOAD = np.array([1.1, 1.0, 0.8])
 
 def by_load(surface_name: str) -> TyreTable:
     """A surface's tyre whose friction falls with the load."""
-    tables_of = table_of_surface(surface_name)
-    spread = tables_of.refined(tables_of.angles, tables_of.slips, LOADS)
+    tyre_tables_of = table_of_surface(surface_name)
+    spread = tyre_tables_of.refined(tyre_tables_of.angles, tyre_tables_of.slips, LOADS)
     return replace(spread, mu_x=spread.mu_x * BY_LOAD[None, :, None], h=spread.h * BY_LOAD)
 
 

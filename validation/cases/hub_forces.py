@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
         rows += [*_stabilised(frame, comparison), _prescribed_truth(frame, comparison)]
-    return rows + _faults(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
+    return rows + _faults(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
 
 
 def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
@@ -172,7 +172,7 @@ def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
     """Row: difference between free runs of all engines under the same noisy forces."""
     steps = round(duration / STEP)
     hub_inputs = static_forces(vehicle, steps + 1)
-    noisy = HubForces(hub_inputs.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
+    noisy = HubForces(hub_inputs.hubs, STEP, "hub").with_noise(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
     paths = [hub_model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
     return Observed(
         "hub_forces.engines_on_noise",
@@ -229,7 +229,7 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
     still = HubForces(rest.hubs, step, "hub")
     ends = np.array(
         [
-            hub_model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, LASTING).run().states[-1]
+            hub_model("mujoco", vehicle, still.with_noise(deviation, SEED, path), step, LASTING).run().states[-1]
             for path in range(COPIES)
         ]
     )

@@ -319,7 +319,7 @@ def _drift_off(
     run = hub_model(
         "mujoco",
         vehicle,
-        forces.noisy(deviation, SEED, path),
+        forces.with_noise(deviation, SEED, path),
         true_measurement.step,
         float(true_measurement.run.times[-1]),
         "smooth",

@@ -80,7 +80,7 @@ def samples(vehicle: CutVehicle) -> HubForces:
     """Hub force samples in axes fixed in space: static loads with random parts of 400 N and 40 N m."""
     static_inputs = static_forces(vehicle, SAMPLES, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
-    return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
+    return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").with_noise(deviations, SEED)
 
 
 def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:

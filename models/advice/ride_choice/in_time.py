@@ -217,7 +217,7 @@ def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]
     return replace(
         scene.vehicle,
         springs=tuple(
-            _linearised_spring(s, scene.straight, motion_of_spring) for s in springs if s.name not in scene.rigid
+            _linearised_spring(s, scene.linearised_laws, motion_of_spring) for s in springs if s.name not in scene.rigid
         ),
         bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda any_body: any_body.name in seats)),
     )

@@ -48,7 +48,7 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     error : whether the error of the time steps is estimated, by further runs in longer steps.
     """
     start_time = time.process_time()
-    ride = ride_with_ideal_rolling(scene) if engine == REFERENCE else ride_on_tyres(scene, engine, scene.run.step)
+    ride = run_with_ideal_rolling(scene) if engine == REFERENCE else run_on_tyres(scene, engine, scene.run.step)
     seconds = time.process_time() - start_time
     channels = dict[str, Channel]()
     for i, (name, unit) in enumerate(COORDINATES.items()):
@@ -89,13 +89,13 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
     ]
 
 
-def ride_on_tyres(
+def run_on_tyres(
     scene: BicycleScene, engine: str, step: float, duration: float | None = None, stride: int | None = None
 ) -> Ride:
     """Run the bicycle on its tyres in an engine with a step (s). The work is summed over all steps. Recorded rows are
     ``stride`` steps apart, by default at most LARGEST_ROW_SPACING (s); the last row is the end of the run.
     """
-    rolling, run = scene.rolling(), scene.run
+    rolling, run = scene.bicycle_on_tyres(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
     path = model.run(*straight_rolling(rolling.bicycle, run.speed, run.lean_rate))
     fallen = np.abs(path.positions[:, LEAN]) > FALLEN_LEAN
@@ -132,9 +132,9 @@ def _steps_between_rows(step_count: int, step: float) -> int:
     return next(stride for stride in range(most_steps, 0, -1) if step_count % stride == 0)
 
 
-def ride_with_ideal_rolling(scene: BicycleScene) -> Ride:
+def run_with_ideal_rolling(scene: BicycleScene) -> Ride:
     """Run the bicycle with wheels that roll without slip; recorded rows are about LARGEST_ROW_SPACING (s) apart."""
-    rolling, run = scene.rolling(), scene.run
+    rolling, run = scene.bicycle_on_tyres(), scene.run
     bicycle = IdealBicycle(rolling.bicycle, rolling.control)
     rows = max(3, round(run.duration / LARGEST_ROW_SPACING) + 1)
     return bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
@@ -157,7 +157,7 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
         if factor > 1.0 and step_count < 2 * stride:
             raise RunFailed(engine, f"steps of {step:g} s are too long for {share * duration:g} s")
         step_count = max(step_count, 2 * stride)
-        return series(ride_on_tyres(scene, engine, step, step_count * step, stride))
+        return series(run_on_tyres(scene, engine, step, step_count * step, stride))
 
     estimates, method_text = by_steps(series(ride), rerun, 4.0, scene.run.step)
     return with_stated_errors(run, estimates, method_text)

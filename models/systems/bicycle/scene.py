@@ -61,7 +61,7 @@ class BicycleScene(SceneFile):
         """Parameters of the bicycle for the linear (Whipple) equations."""
         return load_bicycle(self.bicycle.parameters, self.folder, self.file, "bicycle.parameters")
 
-    def rolling(self) -> RollingBicycle:
+    def bicycle_on_tyres(self) -> RollingBicycle:
         """Returns the bicycle on its tyres with the scene's control and effects."""
         return extended_by_effects(RollingBicycle(self.whipple, self.tyres, self.control), self)
 

@@ -79,7 +79,7 @@ class AdhesionUtilisation:
         return self.z / self.k_vehicle
 
 
-def axles(scene: BrakingScene) -> Axles:
+def axle_geometry(scene: BrakingScene) -> Axles:
     """Axle loads (N), wheelbase (m) and height of the centre of mass (m) of the scene's vehicle."""
     truck = vehicle_of(scene)
     weight = truck.mass * GRAVITY
@@ -105,7 +105,7 @@ def measured_adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     """Measure the adhesion k of every axle on a surface: each axle is braked alone from 50 km/h without locking. Raises
     NoAdhesion.
     """
-    vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axles(scene)
+    vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axle_geometry(scene)
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         raise NoAdhesion("axles are braked without trailer: name a vehicle.file whose vehicle tows nothing")
     front, rear = (
@@ -176,7 +176,7 @@ def utilisation(
 
     k : adhesion of the axles, measured if None; name : of the run at the port.
     """
-    lengths, k = axles(scene), k or measured_adhesion(scene, surface)
+    lengths, k = axle_geometry(scene), k or measured_adhesion(scene, surface)
     train = vehicle_on_one_surface(scene, surface)
     z = _controlled_braking_rate(scene, name, train, (55.0, 45.0, 15.0))
     loads = np.concatenate(([lengths.weight], trailer_loads(train, z)))
@@ -212,7 +212,7 @@ def split_adhesion(scene: BrakingScene, name: str) -> SplitAdhesion:
     z = _controlled_braking_rate(
         scene_without_trailer, name, braked_vehicle(scene_without_trailer, procedure), (50.0, 40.0, 20.0)
     )
-    return SplitAdhesion(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axles(scene)) for k in adhesions))
+    return SplitAdhesion(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axle_geometry(scene)) for k in adhesions))
 
 
 def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
@@ -226,7 +226,7 @@ def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, fl
     if procedure.radius is not None:
         if stop.times[-1] < 1.0:
             return {}
-        return {f"after 1 s: {key}": value for key, value in stop.in_turn(procedure.radius).items()}
+        return {f"after 1 s: {key}": value for key, value in stop.results_in_turn(procedure.radius).items()}
     if procedure.kind == "j_turn":
         response = step_steer(scene, name)
         time, overshoot, steady = (np.nan,) * 3 if response is None else astuple(response)

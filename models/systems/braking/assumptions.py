@@ -14,7 +14,7 @@ from models.brake.plane_vehicle import GRAVITY, Truck
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.systems.braking.march import BrakedVehicle
-from models.systems.braking.of_scene import measured_of, tables_of, vehicle_of
+from models.systems.braking.of_scene import measured_pressures_of, tyre_tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, Stop, wheel_names
 
@@ -58,15 +58,15 @@ def assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> 
     stop.
     """
     parts = (
-        _loads_assumptions(scene),
-        _bodies_assumptions(scene, vehicle),
-        _tyres_assumptions(scene, vehicle),
-        _brakes_assumptions(scene, procedure, vehicle),
+        _load_assumptions(scene),
+        _body_assumptions(scene, vehicle),
+        _tyre_assumptions(scene, vehicle),
+        _brake_assumptions(scene, procedure, vehicle),
     )
     return [*chain.from_iterable(parts), *_drive_assumptions(scene, vehicle)]
 
 
-def _loads_assumptions(scene: BrakingScene) -> Iterator[Assumption]:
+def _load_assumptions(scene: BrakingScene) -> Iterator[Assumption]:
     """Yields assumptions on the wheel loads of a plane vehicle; none for a vehicle on its suspension."""
     if scene.vehicle.file is not None:
         return
@@ -123,7 +123,7 @@ def _load_transfer_of_body(body: Truck, acceleration_along: np.ndarray, accelera
     return body.height / GRAVITY * (acceleration_along * lever + 2.0 * acceleration_across / track)
 
 
-def _bodies_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+def _body_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Yields assumptions on the vehicle's direction, the angles of its train and the travel of its springs."""
     yield Assumption(
         "forwards",
@@ -216,9 +216,9 @@ def _lean_angles(run: Result) -> Watched:
     return dict(zip(("roll", "pitch"), lean.T, strict=True))
 
 
-def _tyres_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+def _tyre_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Yields assumptions that loads and slip angles stay within the tyre tables, and that steps resolve slip angles."""
-    tables = tables_of(scene).values()
+    tables = tyre_tables_of(scene).values()
     largest = min(table.loads[-1] * (LARGEST_LOAD_FACTOR if table.loads.size == 1 else 1.0) for table in tables)
     yield Assumption(
         "loads of the friction",
@@ -263,7 +263,7 @@ def _resolved_speed(vehicle: BrakedVehicle, run: Result) -> Watched:
     }
 
 
-def _brakes_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+def _brake_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Yields assumptions on brake pressures, brake work and the valves that set the pressures."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
@@ -293,7 +293,7 @@ def _brakes_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehi
             "m/s",
             upper_limit=port.signals.range,
         )
-    measured = measured_of(scene, procedure, vehicle.plane.wheels)
+    measured = measured_pressures_of(scene, procedure, vehicle.plane.wheels)
     if measured is not None:
         yield Assumption(
             "measured pressures",

@@ -86,7 +86,7 @@ def with_error(run: Result, scene: BrakingScene, repeats: RepeatedRuns) -> Resul
     if not can_be_repeated(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE_STEP_NOTE if can_be_repeated(scene) else SINGLE_RUN_NOTE)
     try:
-        paths = _finer_runs(path, steps, repeats.repeat_stop)
+        paths = _runs_in_other_steps(path, steps, repeats.repeat_stop)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
@@ -131,16 +131,19 @@ def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
     return _rms(pressures - path.pressures) <= EQUAL_PRESSURE_SHARE * size_of(path.pressures)
 
 
-def commands_change_nearby(path: BrakingPath, longer: BrakingPath, repeats: RepeatedRuns) -> bool:
+def commands_change_nearby(path: BrakingPath, path_in_longer_steps: BrakingPath, repeats: RepeatedRuns) -> bool:
     """Whether the controller's commands change if the signals of a run are shifted by as much as longer steps shift
     them, in the opposite direction.
 
     Valve commands change if any state differs, pressures if they differ by more than EQUAL_PRESSURE_SHARE.
     """
-    path_times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
+    path_times, speeds = (
+        path.times[:-1],
+        [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, path_in_longer_steps)],
+    )
     turning, speed = path.turning[:-1], speeds[0][:-1]
-    shifted = 2.0 * turning - _columns_at(path_times, longer, longer.turning)
-    faster = np.maximum(2.0 * speed - np.interp(path_times, longer.times, speeds[1]), 0.0)
+    shifted = 2.0 * turning - _columns_at(path_times, path_in_longer_steps, path_in_longer_steps.turning)
+    faster = np.maximum(2.0 * speed - np.interp(path_times, path_in_longer_steps.times, speeds[1]), 0.0)
     plain_commands, shifted_commands = (
         repeats.commands_for_speeds(path, *signals) for signals in ((turning, speed), (shifted, faster))
     )
@@ -168,7 +171,9 @@ def motion_and_distance(path: BrakingPath, times: np.ndarray) -> Channels:
     return motion_channels(path, times) | ({STOPPING_DISTANCE: Stop(path).way[-1:]} if path.ended_at_rest else {})
 
 
-def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
+def _runs_in_other_steps(
+    path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]
+) -> list[BrakingPath]:
     """Repeat a stop with half as many steps per sample and, over its first part and if commands stay alike, with a
     quarter. A stop with a single step per sample is repeated with two over its first part.
     """
@@ -182,7 +187,7 @@ def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], Bra
 
 
 def _errors_by_longer_steps(
-    path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float
+    path: BrakingPath, steps: int, other_runs: list[BrakingPath], step: float
 ) -> dict[str, Estimate]:
     """Estimate errors by runs with half and a quarter of the steps per sample. The error of the stopping distance is at
     least the error of x.
@@ -191,15 +196,15 @@ def _errors_by_longer_steps(
     """
     fine, coarse, counts = (
         motion_and_distance(path, path.times),
-        motion_and_distance(finer_runs[0], path.times),
+        motion_and_distance(other_runs[0], path.times),
         [steps, steps // 2, steps // 4],
     )
-    compared_times = path.times[path.times <= finer_runs[-1].times[-1]]
-    channels_of_runs = [motion_channels(run, compared_times) for run in (path, *finer_runs)]
+    compared_times = path.times[path.times <= other_runs[-1].times[-1]]
+    channels_of_runs = [motion_channels(run, compared_times) for run in (path, *other_runs)]
     estimates = dict[str, Estimate]()
     for name in [name for name in fine if name in coarse]:
         order = CAREFUL_ORDER
-        if len(finer_runs) > 1 and name != STOPPING_DISTANCE:
+        if len(other_runs) > 1 and name != STOPPING_DISTANCE:
             gaps = [_rms(first[name] - finer[name]) for first, finer in itertools.pairwise(channels_of_runs)]
             order = observed_order_of_stop(gaps[0], gaps[1], counts)
         least_error = 0.0

@@ -37,7 +37,7 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     for name, scale in scene.tyres.scale.items():
         if name not in known:
             raise InputError(scene.file, f"tyres.scale.{name}", scale, "no such surface", known)
-    names, kinds, lags = surfaces_of(scene, procedure), kinds_of(scene), scene.relaxation
+    names, kinds, lags = surfaces_of(scene, procedure), tyre_kinds_of(scene), scene.relaxation
     front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
     sprung = None if scene.vehicle.file is None else sprung_of(scene)
     engine = None if sprung is None else suspended_in_engine(SPRUNG_ENGINE, sprung)
@@ -46,7 +46,7 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     on_front_unit = np.arange(plane.wheels) < 2
     vehicle = on_tyres(
         plane,
-        [table_of(scene, name, kind) for name in names for kind in kinds],
+        [tyre_table_of(scene, name, kind) for name in names for kind in kinds],
         of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
         chambers_of(scene, plane.wheels),
         road_of(scene, procedure, names),
@@ -187,19 +187,19 @@ def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road
         for s in scene.road.stretches
     ]
     try:
-        return road(stretches, scene.road.line, len(kinds_of(scene)))
+        return road(stretches, scene.road.line, len(tyre_kinds_of(scene)))
     except InputError as error:
         raise InputError(scene.file, "road.stretches", error.value, error.allowed) from None
 
 
-def kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
+def tyre_kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
     """Kinds of tyres in use: False for the front tyre and, if the rear wheels have another tyre, True for the rear
     tyre.
     """
     return (False, True) if scene.tyres.own_rear else (False,)
 
 
-def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
+def tyre_table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
     """Returns the tyre table (friction over slip) of a surface, from a file of the scene if it names one, scaled as in
     [tyres].
     """
@@ -215,12 +215,16 @@ def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
     return table if scale == 1.0 else table.scaled(scale)
 
 
-def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
+def tyre_tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
     """Returns the tyre tables of all surfaces under all procedures, by name; a different rear tyre has the name
     SURFACE/rear.
     """
     names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
-    return {f"{name}/rear" if rear else name: table_of(scene, name, rear) for name in names for rear in kinds_of(scene)}
+    return {
+        f"{name}/rear" if rear else name: tyre_table_of(scene, name, rear)
+        for name in names
+        for rear in tyre_kinds_of(scene)
+    }
 
 
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
@@ -253,7 +257,7 @@ def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     )
 
 
-def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
+def measured_pressures_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
     """Reads the measured pressures of a procedure; None if the scene has no [measured]."""
     if scene.measured is None:
         return None
@@ -268,7 +272,7 @@ def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPre
 
 def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
     """Returns the controller of a procedure's run: measured pressures, or a new controller of the scene."""
-    measured = measured_of(scene, procedure, wheels)
+    measured = measured_pressures_of(scene, procedure, wheels)
     if measured is not None:
         return measured
     kind = scene.controller.kind

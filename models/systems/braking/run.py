@@ -31,7 +31,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
     vehicle, start = vehicle_and_start(scene, name)
-    vehicle = marched_by(vehicle, engine)
+    vehicle = vehicle_in_engine(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
         path = controlled_run(scene, name, vehicle, start, engine)
@@ -45,7 +45,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     return with_error(stop, scene, _repeated_runs(scene, name, vehicle, start, engine)) if error else stop
 
 
-def marched_by(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
+def vehicle_in_engine(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
     """Returns the vehicle with the engine that integrates its motion. For a plane vehicle "reference" means its own
     equations.
     """
@@ -69,12 +69,12 @@ def _repeated_runs(
         shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": end_time})})
         return controlled_run(shorter, name, replace(vehicle, substeps=steps), start, engine)
 
-    def answered(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    def commands_for_speeds(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
         return controller_commands(
             scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds
         )
 
-    return RepeatedRuns(rerun, answered)
+    return RepeatedRuns(rerun, commands_for_speeds)
 
 
 def _labelled_result(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:

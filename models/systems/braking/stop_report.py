@@ -35,8 +35,8 @@ def wheel_names(wheel_count: int) -> tuple[str, ...]:
 class Stop:
     """Time histories of a braking run for the centre of mass of the towing vehicle, along and across its path.
 
-    times, speed, way, side_slip (n,): s, m/s, m, rad; across (n - 1,): m/s^2 to the left; lengths (n - 1,): of the
-    samples (s).
+    times, speed, way, side_slip (n,): s, m/s, m, rad; lateral_acceleration (n - 1,): m/s^2 to the left; lengths (n -
+    1,): of the samples (s).
     """
 
     path: BrakingPath
@@ -72,17 +72,17 @@ class Stop:
         return np.where(self.speed > SLOWEST_SLIP_SPEED, angle, 0.0)
 
     @property
-    def across(self) -> np.ndarray:
+    def lateral_acceleration(self) -> np.ndarray:
         """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, positive to the left."""
         rates_before, rates_after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
         size = np.maximum(self.speed[:-1], 1e-9)
         change = (rates_after - rates_before) / np.maximum(self.lengths, 1e-12)[:, None]
         return (rates_before[:, 0] * change[:, 1] - rates_before[:, 1] * change[:, 0]) / size
 
-    def of_vehicle(self) -> dict[str, float]:
+    def vehicle_results(self) -> dict[str, float]:
         """Results of the vehicle over a stop, by name and unit: distance, time, decelerations, yaw, side slip."""
         path, speed, distances = self.path, self.speed, self.way
-        slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.across)
+        slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.lateral_acceleration)
         time, distance = float(path.times[-1]), float(distances[-1])
         return {
             "initial speed [m/s]": float(speed[0]),
@@ -98,9 +98,9 @@ class Stop:
             "MFDD [m/s^2]": mean_fully_developed(path.times, distances, speed),
             "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
             "largest side slip at [s]": float(path.times[slip]),
-            "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
+            "largest lateral acceleration [m/s^2]": float(self.lateral_acceleration[lateral]),
             "largest lateral acceleration at [s]": float(path.times[lateral]),
-        } | self.of_body()
+        } | self.body_results()
 
     @property
     def lean(self) -> np.ndarray | None:
@@ -110,7 +110,7 @@ class Stop:
         columns = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
         return self.path.states[:, 0, columns] if columns else None
 
-    def of_body(self) -> dict[str, float]:
+    def body_results(self) -> dict[str, float]:
         """Largest roll, largest pitch and least wheel load over a stop, by name and unit; empty for a plane vehicle."""
         if self.lean is None:
             return {}
@@ -140,7 +140,7 @@ class Stop:
         units = self.units
         return units[:, 3] - units[:, 2] if units.shape[1] > 3 else None
 
-    def of_hitch(self) -> dict[str, float]:
+    def hitch_results(self) -> dict[str, float]:
         """Largest and final hitch angle over a stop, by name and unit; empty for a vehicle that tows nothing."""
         hitch = self.hitch
         if hitch is None:
@@ -152,7 +152,7 @@ class Stop:
             "final hitch angle [deg]": float(np.degrees(hitch[-1])),
         }
 
-    def of_wheels(self) -> dict[str, np.ndarray]:
+    def wheel_results(self) -> dict[str, np.ndarray]:
         """Slips, locks and pressures of each wheel (W,) over a stop, by name and unit. Slips count at speeds above
         SLOWEST_SLIP_SPEED, or above half of a lower initial speed."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST_SLIP_SPEED, 0.5 * self.speed[0])
@@ -171,7 +171,7 @@ class Stop:
             "final pressure [bar]": path.pressures[-1],
         }
 
-    def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
+    def results_in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
         """Results at ``time`` (s) after the brake is applied on a circle (radius in m, positive to the left), by name
         and unit.
 

@@ -25,7 +25,7 @@ KEPT_QUANTITIES = {
     "aside": "y [m]",
     "yaw": "final yaw [deg]",
 }
-"""Quantities of every stop that an ensemble stores: array name -> name in ``Stop.of_vehicle``."""
+"""Quantities of every stop that an ensemble stores: array name -> name in ``Stop.vehicle_results``."""
 COURSE_SIZES = {"aside": 1.0, "yaw": 5.0}
 """Least size (m, deg) by which the standard error of a mean deviation from the course is divided."""
 
@@ -72,7 +72,7 @@ class Stops:
             raise PathFailed(path_number, str(error)) from None
         if not path.ended_at_rest:
             raise PathFailed(path_number, f"does not stand after {scene.run.duration:g} s")
-        return Stop(path).of_vehicle()
+        return Stop(path).vehicle_results()
 
 
 @dataclass(frozen=True)

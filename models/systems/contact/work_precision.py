@@ -212,7 +212,7 @@ class TheoryPoint:
         return float(np.quantile(self.errors, 0.95))
 
 
-def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
+def measure_theory(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
     """Measure force errors and evaluation time of a theory over all cases. The time is the median of ``repeats`` in
     each case, then the median over the cases.
     """
@@ -292,7 +292,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], pro
         known.append(with_exact_forces(case))
     for i, theory in enumerate(THEORIES_COMPARED):
         progress(theory.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
-        points += [measure(theory, cells, known) for cells in theory.cells]
+        points += [measure_theory(theory, cells, known) for cells in theory.cells]
     channels = {
         "theory": Channel("point", [point.name for point in points], "", "theory, with its choices"),
         "cells": Channel("point", [point.cells for point in points], "", "cells along each axis"),

@@ -17,7 +17,7 @@ def drive_energy(drive: Drive) -> np.ndarray:
     return motion + drive.ledger[:, at.POTENTIAL]
 
 
-def unaccounted(drive: Drive) -> np.ndarray:
+def unaccounted_energy(drive: Drive) -> np.ndarray:
     """Energy of a drive in J that its work does not explain: energy less its initial value, less the work done since by
     Simpson's rule.
 

@@ -193,7 +193,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
     values outside their ranges.
     """
     scene = checked(HandlingScene, table, file, folder)
-    scene = _with_measured(scene)
+    scene = _with_measured_drives(scene)
     for name, manoeuvre in scene.manoeuvres.items():
         key_path = f"manoeuvres.{name}"
         _check_times(scene, key_path, manoeuvre)
@@ -203,7 +203,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
     return with_own(scene)
 
 
-def _with_measured(scene: HandlingScene) -> HandlingScene:
+def _with_measured_drives(scene: HandlingScene) -> HandlingScene:
     """Returns the scene with speed and duration of each measured drive filled in. Raises InputError for a manoeuvre
     without a speed.
     """

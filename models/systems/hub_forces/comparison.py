@@ -69,7 +69,7 @@ class Comparison:
         has_drifted = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
         return float(run.times[np.argmax(has_drifted)]) if has_drifted.any() else float("inf")
 
-    def answer(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Any]:
         """Numbers of each run for a JSON file: largest errors, rms of the stabiliser's moments (N m), relative damage
         of every element.
         """

@@ -31,7 +31,7 @@ class HubForces:
         signal = signal_from_samples(self.samples, self.period, interpolation)
         return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
 
-    def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
+    def with_noise(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """Returns the hub forces with white noise on every sample, of standard deviations (6 h,) in N and N m."""
         noise = normal_samples(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
         return replace(self, samples=self.samples + noise * deviation)
@@ -46,7 +46,7 @@ class Angles:
     samples: np.ndarray
     period: float
 
-    def noisy(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
+    def with_noise(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
         """Returns the angles with white noise on every sample; deviations : of angles (rad) and of rates (rad/s)."""
         noise = normal_samples(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))

@@ -130,9 +130,9 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
     true, errors = on_road(vehicle, road, scene.forces.frame, march, error and engine not in scene.engines)
     forces, angles = recorded_measurement(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
-        forces = forces.noisy(scene.deviations(vehicle), scene.seed)
+        forces = forces.with_noise(scene.deviations(vehicle), scene.seed)
     if scene.angles.noise == "white":
-        angles = angles.noisy(scene.angles.deviations, scene.seed)
+        angles = angles.with_noise(scene.angles.deviations, scene.seed)
     return Measurement(scene, vehicle, true, forces, angles, errors)
 
 

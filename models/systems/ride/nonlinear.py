@@ -33,7 +33,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import MotionInRun, Spectral, few_speeds, watched_vehicle
+from models.systems.ride.watched import MotionInRun, Spectral, checked_speeds, watched_vehicle
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
@@ -175,11 +175,11 @@ class CopiesBySpeed:
 def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
     """Compute Monte Carlo copies by the scene's worker processes; returns them by speed (m/s)."""
 
-    def tell(state: Done) -> None:
+    def report_progress(state: Done) -> None:
         progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
 
     with Crew.of(scene, default_workers=1).at_work(len(job.speeds)) as pool:
-        arrays = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
+        arrays = run_paths(job, len(job.speeds), None, pool, Blocks(1), report_progress)
     return {
         speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
         for speed, names, moments, step, duration, settling in zip(
@@ -205,7 +205,7 @@ def _motion_of_equivalents(
     travels.
     """
     known = dict(zip(speeds.tolist(), equivalents, strict=True))
-    chosen = few_speeds(speeds)
+    chosen = checked_speeds(speeds)
     means = {
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
         for name in equivalents[0].springs
@@ -290,7 +290,7 @@ def _with_error_of_steps(
         ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, stride=stride)
         return series(ride, begin)
 
-    outputs = read_outputs(
+    outputs = outputs_at_other_steps(
         engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, STEPS_BETWEEN_ROWS)
     )
     fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
@@ -377,7 +377,7 @@ def _engine_model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: n
     return build(engine, vehicle, settings, road.speed, table)
 
 
-def read_outputs(
+def outputs_at_other_steps(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, step_numbers: np.ndarray
 ) -> Ride:
     """Computes the outputs of an engine's run at other steps, ``step_numbers`` (m,)."""
@@ -400,14 +400,14 @@ def _outputs_at_steps(
     rows = np.column_stack(
         [accelerations, run.rates[step_numbers], run.positions[step_numbers], table[2 * step_numbers]]
     )
-    outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
+    outputs = rows @ np.array([factors_of_output(output) for output in linear.outputs]).T
     bent = {spring.name for spring in vehicle.springs if spring.bent}
     pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
     for spec, output, values in zip(vehicle.outputs, linear.outputs, outputs.T, strict=True):
         if spec.kind == "force" and spec.part in bent:
             values[:] = np.nan
         elif spec.kind == "tyre force" and spec.tyre in pushing:
-            elastic = rows @ row_of(
+            elastic = rows @ factors_of_output(
                 replace(
                     output, rate_factors=0.0 * output.rate_factors, road_rate_factors=0.0 * output.road_rate_factors
                 )
@@ -417,7 +417,7 @@ def _outputs_at_steps(
     return Ride(linear.names, run, step_numbers * road.step - step_numbers[0] * road.step, outputs, step_numbers)
 
 
-def row_of(output: Output) -> np.ndarray:
+def factors_of_output(output: Output) -> np.ndarray:
     """Returns the factors (3 n + 2 w,) of an output: of accelerations, rates, positions, road heights and their rates,
     in this order.
     """

@@ -196,10 +196,10 @@ def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[
         return wheels
     if half_track(wheels) == 0.0:
         raise InputError(scene.file, "road.wheels", "tracks", "the first axle has no two tracks in which to run")
-    return in_tracks(wheels)
+    return wheels_in_tracks(wheels)
 
 
-def in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
+def wheels_in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
     """Returns the wheels moved laterally into the track of the first axle's outermost wheel on the same side."""
     first = [wheel.y for wheel in wheels if wheel.axle == 0]
     tracks = {1.0: max(first), -1.0: min(first)}

@@ -151,7 +151,7 @@ def linear_law_effects(scene: ReducedScene) -> list[Effect]:
     return [
         Effect(
             name,
-            partial(reduced_further, straight=[law]),
+            partial(reduced_further, linearised_laws=[law]),
             f"{name}: the gains of statistical linearisation",
             is_singular=True,
         )

@@ -14,7 +14,7 @@ from models.vehicles.spatial_linear import wheels
 @dataclass(frozen=True)
 class ReducedScene:
     """A ride scene and its vehicle with some effects left out: ``massless`` bodies, ``rigid`` springs, ``locked``
-    degrees of freedom, and nonlinear spring laws that are replaced by gains (``straight``).
+    degrees of freedom, and nonlinear spring laws that are replaced by gains (``linearised_laws``).
     """
 
     ride: RideScene
@@ -22,7 +22,7 @@ class ReducedScene:
     massless: frozenset[str] = frozenset()
     rigid: frozenset[str] = frozenset()
     locked: frozenset[tuple[str, Freedom]] = frozenset()
-    straight: frozenset[str] = frozenset()
+    linearised_laws: frozenset[str] = frozenset()
 
     @classmethod
     def complete(cls, ride: RideScene) -> "ReducedScene":

@@ -17,7 +17,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED_LAW_ACCURACY, MATRIX_ACCURACY, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, needs_run_in_time, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, few_speeds, watched_deviations
+from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, checked_speeds, watched_deviations
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -108,7 +108,7 @@ def _deviations_by_speed(
     )
     road = roads.get(AS_WRITTEN, [*roads.values()][-1])
     with_assumptions(
-        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, few_speeds(swept.speeds), {}))
+        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, checked_speeds(swept.speeds), {}))
     )
     if not error:
         return labelled
@@ -162,7 +162,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
         detail=drive,
     )
     spectral = Spectral(
-        vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
+        vehicle, lambda _: linear, road, checked_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
     )
     with_assumptions(
         labelled, assumptions(scene, vehicle, MotionAlongDrive(watched_deviations(vehicle, drive.deviation), spectral))

@@ -78,7 +78,7 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     return {}
 
 
-def few_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
+def checked_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
     """Returns at most JUDGED_SPEEDS of the speeds (m/s), evenly chosen, with the slowest and the fastest."""
     rising = np.unique(np.asarray(speeds, float))
     return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, JUDGED_SPEEDS).round().astype(int))]

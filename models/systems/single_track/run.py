@@ -52,7 +52,7 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
     drive = read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch))
     start_time = time.process_time()
     inputs_of_samples = equation_inputs(drive, scene)
-    motion, table = motion_of(scene, inputs_of_samples, float(drive.times[1] - drive.times[0]))
+    motion, table = simulated_motion(scene, inputs_of_samples, float(drive.times[1] - drive.times[0]))
     channels = sensor_channels(scene.sensors, inputs_of_samples, motion, table[:, 0])
     channels |= {
         name: Channel("time", table[:, column], unit)
@@ -84,7 +84,7 @@ def _with_step_error(
     slow drive.
     """
     period = float(drive.times[1] - drive.times[0])
-    half, quarter = (_sensed_in_parts(scene, inputs_of_samples, period, parts) for parts in (2, 4))
+    half, quarter = (_sensed_in_finer_steps(scene, inputs_of_samples, period, parts) for parts in (2, 4))
     estimates = {}
     for name, finer in quarter.items():
         fine, values = half[name], np.asarray(run[name])
@@ -98,7 +98,7 @@ def _with_step_error(
     )
 
 
-def _sensed_in_parts(
+def _sensed_in_finer_steps(
     scene: SingleTrackScene, inputs_of_samples: np.ndarray, sample_period: float, parts_per_sample: int
 ) -> dict[str, np.ndarray]:
     """ESTIMATED_CHANNELS at the samples (n,), computed with ``parts_per_sample`` time steps between two samples."""
@@ -106,7 +106,7 @@ def _sensed_in_parts(
     between = np.column_stack(
         [np.interp(row_positions, np.arange(len(inputs_of_samples)), column) for column in inputs_of_samples.T]
     )
-    motion, table = motion_of(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
+    motion, table = simulated_motion(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
     sensed = sensor_channels(scene.sensors, inputs_of_samples, motion[::parts_per_sample], table[::parts_per_sample, 0])
     return {name: np.asarray(sensed[name].values) for name in ESTIMATED_CHANNELS}
 
@@ -128,7 +128,9 @@ def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray
     return np.ascontiguousarray(np.column_stack([steer, speed, np.gradient(speed, period)]))
 
 
-def motion_of(scene: SingleTrackScene, inputs: np.ndarray, sample_period: float) -> tuple[np.ndarray, np.ndarray]:
+def simulated_motion(
+    scene: SingleTrackScene, inputs: np.ndarray, sample_period: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Lateral velocity (m/s) and yaw rate (rad/s), shape (n, 2), and ``motion_reports`` (n, 7), for inputs
     ``sample_period`` (s) apart. The motion begins in the steady turn of the first sample.
     """

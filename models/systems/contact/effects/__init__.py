@@ -13,15 +13,15 @@ from models.core.scene_effects import Entry, Table
 
 
 def _theory_effect(
-    description: str, theory: str, cost: str, count_name: str, instead: Callable[[Any], dict[str, str]]
+    description: str, theory: str, cost: str, count_name: str, method_without: Callable[[Any], dict[str, str]]
 ) -> Entry:
-    """Returns the effect of a theory beyond FASTSIM. ``instead`` returns the scene's [method] without this theory,
-    except the key cells.
+    """Returns the effect of a theory beyond FASTSIM. ``method_without`` returns the scene's [method] without this
+    theory, except the key cells.
     """
 
     def leave_out(table: Table, scene: Any) -> None:
         cells = {key: value for key, value in table["method"].items() if key == "cells"}
-        table["method"] = cells | instead(scene)
+        table["method"] = cells | method_without(scene)
 
     return Entry(
         description,

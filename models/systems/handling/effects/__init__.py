@@ -66,7 +66,7 @@ def _is_measured_drive(scene: Any) -> bool:
     return any(manoeuvre.measured for manoeuvre in scene.manoeuvres.values())
 
 
-def _without_measured(table: dict[str, Any], scene: Any) -> None:
+def _without_measured_drive(table: dict[str, Any], scene: Any) -> None:
     """Replace measured drives by rolling straight ahead from the same speed for the same time."""
     for manoeuvre in table["manoeuvres"].values():
         manoeuvre.pop("measured", None)
@@ -92,7 +92,7 @@ TABLE = {
         "manoeuvres.NAME.measured",
         "about four marches of the manoeuvre in MuJoCo, once, that seek the torques",
         there=_is_measured_drive,
-        leave_out=_without_measured,
+        leave_out=_without_measured_drive,
         modules=("models.measured.drive", "models.systems.handling.following"),
     ),
     "inclined_wheels": Entry(
