@@ -157,7 +157,7 @@ def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():
-    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).of_wheels()
+    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).wheel_results()
     assert 0.0 < slips["mean slip"].min() <= slips["largest slip"].max() <= 1.0
 
 

@@ -19,24 +19,26 @@ DISSIMILARITY_COST = 0.02
 """Largest error of a force, divided by mu N, that comes from treating different materials as alike."""
 
 
-def assumptions(scene: ContactScene, body: RollingContact) -> list[Assumption]:
+def assumptions(scene: ContactScene, contact: RollingContact) -> list[Assumption]:
     """Assumptions of the scene's theory about its contact: half-space, elasticity, small creepages, shape, friction."""
-    listed = [*pressing_assumptions(scene, body), *_creepage_assumptions(body)]
-    if isinstance(body, LinearTheory):
-        listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, body)}))
-    if isinstance(body, LinearTheory | Fastsim):
-        listed.append(_slender_assumption(lambda run: {"contact": np.array([body.a / body.b])}))
-    if body.pair.mismatch != 0.0 and body.friction > 0.0:
-        listed.append(_like_bodies_assumption(body))
+    listed = [*pressing_assumptions(scene, contact), *_creepage_assumptions(contact)]
+    if isinstance(contact, LinearTheory):
+        listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, contact)}))
+    if isinstance(contact, LinearTheory | Fastsim):
+        listed.append(_slender_assumption(lambda run: {"contact": np.array([contact.a / contact.b])}))
+    if contact.pair.mismatch != 0.0 and contact.friction > 0.0:
+        listed.append(_like_bodies_assumption(contact))
     return listed
 
 
-def pressing_assumptions(scene: ContactScene, body: RollingContact) -> list[Assumption]:
+def pressing_assumptions(scene: ContactScene, contact: RollingContact) -> list[Assumption]:
     """Assumptions of the normal problem: half-spaces, elastic bodies, and patches within the profiles."""
-    listed = [_half_space_assumption(_axes_divided_by_radii(scene, body))]
+    listed = [_half_space_assumption(_axes_divided_by_radii(scene, contact))]
     if yields(scene.bodies.wheel, scene.bodies.rail):
-        listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
-    return listed + (_profile_assumptions(body) if scene.profiles is not None and isinstance(body, OnPatches) else [])
+        listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * contact.pressing.peak])}))
+    return listed + (
+        _profile_assumptions(contact) if scene.profiles is not None and isinstance(contact, OnPatches) else []
+    )
 
 
 def table_assumptions(file: Path) -> list[Assumption]:
@@ -67,20 +69,20 @@ def _half_space_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _axes_divided_by_radii(scene: ContactScene, body: RollingContact) -> Callable[[Result], Watched]:
+def _axes_divided_by_radii(scene: ContactScene, contact: RollingContact) -> Callable[[Result], Watched]:
     """Returns a function of a result that gives the contact's semi-axes divided by the radii of curvature.
 
     The radii are those of both bodies, or else of the distance between the undeformed surfaces.
     """
     shares: dict[str, np.ndarray] = {}
-    if isinstance(body, OnEllipse):
-        axes = {"x": body.a, "y": body.b}
+    if isinstance(contact, OnEllipse):
+        axes = {"x": contact.a, "y": contact.b}
         if scene.radii is not None:
             shares = {f"radii.{name}": np.array([axes[name[-1]] / abs(r)]) for name, r in scene.radii if r is not None}
         else:
-            shares = {"along": 2.0 * body.a * body.hertz.A, "across": 2.0 * body.b * body.hertz.B}
-    elif isinstance(body, OnPatches):
-        for k, patch_pressure in enumerate(body.pressed.patches, 1):
+            shares = {"along": 2.0 * contact.a * contact.hertz.A, "across": 2.0 * contact.b * contact.hertz.B}
+    elif isinstance(contact, OnPatches):
+        for k, patch_pressure in enumerate(contact.pressed.patches, 1):
             curvature_along, across = patch_pressure.patch.distance.curvatures
             x0, x1, y0, y1 = patch_pressure.box
             shares[f"patch {k} along"] = np.array([0.5 * (x1 - x0) * curvature_along])
@@ -100,14 +102,14 @@ def _elastic_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _creepage_assumptions(body: RollingContact) -> list[Assumption]:
+def _creepage_assumptions(contact: RollingContact) -> list[Assumption]:
     """Assumptions that creepages are small and, where friction is constant, that slip is slow."""
-    longer = body.lever
+    longer = contact.lever
 
     def creepages(run: Result) -> Mapping[str, np.ndarray]:
         return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
 
-    if isinstance(body, LinearTheory) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
+    if isinstance(contact, LinearTheory) or (isinstance(contact, Fastsim) and contact.choices["falling"] is not None):
         return [_small_creepage_assumption(creepages)]
     return [
         _small_creepage_assumption(creepages),
@@ -148,9 +150,9 @@ def _no_slip_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _utilised_friction(run: Result, body: RollingContact) -> np.ndarray:
+def _utilised_friction(run: Result, contact: RollingContact) -> np.ndarray:
     """Tangential force divided by mu N at every creepage; infinite for any force without friction."""
-    force, limit = np.hypot(run["fx"], run["fy"]), body.friction * body.pressing.load
+    force, limit = np.hypot(run["fx"], run["fy"]), contact.friction * contact.pressing.load
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
 
 
@@ -165,8 +167,8 @@ def _slender_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _like_bodies_assumption(body: RollingContact) -> Assumption:
-    cost = np.array([body.pair.quasi_identity_error(body.friction)])
+def _like_bodies_assumption(contact: RollingContact) -> Assumption:
+    cost = np.array([contact.pair.quasi_identity_error(contact.friction)])
     return Assumption(
         "bodies alike",
         "both bodies stretch alike under the pressure",
@@ -177,9 +179,9 @@ def _like_bodies_assumption(body: RollingContact) -> Assumption:
     )
 
 
-def _profile_assumptions(body: OnPatches) -> list[Assumption]:
+def _profile_assumptions(contact: OnPatches) -> list[Assumption]:
     """Assumptions that contact patches lie within the profiles, and do not overlap."""
-    parts = sorted(body.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
+    parts = sorted(contact.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
     free_distances = {}
     for k, patch_pressure in enumerate(parts, 1):
         known, (_, _, low, high) = patch_pressure.patch.distance, patch_pressure.box

@@ -15,20 +15,20 @@ HALVED_CELLS = "half the cells along each axis"
 BAND_TEXT = "which 95 % of such contacts keep to"
 
 
-def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: Sequence[Error]) -> Result:
+def with_error(run: Result, scene: ContactScene, contact: RollingContact, errors: Sequence[Error]) -> Result:
     """Returns the result with the stated errors of force and moment, each as the root mean square over all creepages.
 
     Relative errors of the force refer to its root mean square. Those of the moment, which may vanish, refer to that
     force times the contact's lever. Raises RunFailed where the cells are too few.
     """
     force = finite_rms(np.hypot(run["fx"], run["fy"]))
-    sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
+    sizes = {"force": (force, "N"), "mz": (force * contact.lever, "N m")}
     likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
-    cells, order = scene.method.cells, min(body.order, 1.5)
+    cells, order = scene.method.cells, min(contact.order, 1.5)
     estimates = {
         name: by_cells(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
     }
-    if isinstance(body, LinearTheory):
+    if isinstance(contact, LinearTheory):
         not_estimated(run, "the linear theory has no cells")
     else:
         with_stated_errors(run, estimates, HALVED_CELLS)

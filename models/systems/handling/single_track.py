@@ -36,39 +36,39 @@ class SteadyTurn:
 
 def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
     """Solve the steady turn of the linear single-track model at a speed (m/s), with the static wheel loads."""
-    free = handling.vehicle
-    mass = sum(body.mass for body in free.bodies)
-    centre = sum(body.mass * body.position[0] for body in free.bodies) / mass
-    size = 2 + len(free.towed)
+    vehicle = handling.vehicle
+    mass = sum(body.mass for body in vehicle.bodies)
+    centre = sum(body.mass * body.position[0] for body in vehicle.bodies) / mass
+    size = 2 + len(vehicle.towed)
     matrix, steered = np.zeros((size, size)), np.zeros(size)
-    for body in free.bodies:
-        by_force, _ = _force_balances(free, body.name, body.position[0], centre)
+    for body in vehicle.bodies:
+        by_force, _ = _force_balances(vehicle, body.name, body.position[0], centre)
         matrix[:, 1] -= body.mass * speed * by_force
-    for i, tyre in enumerate(free.tyres):
+    for i, tyre in enumerate(vehicle.tyres):
         n = handling.tyre_numbers(i)
         a = np.sqrt(n[RADIUS] * n[STATIC] / n[VERTICAL])
         c = 8.0 / 3.0 * a**2 * n[HALF_WIDTH] * n[BRISTLES]
         trail, turning = 3.0 * np.pi / 32.0 * a, n[HALF_WIDTH] ** 2 / 5.0
-        heading = [-float(name == free.towed_under(tyre.body)) for name in free.towed]
+        heading = [-float(name == vehicle.towed_under(tyre.body)) for name in vehicle.towed]
         slip = np.array([1.0 / speed, (tyre.point[0] - centre) / speed, *heading])
         turn = np.eye(size)[1] / speed
-        by_force, by_moment = _force_balances(free, tyre.body, tyre.point[0], centre)
+        by_force, by_moment = _force_balances(vehicle, tyre.body, tyre.point[0], centre)
         matrix += c * np.outer(by_moment, trail * slip - turning * turn) - c * np.outer(by_force, slip + trail * turn)
         steered += n[STEERED] * c * (trail * by_moment - by_force)
     side, yaw, *headings = np.linalg.solve(matrix, steered).tolist()
-    coordinates = [tyre.point[0] for tyre in free.tyres if free.towed_under(tyre.body) is None]
+    coordinates = [tyre.point[0] for tyre in vehicle.tyres if vehicle.towed_under(tyre.body) is None]
     wheelbase = max(coordinates) - min(coordinates)
     return SteadyTurn(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
 
 
-def _force_balances(free: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
+def _force_balances(vehicle: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients with which a side force on a body at x (m), and a moment about the vertical, enter the equilibrium
     equations; two arrays (2 + towed,).
 
     The equations are those of side forces, of moments about the centre of mass at ``centre`` (m), and of moments about
     the hitch of each towed body.
     """
-    chain = free.chain(body)
-    behind = np.array([float(name in chain) for name in free.towed])
-    hitches = np.array([free.body(hitch_of(name)).position[0] for name in free.towed])
+    chain = vehicle.chain(body)
+    behind = np.array([float(name in chain) for name in vehicle.towed])
+    hitches = np.array([vehicle.body(hitch_of(name)).position[0] for name in vehicle.towed])
     return np.array([1.0, x - centre, *(behind * (x - hitches))]), np.array([0.0, 1.0, *behind])

@@ -100,11 +100,11 @@ def record_on_clock(
     progress("reading times", 0.0)
     placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
     groups = [each for source, shift, drift in placing for each in _mapped_groups(source, signals, shift, drift)]
-    leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
-    if not leading:
+    wheel_force_groups = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
+    if not wheel_force_groups:
         needed = "no channel is mapped to a hub: wheel forces are what drives the vehicle"
         raise InputError(scene.file, "files", None, needed)
-    grid = _clock_grid(scene, leading)
+    grid = _clock_grid(scene, wheel_force_groups)
     noticed += [finding for group in groups for finding in (*_group_findings(group), *_check_cover(scene, group, grid))]
     columns = _recording_columns(folder, scene, signals, sources, grid)
     if columns.done < grid.count:
@@ -207,11 +207,11 @@ def _group_findings(group: ClockGroup) -> Iterator[Finding]:
     yield Finding("times", weight, label, text, clock.period, "s", (group.signals[0].name,))
 
 
-def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
+def _clock_grid(scene: MeasuredScene, wheel_force_groups: list[ClockGroup]) -> ClockGrid:
     """Returns the sample times of the recording. Raises InputError where the wheel forces do not overlap in time, or do
     not allow the settings of [clock].
     """
-    settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
+    settings, file, timings = scene.clock, scene.file, [group.timing for group in wheel_force_groups]
     fastest = min(timings, key=lambda timing: timing.period)
     period = 1.0 / settings.rate if settings.rate else fastest.period
     if period < fastest.period * (1 - EQUAL_RATES):
@@ -219,7 +219,9 @@ def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
         raise InputError(file, "clock.rate", settings.rate, slower)
     first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
     if first >= last:
-        spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
+        spans = "; ".join(
+            f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in wheel_force_groups
+        )
         raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
     times = fastest.times
     start = float(

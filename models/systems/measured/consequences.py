@@ -155,11 +155,11 @@ def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -
 
 
 def _consequence_of_most_changed_force(
-    finding: Finding, recorded: SectionOutcome, right: SectionOutcome, answers: Sequence[SectionChannel]
+    finding: Finding, recorded: SectionOutcome, corrected: SectionOutcome, answers: Sequence[SectionChannel]
 ) -> Consequence:
     """Returns the consequence of a finding for the section force that changes most, without negligibly small forces."""
-    first = min(round(SETTLING_DURATION / right.period), right.done // 4)
-    pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
+    first = min(round(SETTLING_DURATION / corrected.period), corrected.done // 4)
+    pairs = {a: (recorded.samples(a)[first:], corrected.samples(a)[first:]) for a in answers}
     size = {a: root_mean_square(measured - measured.mean()) for a, (_, measured) in pairs.items()}
     most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
     every = [

@@ -63,7 +63,7 @@ class PitchStep:
         per_step, ends = n * self._rows[2], 0 if signal.held else 1
         self._inputs = signal.sample(0.0, self.period / per_step, self.count * per_step + ends)
         falling = np.ones(per_step) if signal.held else np.linspace(1.0, 0.0, per_step + 1)
-        self._hats = np.column_stack([falling, 1.0 - falling])
+        self._sample_weights = np.column_stack([falling, 1.0 - falling])
         self._p = assembly.parameters.array()
         self._respond = compiled_filter_step(assembly.mode, assembly.vehicle.geometry)
 
@@ -75,8 +75,10 @@ class PitchStep:
         A held sample acts on the step after it alone; a spline counts as the polyline through its samples.
         """
         first = step_number * self._substeps * self._rows[2]
-        inputs = self._inputs[first : first + len(self._hats)]
-        answer = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
+        inputs = self._inputs[first : first + len(self._sample_weights)]
+        answer = self._respond(
+            x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._sample_weights
+        )
         return answer[:, 0].copy(), answer[:, 1:8], answer[:, 8:10], answer[:, 10:]
 
 
@@ -84,14 +86,14 @@ class PitchStep:
 def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
     """Returns the compiled filter step with its derivatives, for a mode of excitation and a geometry.
 
-    The step maps (x, step, count, inputs, rows, p, hats) to (7, 12): the new x, then derivatives with respect to x (7),
-    the first force sample (2) and the last force sample (2). step to p are those of the reference's march; hats
-    (rows, 2) : weights of the first and the last sample in each row of the inputs.
+    The step maps (x, step, count, inputs, rows, p, sample_weights) to (7, 12): the new x, then derivatives with respect
+    to x (7), the first force sample (2) and the last force sample (2). step to p are those of the reference's march;
+    sample_weights (rows, 2) : weights of the first and the last sample in each row of the inputs.
     """
     # the march goes in as Python: numba cannot cache what encloses compiled code
     march = register_jitable(march_of(drive_mode, geometry).py_func)
 
-    def respond(x, step, step_count, inputs, rows, p, hats):
+    def respond(x, step, step_count, inputs, rows, p, sample_weights):
         states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), p.copy()
         for column in range(12):
             for sign in (1.0, -1.0):
@@ -102,7 +104,7 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
                     y[KEPT_STATES[column - 1]] += nudge
                 elif column > 7:
                     pushed = inputs.copy()
-                    pushed[:, (column - 8) % 2] += nudge * hats[:, (column - 8) // 2]
+                    pushed[:, (column - 8) % 2] += nudge * sample_weights[:, (column - 8) // 2]
                 march(y, step, step_count, pushed, rows, parameters, states)
                 end, share = states[step_count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):

@@ -59,51 +59,51 @@ def _symmetrised(matrix: np.ndarray) -> np.ndarray:
 
 def with_error_of_sweep(
     run: Result,
-    swept: Sweep,
+    sweep: Sweep,
     linear: LinearVehicleAtSpeed,
     roads: Mapping[str, Excitation],
-    filters: Mapping[str, str],
+    weightings: Mapping[str, str],
     matrix_accuracy: float,
 ) -> Result:
     """Returns the result with the rounding errors of its standard deviations, estimated at some speeds on all roads.
 
     matrix_accuracy : relative accuracy of the entries of the vehicle's matrices.
     """
-    checked_speeds = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
+    checked_speeds = np.unique(np.linspace(0, len(sweep.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
     recomputed = np.array(
         [
             [
-                _deviations_of_changed(linear, road, filters, float(swept.speeds[i]), matrix_accuracy)
+                _deviations_of_changed(linear, road, weightings, float(sweep.speeds[i]), matrix_accuracy)
                 for i in checked_speeds
             ]
             for road in roads.values()
         ]
     )
-    deviation = swept.deviation[:, checked_speeds]
+    deviation = sweep.deviation[:, checked_speeds]
     known = np.isfinite(deviation) & np.isfinite(recomputed)
-    sizes, estimates = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
+    sizes, estimates = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(sweep.outputs))], {}
     largest = {
-        unit: max(size for size, unit_of_output in zip(sizes, swept.units, strict=True) if unit_of_output == unit)
-        for unit in swept.units
+        unit: max(size for size, unit_of_output in zip(sizes, sweep.units, strict=True) if unit_of_output == unit)
+        for unit in sweep.units
     }
-    for i, (name, unit, size) in enumerate(zip(swept.outputs, swept.units, sizes, strict=True)):
+    for i, (name, unit, size) in enumerate(zip(sweep.outputs, sweep.units, sizes, strict=True)):
         if size > 0.0:
             is_known = known[..., i]
             changes = recomputed[..., i][is_known] - deviation[..., i][is_known]
             error = max(SAFETY_FACTOR * root_mean_square(changes), MATRIX_ACCURACY / 4.0 * size)
             estimates[name] = Estimate(error, unit, error / max(size, STANDSTILL_SHARE * largest[unit]), 1.0, 0.0)
-    points = f"{len(checked_speeds)} of {len(swept.speeds)} speeds"
+    points = f"{len(checked_speeds)} of {len(sweep.speeds)} speeds"
     return with_stated_errors(run, estimates, f"the Lyapunov equation of nudged matrices at {points}", "")
 
 
 def _deviations_of_changed(
-    linear: LinearVehicleAtSpeed, road: Excitation, filters: Mapping[str, str], speed: float, matrix_accuracy: float
+    linear: LinearVehicleAtSpeed, road: Excitation, weightings: Mapping[str, str], speed: float, matrix_accuracy: float
 ) -> np.ndarray:
     """Standard deviations (outputs,) at a speed (m/s) of the vehicle with changed last digits; NaN where the solution
     fails.
     """
     system = system_with_weightings(
-        vehicle_with_road(with_changed_last_digits(linear(speed), matrix_accuracy), road, speed), filters
+        vehicle_with_road(with_changed_last_digits(linear(speed), matrix_accuracy), road, speed), weightings
     )
     try:
         return stationary_covariance(system).deviation

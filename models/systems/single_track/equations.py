@@ -111,15 +111,17 @@ def motion_rates(
 
 
 @compiled
-def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
+def march(
+    car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, initial_motion: tuple[float, float]
+) -> np.ndarray:
     """Integrate by Heun's method from sample to sample. Returns lateral velocity (m/s) and yaw rate (rad/s) at every
     sample, shape (n, 2).
 
-    inputs (n, 3) : steer angle (rad), speed (m/s) and its rate (m/s^2) at samples ``step`` (s) apart; first : lateral
-    velocity and yaw rate at the first sample.
+    inputs (n, 3) : steer angle (rad), speed (m/s) and its rate (m/s^2) at samples ``step`` (s) apart; initial_motion :
+    lateral velocity and yaw rate at the first sample.
     """
     motion = np.empty((len(inputs), 2))
-    w, r = first
+    w, r = initial_motion
     motion[0] = w, r
     for i in range(len(inputs) - 1):
         inputs_now = inputs[i, 0], inputs[i, 1], inputs[i, 2]
