@@ -13,7 +13,7 @@ from models.core.result import Result
 from models.core.strict import Strict, read
 from models.systems.braking.adhesion import NoAdhesion, figures_of_merit
 from models.systems.braking.measured_pressures import MeasuredPressures, write_pressures
-from models.systems.braking.of_scene import measured_of, plane_of
+from models.systems.braking.of_scene import measured_pressures_of, plane_of
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
@@ -56,7 +56,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         all_stops |= {name if len(engines) == 1 else f"{name}, {engine}": stop for engine, stop in results.items()}
         stop = Stop(next(iter(results.values())).detail)
         radius = plane_of(scene).radius
-        measured, rims = measured_of(scene, name, radius.size), stop.path.turning * radius
+        measured, rims = measured_pressures_of(scene, name, radius.size), stop.path.turning * radius
         write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
         stop_figure(scene, name, results, folder / f"{name}.png", measured)
         figures, remarks = dict[str, float](), list[str]()
@@ -66,11 +66,11 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             remarks = [f"    {error}"]
         except RunFailed as error:
             failed[f"{name}, figures of merit"] = str(error)
-        train = stop.of_hitch()
+        train = stop.hitch_results()
         remarks += [f"    {key:<40}{value:>10.2f}" for key, value in train.items()]
-        wheels = stop.of_wheels() | rim_speed_differences(measured, stop, rims)
+        wheels = stop.wheel_results() | rim_speed_differences(measured, stop, rims)
         answer[name] = {
-            **stop.of_vehicle(),
+            **stop.vehicle_results(),
             **{key: value.tolist() for key, value in wheels.items()},
             **figures,
             **train,
@@ -92,7 +92,7 @@ def rim_speed_differences(
     rim_speeds (n, W) : computed, in m/s, of the W wheels."""
     if measured_pressures is None or measured_pressures.speeds is None:
         return {}
-    return {"rim less measured, rms [m/s]": measured_pressures.rms(stop.times, rim_speeds)}
+    return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, rim_speeds)}
 
 
 def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:
@@ -125,7 +125,7 @@ def figures_lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict
     unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {remaining_text}"
     rows = [f"  {name.replace('_', ' ')}{unfinished}"]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
-    rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
+    rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.vehicle_results().items()]
     rows += [
         f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}" for key, value in figures.items()
     ]

@@ -113,7 +113,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         if not stop.path.ended_at_rest:
             failed[name] = f"not stopped by {stop.times[-1]:g} s"
             continue
-        values, estimated = stop.of_vehicle(), estimated or not single_scene.controller.true_speed
+        values, estimated = stop.vehicle_results(), estimated or not single_scene.controller.true_speed
         shown = {head: values[quantity] for head, quantity in SHOWN_QUANTITIES.items()}
         answer.append(
             dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.locks().time.max())}

@@ -55,7 +55,7 @@ def stop_figure(
     _plot_wheel_curves(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
     if leaves_straight:
         _plot_angles(axes["angles"], stop)
-        axes["across"].plot(stop.times[1:], stop.across, color=DARK, lw=0.8)
+        axes["across"].plot(stop.times[1:], stop.lateral_acceleration, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
     if lean is not None:
         _plot_lean(axes["lean"], stop.times, lean)
@@ -65,7 +65,7 @@ def stop_figure(
     draw_path_from_above(axes["road"], scene, name, stop)
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
-    distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
+    distance, time = stop.vehicle_results()["stopping distance [m]"], stop.times[-1]
     distance_text, time_text = f"{distance:.2f}\N{NO-BREAK SPACE}m", f"{time:.2f}\N{NO-BREAK SPACE}s"
     ended = (
         f"stands after {distance_text} and {time_text}" if stop.path.ended_at_rest else f"still moves at {time_text}"
@@ -100,7 +100,7 @@ STRAIGHT_LIMIT = 0.05
 def _moves_laterally(stop: Stop) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST_SLIP_SPEED
-    sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
+    sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.lateral_acceleration
     return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in sideways)
 
 

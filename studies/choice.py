@@ -139,9 +139,9 @@ def has_closed_form(scene: Any) -> bool:
     """Whether the choice of a scene's effects has a closed form, without runs in time: a linear stationary ride."""
     if scene.system != "ride":
         return False
-    from models.systems.ride.of_scene import goes_in_time
+    from models.systems.ride.of_scene import needs_run_in_time
 
-    return not goes_in_time(scene)
+    return not needs_run_in_time(scene)
 
 
 def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:

@@ -228,7 +228,9 @@ def _plot_theory(
     """Plot the mean error (% of mu N) of a contact theory. An optional bar at its largest number of cells reaches up to
     the error that 95 % of the contacts do not exceed."""
     colour, marker = THEORY_STYLES[name]
-    mean, largest_errors = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
+    mean, largest_errors = (
+        100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "quantile_95")
+    )
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
     axis.plot(x_values, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
     if with_bar:

@@ -74,7 +74,7 @@ def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncert
         f"{100 * reference_uncertainty:.2g} %)",
         f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
         *(
-            f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.most:>11.2f}"
+            f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.quantile_95:>11.2f}"
             f"{100 * max(point.errors):>9.2f}   {cost((point.seconds, *point.range))}"
             for point in points
         ),

@@ -30,7 +30,7 @@ from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright_assumption
 from models.systems.pitch_plane.noise_paths import largest_difference, mujoco_threads, noise_paths
 from models.systems.pitch_plane.path_statistics import PITCH_STATE, PathStatistics
-from models.systems.pitch_plane.run import run_away
+from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import check_road, follower_builder, measure, write_measurement
 from models.vehicles.pitch_plane import STATE_NAMES
@@ -95,7 +95,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower_builder(scene, Path(name))({}, {"force_noise": noise})
-        first = run_away(noisy, "reference", scene.error)
+        first = run_with_drift(noisy, "reference", scene.error)
         path_arguments = (noisy, row_times, measured["pitch"], options.threshold)
         for block in each_block(noise_paths(*path_arguments), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell):
             statistics.add(block)

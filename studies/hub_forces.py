@@ -38,7 +38,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": comparison.answer(),
+        "answer": comparison.figures(),
         "results": comparison.results,
         "doubts": list(comparison.measurement.tilt.objections),
         "table": _table_lines(scene, comparison),
@@ -72,7 +72,7 @@ def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
     lines += [f"  doubt: {text}" for text in tilt.objections]
     lines += [f"  {name}: {text}" for name, text in comparison.failed.items()]
     if len(comparison.runs) > len(METHOD_OF_RUN):
-        lines.append(f"  engines before drift-off: {comparison.engines_apart():.1e}")
+        lines.append(f"  engines before drift-off: {comparison.largest_engine_difference():.1e}")
     return lines
 
 

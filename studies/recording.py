@@ -53,7 +53,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 def _failure_reasons(examination: Examination) -> dict[str, str]:
     """Reasons for which the command ends with code 1: errors in the recording, or the failure of the run whose results
     were to be saved."""
-    if examination.is_stopped:
+    if examination.has_error_findings:
         count = sum(finding.weight == "error" for finding in examination.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
     return {name: text for name, text in examination.failed.items() if name == examination.scene.stabilise.method}

@@ -56,7 +56,7 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
         assumed=assumption_sentences(result),
         free=FREE_RUN,
         weights=[finding.weight for finding in examination.findings],
-        used=[(signal, examination.put_in(signal)) for signal in examination.recording.signals],
+        used=[(signal, examination.is_input(signal)) for signal in examination.recording.signals],
         effects={
             finding: f" {consequence}."
             for consequence in examination.consequences

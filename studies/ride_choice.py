@@ -18,7 +18,7 @@ from models.core.strict import read
 from models.core.told import derived_result
 from models.core.whole_files import write_whole
 from models.systems import run as run_scene
-from models.systems.ride.of_scene import goes_in_time, scene_errors
+from models.systems.ride.of_scene import needs_run_in_time, scene_errors
 from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
 from models.systems.ride.scene import RideScene
 from studies.choice import save_choices
@@ -51,7 +51,7 @@ class SingleEffect:
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     """Raise InputError for scenes without a choice of effects, and for options of copies if the vehicle is linear."""
     read(Options, scene.options, scene.file, "options")
-    if goes_in_time(scene):
+    if needs_run_in_time(scene):
         opened(scene)
     elif scene.options:
         option_name, value = next(iter(scene.options.items()))
@@ -67,7 +67,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     """Choose the effects of a ride scene, by runs for nonlinear springs; saves ``choice.nc``, two CSV files, a figure
     and files of the reduced scene; returns the summary."""
     check(scene, engines)
-    if goes_in_time(scene):
+    if needs_run_in_time(scene):
         return save_choices([scene], engines, folder, progress)
     progress("screening", 0.1)
     with scene_errors(scene):

@@ -312,7 +312,7 @@ def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None
     Carlo copies; open marks show where statistical linearisation states a large error."""
     outputs = nonlinear.shown.vehicle.outputs
     figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
-    left = nonlinear.of("left_out")
+    left = nonlinear.quantity_by_speed("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
         axis.plot(

@@ -17,7 +17,7 @@ from models.ride.road_path import check_rates
 from models.road.excitation import Excitation
 from models.systems import run as run_scene
 from models.systems.ride.nonlinear import Nonlinear, Ride, Sampling
-from models.systems.ride.of_scene import excitation_of, in_time_only, vehicle_of
+from models.systems.ride.of_scene import excitation_of, has_no_linear_equivalent, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
@@ -35,7 +35,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     vehicle = vehicle_of(scene)
-    if not in_time_only(vehicle):
+    if not has_no_linear_equivalent(vehicle):
         allowed = "has neither curves nor friction, nor tyres that lift: use ride, which is exact for it"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
     for name, weighting_name in scene.weighting.items():
@@ -95,7 +95,7 @@ def _summary_of_deviations(nonlinear: Nonlinear) -> dict[str, Any]:
     tyres that may lift off, those of the Monte Carlo copies at the copies' speeds."""
     copies = list(nonlinear.copies.values())
     table: dict[str, Any] = {"speed": list(nonlinear.copies) if nonlinear.tyres_may_lift else nonlinear.speeds.tolist()}
-    for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.of("mean"))):
+    for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.quantity_by_speed("mean"))):
         values = (
             np.array([getattr(copies_at_speed, key) for copies_at_speed in copies])
             if nonlinear.tyres_may_lift
@@ -166,7 +166,8 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[s
     ]
     for spec in (spec for spec in vehicle.outputs if isinstance(spec, TyreOutput) and spec.kind == "tyre force"):
         shares = [
-            f"{engine} {100 * np.mean(run.of(spec.name) <= -loads[spec.tyre]):.2g} %" for engine, run in runs.items()
+            f"{engine} {100 * np.mean(run.output_values(spec.name) <= -loads[spec.tyre]):.2g} %"
+            for engine, run in runs.items()
         ]
         pulls = float(ndtr(-loads[spec.tyre] / largest_deviations[names.index(spec.name)]))
         air_text = f"; in the air {', '.join(shares)}" if shares else ""

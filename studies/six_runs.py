@@ -13,12 +13,12 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.whole_files import write_whole
-from models.systems.pitch_plane.run import run_away
+from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import (
     DRIFT_OFF_PITCH,
     Options,
-    error,
+    channel_error,
     figures_of_run,
     measurement_and_runs,
     options_of,
@@ -42,7 +42,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     for i, (engine, name) in enumerate(pairs):
         progress(f"{engine}: {name}", i / len(pairs))
         try:
-            runs[engine][name] = run_away(scenes[name], engine, scene.error)
+            runs[engine][name] = run_with_drift(scenes[name], engine, scene.error)
         except RunFailed as failure:
             failed[f"{engine}, {name}"] = str(failure)
             continue
@@ -165,7 +165,7 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
     (name, measured), *runs = results.items()
     pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH_COLOUR, linewidth=1.8, zorder=9)
     for i, (name, run) in enumerate(runs):
-        heave.semilogy(run.times, np.abs(error(measured, run, "z3")) + 1e-12, color=f"C{i}", linewidth=0.8)
+        heave.semilogy(run.times, np.abs(channel_error(measured, run, "z3")) + 1e-12, color=f"C{i}", linewidth=0.8)
         pitch.plot(run.times, run["pitch"], label=name, color=f"C{i}")
     heave.set(title="Error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
     pitch.set(title="Pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")

@@ -26,14 +26,14 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.statistics import STANDARD_ERRORS_95, quantile_with_interval
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.noise_paths import noise_paths
-from models.systems.pitch_plane.run import run_away
+from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
 from models.systems.pitch_plane.trust import (
     UNTRUSTED_PITCH,
     GrowthCurve,
-    interpolation,
+    interpolation_error_curve,
     model_error_curve,
-    noise,
+    noise_error_curve,
     pitch_error_growth,
     rounding_error_curve,
     small_errors,
@@ -75,16 +75,16 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     other_parameters = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
     curves = {
-        "noise": noise(assembly, deviation),
-        "interpolation": interpolation(assembly),
+        "noise": noise_error_curve(assembly, deviation),
+        "interpolation": interpolation_error_curve(assembly),
         "inertia": model_error_curve(assembly, other_parameters),
         "rounding": rounding_error_curve(assembly),
     }
     runs = {}
     if measured is not None:
         progress("runs", 0.2)
-        clean = run_away(base, engines[0])
-        wrong = run_away(
+        clean = run_with_drift(base, engines[0])
+        wrong = run_with_drift(
             changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other_parameters.I}}), engines[0]
         )
         runs = {
@@ -92,7 +92,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             "inertia": _pitch_difference(wrong, clean["pitch"]),
         }
     progress("noise paths", 0.4)
-    quiet = run_away(base, "reference", scene.error)
+    quiet = run_with_drift(base, "reference", scene.error)
     spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, default_workers=1))
     rows = _drift_off_rows(curves, runs, spread, options)
     table = _table_lines(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)

@@ -13,7 +13,7 @@ from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
 from models.core.tables import write_table
-from models.systems.braking.of_scene import tables_of
+from models.systems.braking.of_scene import tyre_tables_of
 from models.systems.braking.plan import check_reference
 from models.systems.braking.scene import BrakingScene
 from models.tyre.assumptions import assumptions
@@ -36,7 +36,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     options = read(Options, scene.options, scene.file, "options")
     if not all(0.0 <= angle <= 90.0 for angle in options.slip_angles):
         raise InputError(scene.file, "options.slip_angles", options.slip_angles, "must be from 0 to 90 deg")
-    tables_of(scene)
+    tyre_tables_of(scene)
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     from studies.tyre_figure import tyre_figure
 
     options = read(Options, scene.options, scene.file, "options")
-    tables = tables_of(scene)
+    tables = tyre_tables_of(scene)
     answer = {name: table.characteristic_values(options.load) for name, table in tables.items()}
     results = {
         name: save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")

@@ -18,7 +18,7 @@ from models.rail.linear import critical_speed_or_reason, kinematic_wavelength, k
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset import conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
-from models.systems.wheelset.run import Linear, at_speeds, linearised_result, over_speeds
+from models.systems.wheelset.run import LinearisedMotion, linearised_result, over_speeds, results_by_speed_text
 from models.systems.wheelset.run import run as run_path
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -34,7 +34,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
 
     wheelset, failed, eigenvalues, paths = wheelset_of(scene), dict[str, str](), dict[str, Result](), Paths()
-    conicities = conicity.run(scene) if conicity.told_conicity(scene) else None
+    conicities = conicity.run(scene) if conicity.reports_conicity(scene) else None
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
@@ -79,11 +79,11 @@ def _results_by_name(paths: Paths) -> dict[str, Result]:
     return {
         f"{engine}, {speed_text}": path
         for engine, paths_of_engine in paths.items()
-        for speed_text, path in at_speeds(paths_of_engine).items()
+        for speed_text, path in results_by_speed_text(paths_of_engine).items()
     }
 
 
-def _save_table(linear_results: dict[str, Linear], folder: Path) -> None:
+def _save_table(linear_results: dict[str, LinearisedMotion], folder: Path) -> None:
     """Save a CSV table of growth rate (1/s), and damping and frequency of hunting, over speed."""
     columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
     for engine, linear_run in linear_results.items():
@@ -93,7 +93,7 @@ def _save_table(linear_results: dict[str, Linear], folder: Path) -> None:
     write_table(folder / "over_speed.csv", columns)
 
 
-def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, Linear], paths: Paths) -> dict[str, Any]:
+def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], paths: Paths) -> dict[str, Any]:
     """Summary in SI units: wavelengths, critical speed by engine (None if there is none), and largest power of the
     creep forces."""
     return {
@@ -107,7 +107,7 @@ def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, Linear], pat
     }
 
 
-def _wavelength_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> list[str]:
+def _wavelength_lines(wheelset: Wheelset, linear_results: dict[str, LinearisedMotion]) -> list[str]:
     """Lines for the screen on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each
     engine's eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
@@ -129,7 +129,7 @@ def _wavelength_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> 
     return lines
 
 
-def _stability_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> list[str]:
+def _stability_lines(wheelset: Wheelset, linear_results: dict[str, LinearisedMotion]) -> list[str]:
     """Lines for the screen on the critical speed in every engine, or the reason why there is none."""
     lines = [
         "  critical speed with linear creep",

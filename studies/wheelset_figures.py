@@ -26,7 +26,7 @@ from models.rail.limit_cycle import Orbit
 from models.rail.linear import klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.conicity import Conicities
-from models.systems.wheelset.run import Linear, at_speeds
+from models.systems.wheelset.run import LinearisedMotion, results_by_speed_text
 
 ENGINE_MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """Line or mark of each implementation: the reference is a line, the engines are marks on it."""
@@ -52,7 +52,7 @@ def _patch_sums_of_wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[s
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
     """Save a figure of growth rate and wavelength of the hunting motion over speed, and of its root locus."""
-    linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
+    linear: dict[str, LinearisedMotion] = {engine: result.detail for engine, result in eigenvalues.items()}
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
@@ -128,7 +128,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
     runs_by_name = {
         f"{engine}, {speed_of_path}": run
         for engine, path_then in results.items()
-        for speed_of_path, run in at_speeds(path_then).items()
+        for speed_of_path, run in results_by_speed_text(path_then).items()
     }
     add_heading(figure, f"{title}: the same path in every implementation", runs_by_name)
     save(figure, path)
@@ -150,7 +150,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
     legend_below(figure, axes[0, 0])
     largest = max(float(course.contacts["power"].max()) for course in paths.values())
     subtitle = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
-    add_heading(figure, f"{title}\n{subtitle}", at_speeds(results))
+    add_heading(figure, f"{title}\n{subtitle}", results_by_speed_text(results))
     save(figure, path)
 
 

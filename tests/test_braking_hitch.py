@@ -26,7 +26,7 @@ def test_hitch_angles_are_of_the_drawbar_against_the_truck():
     states = np.zeros((3, 2, 5))
     states[:, 0, 2:4] = [[0.0, 0.0], [0.1, -0.2], [0.3, 0.2]]
     stop = Stop(SimpleNamespace(states=states, times=np.array([0.0, 1.0, 2.0]), coordinates=()))
-    assert stop.of_hitch() == pytest.approx(
+    assert stop.hitch_results() == pytest.approx(
         {
             "largest hitch angle [deg]": np.degrees(-0.3),
             "largest hitch angle at [s]": 1.0,

@@ -8,7 +8,7 @@ import pytest
 from models.brake.controller import SAMPLE, Sample
 from models.core.errors import InputError
 from models.systems.braking.measured_pressures import read_pressures
-from models.systems.braking.of_scene import measured_of
+from models.systems.braking.of_scene import measured_pressures_of
 from models.systems.braking.plan import check, describe
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
@@ -49,7 +49,7 @@ def test_pressures_of_a_file_are_held_after_its_end_and_it_is_said(tmp_path):
     own = scene(tmp_path, **MEASURED, run={"duration": 0.3})
     path = drive(own).detail
     assert path.pressures[1:] == pytest.approx(1.0, rel=1e-12)
-    told = measurement_end_line(measured_of(own, "stop", 4), Stop(path))
+    told = measurement_end_line(measured_pressures_of(own, "stop", 4), Stop(path))
     assert told == ["    measured pressures end at 0.100 s: from then on the last ones stay"]
     assert "measured pressures {procedure}" in describe(own)
 
@@ -84,7 +84,9 @@ def test_measured_speeds_differ_from_rims_by_their_rms(tmp_path):
     file.write_text(HEAD + SPEEDS + "\n0, 0, 0, 1, 1, 36, 10, 10, 10\n1, 2, 200, 1, 1, 18, 5, 5, 5\n")
     found = read_pressures(file, 4)
     rims = np.array([[10.0, 10, 10, 10], [7.5, 8.5, 7.5, 5.5], [0, 0, 0, 0]])  # the last row is after the file's end
-    assert found.rms(np.array([0.0, 0.5, 2.0]), rims) == pytest.approx([0.0, 0.5**0.5, 0.0, 2.0**0.5], abs=1e-12)
+    assert found.wheel_speed_error(np.array([0.0, 0.5, 2.0]), rims) == pytest.approx(
+        [0.0, 0.5**0.5, 0.0, 2.0**0.5], abs=1e-12
+    )
 
 
 @pytest.mark.parametrize(

@@ -548,7 +548,7 @@ def test_the_switch_closes_in_time(vehicle):
     from dataclasses import replace
 
     seen = Says(lambda given: Command(valves=np.ones(4)))
-    path = replace(vehicle, switch=0.05).run(seen, 11.0, 0.1)
+    path = replace(vehicle, switch_time=0.05).run(seen, 11.0, 0.1)
     closed = [given.brake for given in seen.seen]
     assert closed == [SAMPLE * i >= 0.05 - 1e-9 for i in range(len(closed))]
     assert not path.pressures[: closed.index(True) + 1].any() and path.pressures[closed.index(True) + 1].all()

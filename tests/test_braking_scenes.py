@@ -89,7 +89,7 @@ def test_without_load_transfer_and_dynamics_nothing_of_them_is_computed():
 def test_a_turn_begins_on_its_steady_circle(radius):
     own = scene(procedures={"a": {"kind": "turn", "speed": 8.0, "radius": radius}}, load_transfer={})
     vehicle, start = vehicle_and_start(own, "a")
-    path = replace(vehicle, switch=1.0).run(Applied(), start, 0.5)
+    path = replace(vehicle, switch_time=1.0).run(Applied(), start, 0.5)
     centre = radius * np.array([-start.state[1, 1], start.state[1, 0]]) / 8.0
     off = np.hypot(*(path.states[:, 0, :2] - centre).T) - abs(radius)
     assert abs(start.state[1, 2] - 8.0 / radius) < 1e-12 and np.sign(vehicle.steer[0]) == np.sign(radius)
@@ -157,7 +157,7 @@ def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():
-    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).of_wheels()
+    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).wheel_results()
     assert 0.0 < slips["mean slip"].min() <= slips["largest slip"].max() <= 1.0
 
 

@@ -112,7 +112,7 @@ def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_bo
     assert np.abs(path.states[-1, 0, 3:] - start.state[0, 3:]).max() < 1e-5  # springs are settled; drag slows it down
     assert start.state[0, ROLL] > 5e-3
     stop = Stop(drive(own, procedure="straight").detail)
-    assert stop.path.ended_at_rest and stop.of_vehicle()["largest pitch [deg]"] > 0.5
+    assert stop.path.ended_at_rest and stop.vehicle_results()["largest pitch [deg]"] > 0.5
     assert "suspension, roll and pitch" in describe(own)
     check(own, ("reference", "exudyn", "mujoco"))
     assert engines_of(own, ("reference", "exudyn")) == ("exudyn",) and engines_of(own, ("reference",)) == ("reference",)

@@ -136,7 +136,7 @@ def test_a_scene_brakes_and_controls_the_wheels_of_its_trailer():
     check(towing, ("reference", "exudyn", "mujoco"))
     assert (
         result.detail.coordinates[19] == "caravan hitch rz"
-        and "largest hitch angle [deg]" in Stop(result.detail).of_hitch()
+        and "largest hitch angle [deg]" in Stop(result.detail).hitch_results()
     )
 
 

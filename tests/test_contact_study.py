@@ -18,7 +18,7 @@ from models.core.errors import InputError
 from models.core.tables import NEWTONS, SHARES, read_table, table_blocks
 from models.ensemble.store import Store
 from models.systems.contact import cases_table
-from models.systems.contact.cases_table import ANSWER_HEADINGS, BY_AXES, answer_table
+from models.systems.contact.cases_table import BY_AXES, OUTPUT_HEADINGS, solve_table
 from models.systems.contact.run import Built, solved_contact
 from models.systems.contact.scene import Method, build
 from models.systems.contact.work_precision import TheoryPoint, fastest_point, with_exact_forces
@@ -41,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
 def answered(text, name="cases.csv", **method):
     """Counts and rows that a table is answered with."""
     Path(name).write_text(text, encoding="utf-8", errors="surrogateescape")
-    counts = answer_table(Path(name), Path("out.csv"), partial(Built, MaterialPair()), Method(**method))
+    counts = solve_table(Path(name), Path("out.csv"), partial(Built, MaterialPair()), Method(**method))
     with open("out.csv", newline="") as file:
         return counts, list(csv.DictReader(file))
 
@@ -192,7 +192,7 @@ def test_fields_of_fastsim_are_those_of_its_forces():
 def test_a_row_of_a_table_is_the_contact_with_its_units():
     counts, rows = answered(CASES + ROW)
     one = fastsim(RollingEllipse(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4), MaterialPair())
-    assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == ANSWER_HEADINGS and rows[0]["status"] == "ok"
+    assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == OUTPUT_HEADINGS and rows[0]["status"] == "ok"
     for heading, value in (("fx [N]", one.fx), ("fy [N]", one.fy), ("mz [N m]", one.mz), ("stick [-]", one.stick)):
         assert float(rows[0][heading]) == pytest.approx(float(value), rel=1e-5)
     body = solved_contact(build(TABLE))
@@ -259,7 +259,7 @@ def test_a_table_that_was_cut_off_says_so():
 def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
     Path("cases.csv").write_text(header + ROW if header else "")
     with pytest.raises(InputError) as found:
-        answer_table(Path("cases.csv"), Path("out.csv"), partial(Built, MaterialPair()), Method())
+        solve_table(Path("cases.csv"), Path("out.csv"), partial(Built, MaterialPair()), Method())
     assert words in str(found.value) and not Path("out.csv").exists()
 
 
@@ -349,8 +349,8 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
     path, built = tmp_path / "cases.csv", partial(Built, MaterialPair())
     path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
     alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))
-    assert answer_table(path, alone, built, Method()) == {"rows": 9, "wrong": 1}
-    answer_table(path, shared, built, Method(), executor=Counting())
+    assert solve_table(path, alone, built, Method()) == {"rows": 9, "wrong": 1}
+    solve_table(path, shared, built, Method(), executor=Counting())
     assert shared.read_bytes() == alone.read_bytes()
 
     def stop(rows):
@@ -359,7 +359,7 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
 
     store, again = Store(tmp_path), Counting()
     with pytest.raises(KeyboardInterrupt):
-        answer_table(path, resumed, built, Method(), stop, store=store)
+        solve_table(path, resumed, built, Method(), stop, store=store)
     assert not resumed.exists() and store.has(1)
-    answer_table(path, resumed, built, Method(), executor=again, store=store)
+    solve_table(path, resumed, built, Method(), executor=again, store=store)
     assert resumed.read_bytes() == alone.read_bytes() and again.count == 3

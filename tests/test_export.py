@@ -23,7 +23,7 @@ from models.multibody.cut_table import HubInputs
 from models.systems.braking.of_scene import sprung_of
 from models.systems.braking.scene import build as braking
 from models.systems.handling.run import driven_by
-from models.systems.hub_forces.export import of_cut
+from models.systems.hub_forces.export import export_cut_vehicle
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.ride.of_scene import vehicle_of
 from models.systems.wheelset.of_scene import equations_of
@@ -140,7 +140,7 @@ CARS = {"shipped": r19, "twin": lambda: cut(twin(), "body"), "rough": rough_car}
 def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
     """The product has all its forces here, with hub forces of 0 and what no element has set to 0."""
     whole = CARS[car]()
-    answer = of_cut(engine, whole, ExportSubject("car", "car.toml", ""), [])
+    answer = export_cut_vehicle(engine, whole, ExportSubject("car", "car.toml", ""), [])
     tree = whole.tree
     if engine == "mujoco":
         tree, lowered = realisable(tree)
@@ -156,7 +156,7 @@ def test_parts_that_are_left_out_of_a_cut_car_are_named():
     for engine in ("mujoco", "exudyn"):
         car = rough_car()
         reasons = divide(car.tree, car.elements, engine).reasons
-        answer = of_cut(engine, rough_car(), ExportSubject("car", "car.toml", ""), ["stabiliser"])
+        answer = export_cut_vehicle(engine, rough_car(), ExportSubject("car", "car.toml", ""), ["stabiliser"])
         assert reasons
         assert all(any(name in text and why in text for text in answer.left_out) for name, why in reasons.items())
         assert answer.left_out.count("stabiliser") == 1 and "stabiliser" in answer.text

@@ -22,7 +22,13 @@ from models.systems.pitch_plane.tangent import (
     slow_swing_frequency,
     tilt_error_columns,
 )
-from models.systems.pitch_plane.trust import interpolation, model_error_curve, noise, pitch_error_growth, predict_trust
+from models.systems.pitch_plane.trust import (
+    interpolation_error_curve,
+    model_error_curve,
+    noise_error_curve,
+    pitch_error_growth,
+    predict_trust,
+)
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from studies.command.asked import SCENES_FOLDER
 from studies.trust import run as run_study
@@ -51,7 +57,7 @@ def test_tangent_is_the_difference_of_two_runs(folder, mode, parameters):
     scene = force_scene(folder, parameters, 1e-3, 2.0, effects={"wheel_forces": forces})
     assembly = replace(assembly_of_scene(scene), mode=mode)
     small = 1e-6 * np.array([1.0, -2.0, 0.5, 1.0, 3.0, -1.0, 0.2, 1.0])
-    _, columns = path_of(assembly).carry_errors(small[None] / 1e-6)
+    _, columns = path_of(assembly).propagate_errors(small[None] / 1e-6)
     moved = [states(replace(assembly, initial=assembly.initial + sign * small)) for sign in (1, -1)]
     # central difference of 1e-6: second-order error 1e-12, rounding 1e-10 of it
     assert np.abs((moved[0] - moved[1]) / 2e-6 - columns[:, 0]).max() < 1e-5 * np.abs(columns).max()
@@ -61,11 +67,11 @@ def test_tangent_of_a_wrong_model_and_of_wrong_forces(folder):
     assembly = assembly_of_scene(force_scene(folder, duration=2.0, step=1e-3))
     p = assembly.parameters
     other = p.model_copy(update={"I": p.I * 1.0001, "k3": p.k3 * 0.9999})
-    _, columns = path_of(assembly).carry_errors(np.zeros((1, 8)), wrong_parameters=other)
+    _, columns = path_of(assembly).propagate_errors(np.zeros((1, 8)), wrong_parameters=other)
     found = states(replace(assembly, parameters=other)) - states(assembly)
     assert np.abs(found - columns[:, 0]).max() < 1e-3 * np.abs(found).max()  # second order in 1e-4
     pushes = np.full((3 * 2000, 1, 2), [[0.01, -0.02]])
-    _, columns = path_of(assembly).carry_errors(np.zeros((1, 8)), pushes)
+    _, columns = path_of(assembly).propagate_errors(np.zeros((1, 8)), pushes)
     wrong = assembly.input.values + np.array([0.01, -0.02])
     found = states(replace(assembly, input=replace(assembly.input, values=wrong)))
     assert np.abs(found - states(assembly) - columns[:, 0]).max() < 1e-3 * np.abs(columns).max()
@@ -75,7 +81,7 @@ def test_linear_geometry_and_body_forces_do_not_grow(folder):
     scene = force_scene(folder, duration=6.0, step=1e-3)
     assembly = assembly_of_scene(scene)
     linear = replace(assembly, vehicle=replace(assembly.vehicle, geometry="linear"))
-    _, columns = path_of(linear).carry_errors(tilt_error_columns(linear))
+    _, columns = path_of(linear).propagate_errors(tilt_error_columns(linear))
     assert columns[-1, 0, 3] == pytest.approx(1.0, abs=1e-9) and columns[-1, 1, 3] == pytest.approx(6.0, rel=1e-6)
     body = replace(assembly, mode="force-body")
     assert slow_swing_frequency(path_of(body)) > 0 and slow_swing_frequency(path_of(assembly)) == 0
@@ -127,7 +133,7 @@ def test_covariance_is_that_of_the_samples(folder, rule, step):
             table = replace(path, forces=replace(assembly.input, values=values)).forces_at_stages
             stages = [table] * 3 if rule == "held" else [table[0:-1:2], table[1::2], table[2::2]]
             pushes = np.stack(stages, axis=1).reshape(-1, 1, 2)
-            responses.append(path.carry_errors(np.zeros((1, 8)), pushes)[1][-1, 0])
+            responses.append(path.propagate_errors(np.zeros((1, 8)), pushes)[1][-1, 0])
     found = np.array(responses).T @ np.array(responses)
     assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
 
@@ -157,7 +163,7 @@ def test_trust_names_what_comes_first(folder):
 
 def test_noise_curve_scales_and_a_wrong_model_comes_from_its_inertia(folder):
     assembly = assembly_of_scene(force_scene(folder, duration=6.0, step=1e-3))
-    once, twice = noise(assembly, 10.0), noise(assembly, 20.0)
+    once, twice = noise_error_curve(assembly, 10.0), noise_error_curve(assembly, 20.0)
     assert twice.size[-1] == pytest.approx(2 * once.size[-1], rel=1e-12)
     p = assembly.parameters
     wrong = {
@@ -168,8 +174,8 @@ def test_noise_curve_scales_and_a_wrong_model_comes_from_its_inertia(folder):
 
 
 def test_interpolation_error_falls_with_the_square_of_the_period(folder):
-    slow = interpolation(assembly_of_scene(force_scene(folder / "slow", duration=5.0, step=1e-3)))
-    fast = interpolation(assembly_of_scene(force_scene(folder, duration=5.0, step=1e-3)))
+    slow = interpolation_error_curve(assembly_of_scene(force_scene(folder / "slow", duration=5.0, step=1e-3)))
+    fast = interpolation_error_curve(assembly_of_scene(force_scene(folder, duration=5.0, step=1e-3)))
     assert slow.size[-1] / fast.size[-1] == pytest.approx(100.0, rel=0.3)  # 40 Hz of road in samples of 10 ms
 
 
@@ -220,5 +226,5 @@ def test_study_on_a_file_of_ones_own(folder):
 
 def test_a_path_is_a_march_of_the_reference(folder):
     assembly = assembly_of_scene(force_scene(folder, duration=2.0, step=1e-3))
-    found, _ = TangentPath(assembly, assembly.input, 1, 2000).carry_errors(np.zeros((1, 8)))
+    found, _ = TangentPath(assembly, assembly.input, 1, 2000).propagate_errors(np.zeros((1, 8)))
     assert np.abs(found - states(assembly)).max() < 1e-12

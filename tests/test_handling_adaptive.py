@@ -14,7 +14,7 @@ from models.engines import free_vehicle_adaptive
 from models.engines.assembly import Settings
 from models.multibody.numbers import Controls, Handling
 from models.systems.handling.plan import describe
-from models.systems.handling.run import drive_run, driven_adaptively, run
+from models.systems.handling.run import drive_run, drive_run_adaptive, run
 from models.systems.handling.scene import build
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -31,7 +31,7 @@ TABLE = {
 def end(tolerance: float) -> np.ndarray:
     """State of a step of steering after 0.1 s, by DOPRI5."""
     settings = Settings("DOPRI5", 0.01, 0.1, tolerance)
-    return driven_adaptively("exudyn", STEERED, 20.0, settings).run.states[-1]
+    return drive_run_adaptive("exudyn", STEERED, 20.0, settings).run.states[-1]
 
 
 def test_it_is_the_motion_of_short_fixed_steps_and_reads_the_controls_at_their_time() -> None:
@@ -49,7 +49,7 @@ def test_it_is_the_motion_of_short_fixed_steps_and_reads_the_controls_at_their_t
 def test_a_car_at_walking_pace_needs_no_shorter_step_to_be_named() -> None:
     with pytest.raises(RunFailed, match="damps its wheel faster"):
         drive_run("exudyn", Handling(R19), 0.1, 0.02, 2e-3)
-    slow = driven_adaptively("exudyn", Handling(R19), 0.1, Settings("DOPRI5", 2e-3, 0.02, 1e-6))
+    slow = drive_run_adaptive("exudyn", Handling(R19), 0.1, Settings("DOPRI5", 2e-3, 0.02, 1e-6))
     assert np.abs(slow.run.rates[-1] - slow.run.rates[0]).max() < 1e-3 and slow.run.counts["steps"] > 10
 
 

@@ -13,7 +13,7 @@ from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded_measurement, true_run, two_tracks
-from models.systems.hub_forces.run import run, with_angles
+from models.systems.hub_forces.run import inputs_with_angles, run
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate, inputs_with_moments
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid_vehicle
@@ -70,7 +70,7 @@ def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
     car, true, forces, angles = measured
     less = replace(forces, samples=forces.samples - np.eye(24)[3] * 200.0)  # 200 N m about x at one hub
     hub_input_sets = [
-        with_angles(own.hub_inputs(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)
+        inputs_with_angles(own.hub_inputs(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)
     ]
     whole, run = (build("mujoco", car, hub_inputs, 2e-3, 1.0).run() for hub_inputs in hub_input_sets)
     assert np.abs(run.states[:, [ROLL, PITCH]] - true.states[:, [ROLL, PITCH]]).max() < 1e-6
@@ -82,7 +82,7 @@ def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
 def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     car, true, forces, angles = measured
     deviations = Deviations(np.tile([8.0] * 3 + [1.0] * 3, 4), (1.75e-3, 5e-3), 1.0)
-    tilt = estimate(car, forces, angles.noisy((1.75e-3, 5e-3), 3), deviations)
+    tilt = estimate(car, forces, angles.with_noise((1.75e-3, 5e-3), 3), deviations)
     assert np.abs(tilt.states[50:, :2] - angles.samples[50:, :2]).max() < 3e-3
     shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
     free, drawn = (
@@ -113,11 +113,11 @@ def test_the_laws_of_the_rigid_vehicle():
 @pytest.mark.grounds("closed form")
 def test_noise_is_the_same_in_any_frame_and_differs_from_path_to_path():
     still = HubForces(np.zeros((5000, 24)), 1e-3, "hub")
-    one, two = (still.noisy(np.full(24, 3.0), 7, path).samples for path in (0, 1))
+    one, two = (still.with_noise(np.full(24, 3.0), 7, path).samples for path in (0, 1))
     assert one.std() == pytest.approx(3.0, rel=0.006)  # 120,000 samples: 0.2 %
     assert abs(np.mean(one * two)) < 0.1
     # 200,000 samples of each kind: 0.16 %
-    angles = Angles(np.zeros((100_000, 4)), 1e-3).noisy((1.0, 10.0), 7).samples
+    angles = Angles(np.zeros((100_000, 4)), 1e-3).with_noise((1.0, 10.0), 7).samples
     assert [angles[:, :2].std(), angles[:, 2:].std()] == pytest.approx([1.0, 10.0], rel=0.005)
 
 

@@ -62,7 +62,7 @@ def test_a_drive_tells_the_error_of_its_steps_between_samples(scene, stiffer):
     """Within 3 of the difference from 16 times as many steps with the inputs straight between the samples."""
     changes = {axle: {**table()[axle], "stiffness": stiffer * table()[axle]["stiffness"]} for axle in ("front", "rear")}
     stiff = build(table(**changes), "car.toml", scene.folder)
-    driven, true = run(stiff, error=True), single_track._sensed_in_parts(stiff, *_given(stiff), 16)
+    driven, true = run(stiff, error=True), single_track._sensed_in_finer_steps(stiff, *_given(stiff), 16)
     assert set(errors_of(driven)) == set(true)
     for name, estimate in errors_of(driven).items():
         off = float(np.sqrt(np.mean((driven[name] - true[name]) ** 2)))

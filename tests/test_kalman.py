@@ -129,7 +129,7 @@ def test_without_measurement_the_covariance_is_that_of_all_force_samples(folder,
             total += np.outer(response, response)
     assert np.array_equal(own.input.values, base)
     scale = np.sqrt(total.diagonal())
-    difference = (found.errors()[-1, :6, :6] - total) / np.outer(scale, scale)
+    difference = (found.error_covariances()[-1, :6, :6] - total) / np.outer(scale, scale)
     assert np.abs(difference).max() < 1e-6  # differences of the step are good to 1e-9
 
 
@@ -138,7 +138,7 @@ def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     n, own = 12, assembly_of_scene(scene(folder, duration=0.06, geometry="linear", interpolation="held"))
     measured = Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,))
     step = PitchStep(own, PERIOD, n)
-    mean, start = pitch_filter._start(own, 0.05, 0.0)
+    mean, start = pitch_filter._initial_state_and_covariance(own, 0.05, 0.0)
     means, roots = [mean], [np.linalg.cholesky(start)]
     for i in range(n):
         after, transition, first, _ = step.advance(means[-1], i)
@@ -164,7 +164,7 @@ def test_a_wrong_inertia_is_learnt(folder):
     right = assembly_of_scene(scene(folder)).parameters.I
     wrong = assembly_of_scene(scene(folder, I=0.95 * right))
     found = estimate(wrong, Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0, inertia_deviation=0.05)
-    share, sure = found.states[-1, INERTIA_SHARE], np.sqrt(found.errors()[-1, INERTIA_SHARE, INERTIA_SHARE])
+    share, sure = found.states[-1, INERTIA_SHARE], np.sqrt(found.error_covariances()[-1, INERTIA_SHARE, INERTIA_SHARE])
     assert sure < 0.01 and abs(share + 0.05) < 4 * sure  # 1/I of the model is 1/0.95 of the true one
     trusted = estimate(wrong, Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0)
     assert abs(trusted.states[-1, INERTIA_SHARE]) < 1e-6
@@ -220,7 +220,7 @@ def test_angle_and_rate_together_are_surer_than_either(folder):
         chosen = [0 if column == PITCH else 1 for column in columns]
         deviations = tuple((ANGLE, 0.05)[i] for i in chosen)
         found = estimate(own, Measurement(values[:, chosen], PERIOD, columns, deviations), 16.0)
-        sure[columns] = np.sqrt(found.errors()[-1, PITCH, PITCH])
+        sure[columns] = np.sqrt(found.error_covariances()[-1, PITCH, PITCH])
         assert abs(found.states[-1, PITCH] - states[-1, 3]) < 5 * sure[columns]
     assert sure[PITCH, PITCH_RATE] < min(sure[PITCH,], sure[PITCH_RATE,])
 

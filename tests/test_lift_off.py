@@ -285,7 +285,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     runs = [drive_over_road(engine, vehicle, road, 2.0, seed=2) for engine in ENGINES[1:]]
     assert np.abs(runs[0].run.positions - runs[1].run.positions).max() < 1e-12
     load = preloads(vehicle).tyres[vehicle.tyres[0].name]
-    force = runs[0].of("tyre force front left")
+    force = runs[0].output_values("tyre force front left")
     assert force.min() == pytest.approx(-load) and 0.1 < (force <= -load + 1e-9).mean() < 0.6
     march = CopiesMarch(vehicle, 20.0, road.step, 1)
     march.states = np.zeros((2 * len(vehicle.coordinates()), 1))  # the engines begin at rest in the design position

@@ -33,7 +33,7 @@ from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, _both_filters, half_track
 from models.systems.bicycle.run import assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels
-from models.systems.ride.watched import Spectral, few_speeds, static_loads
+from models.systems.ride.watched import Spectral, checked_speeds, static_loads
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import CARRIER
@@ -176,7 +176,7 @@ def test_a_car_stands_on_loads_that_balance_its_weight():
 
 
 def test_a_few_of_many_speeds_are_evenly_among_them():
-    assert few_speeds([30.5, 10.5, *np.linspace(11.5, 29.5, 19)]) == [10.5, 15.5, 20.5, 25.5, 30.5]
+    assert checked_speeds([30.5, 10.5, *np.linspace(11.5, 29.5, 19)]) == [10.5, 15.5, 20.5, 25.5, 30.5]
 
 
 @pytest.mark.grounds("plain counterpart")
@@ -186,8 +186,8 @@ def test_deviations_of_parts_are_those_of_outputs_that_ask_for_the_same():
     spectral = Spectral(CAR, lambda speed: linearise(CAR, speed), road, speeds, {"load fl": np.array([0.5, 0.75])})
     sweep = variance_sweep(lambda speed: linearise(CAR, speed), {"c": road}, speeds)
     for name, output in (("load fl", "tyre force front left"), ("travel rear right", "travel rear right")):
-        assert spectral.of(name).deviation == pytest.approx(sweep.of("c", output), rel=1e-9)
-    assert spectral.of("load fl").mean.tolist() == [0.5, 0.75]
+        assert spectral.motion_of_part(name).deviation == pytest.approx(sweep.of("c", output), rel=1e-9)
+    assert spectral.motion_of_part("load fl").mean.tolist() == [0.5, 0.75]
 
 
 def test_pressure_of_a_grid_falls_along_its_ellipse_and_sums_up_to_the_load():

@@ -21,7 +21,7 @@ from models.measured.timing import sample_timing
 from models.measured.units import factor_to_si
 from models.systems.measured.channel_map import find, mapped_signals
 from models.systems.measured.clock import ClockGrid, ClockGroup, _clock_finding, _clock_grid, file_shifts
-from models.systems.measured.holds import holds_of, noise_of
+from models.systems.measured.holds import noise_of, stabilisers_of_runs
 from models.systems.measured.plan import opened_files, signals_of_files
 from models.systems.measured.run import read_files
 from models.systems.measured.scene import Deviations, build
@@ -267,6 +267,6 @@ def test_deviations_of_a_hold_are_stated_or_estimated_or_at_least_those_of_trans
     stated = {"force": 12.5, "moment": 2.5, "angle": 0.25, "rate": 0.5}
     file = {"file": "a.csv", "channels": [mapped("fl", "fl")]}
     scene = scene_of(tmp_path, file, stabilise=stabilise, noise=stated)
-    free, held = holds_of(scene, recording).values()
+    free, held = stabilisers_of_runs(scene, recording).values()
     assert [vars(held)[key] for key in stabilise | stated] == [*stabilise.values(), *stated.values()]
     assert (free.method, {key: vars(free)[key] for key in stated}) == ("none", stated)

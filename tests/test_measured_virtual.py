@@ -19,8 +19,8 @@ from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as plane_run
 from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold
 from models.systems.measured.sections import SectionChannel
-from models.systems.measured.trust import Level, position, predicted_drift
-from models.systems.measured.verdict import Band, ChannelComparison, disagreement, uncertainty
+from models.systems.measured.trust import MeasurementErrors, position, predicted_drift
+from models.systems.measured.verdict import ChannelComparison, FrequencyBand, disagreement, uncertainty
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
 from models.systems.measured.virtual import check as check_virtual
 from models.systems.pitch_plane.run import run as simulate
@@ -176,7 +176,7 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     own, deviation = rigid_vehicle(car), np.tile([8.0] * 3 + [1.0] * 3, 4)
     bias = np.zeros(24)
     bias[2] = 5.0
-    level = Level(8.0, 1.0, bias, tilt=(0.01, 0.0), rate=(0.0, 0.02))
+    level = MeasurementErrors(8.0, 1.0, bias, tilt=(0.01, 0.0), rate=(0.0, 0.02))
     hub = predicted_drift(car, level, PERIOD, 8.0, "hub")
     law = own.angle_variance(deviation, PERIOD, hub.times[1:])
     assert np.abs(hub.deviations[200:] / np.sqrt(law[199:]) - 1).max() < 1e-3
@@ -190,7 +190,7 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     )  # cosh has become exp, products are small
     assert hub.passing_time(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
     assert hub.angle > space.angle and space.trusted_time < hub.trusted_time == 8.0
-    off = position(car, Level(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
+    off = position(car, MeasurementErrors(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
     assert np.allclose(off, [0.0, 9.81 * 0.01 * 2.0, 0.0])
 
 
@@ -209,7 +209,13 @@ def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehic
 def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
     answer = SectionChannel("a", "N", "")
     band = ChannelComparison(
-        _signal("a"), answer, 0.0, (Band(0.0, 9.0, 10.0, 3.0), Band(9.0, 99.0, 0.0, 4.0)), 0.0, {}, np.inf
+        _signal("a"),
+        answer,
+        0.0,
+        (FrequencyBand(0.0, 9.0, 10.0, 3.0), FrequencyBand(9.0, 99.0, 0.0, 4.0)),
+        0.0,
+        {},
+        np.inf,
     )
     assert disagreement(band) == pytest.approx(0.5)  # 5 of 10
     assert disagreement(band, 3.0) == pytest.approx(np.sqrt(16 / 91))

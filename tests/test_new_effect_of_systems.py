@@ -22,11 +22,11 @@ from models.core.scene_effects import (
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
-from models.systems.contact.cases_table import answer_table
+from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built, solved_contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
-from models.systems.handling.energy import unaccounted
+from models.systems.handling.energy import unaccounted_energy
 from models.systems.handling.run import drive_run
 from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
@@ -205,7 +205,7 @@ def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
         pushes=(Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))),)
     )
     drive = drive_run("mujoco", handling, 25.0, 0.5)
-    assert np.abs(unaccounted(drive)).max() < 1e-6
+    assert np.abs(unaccounted_energy(drive)).max() < 1e-6
     assert drive.path[-1, 1] > 0.04  # m, to the left
     with pytest.raises(InputError, match="no such body"):
         handling.changed(pushes=(Push("sail", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((0.0, 1.0),)),))
@@ -316,7 +316,7 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
         folder=tmp_path,
     )
     run_contact(scene, answers=tmp_path / "a.csv")
-    answer_table(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
+    solve_table(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
     assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
 
 

@@ -21,8 +21,8 @@ from models.own_model.car import vehicle_of_file
 from models.systems.braking import plan as braking_plan
 from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
-from models.systems.handling.energy import unaccounted
-from models.systems.handling.export import of_handling
+from models.systems.handling.energy import unaccounted_energy
+from models.systems.handling.export import export_handling
 from models.systems.handling.run import REFERENCE, build, drive_run
 from models.systems.ride.run import run as run_ride
 from models.tyre.magic_formula import table_of_surface
@@ -94,7 +94,7 @@ def test_it_drives_a_lane_change_in_both_engines(drives):
     assert np.abs(exudyn["fy"] - other["fy"]).max() < 1e-10 * np.abs(other["fy"]).max()
     assert np.abs(other["fy"]).max() > 1500.0
     assert np.ptp(other.path[:, 1]) > 0.5
-    assert np.abs(unaccounted(other)).max() < 1e-5 * np.ptp(other.ledger[:, 0])
+    assert np.abs(unaccounted_energy(other)).max() < 1e-5 * np.ptp(other.ledger[:, 0])
 
 
 def test_engines_accelerate_it_as_the_plain_equations_do(saloon, drives):
@@ -194,7 +194,7 @@ def test_what_is_no_car_of_a_scene_is_refused_by_name(tmp_path, fault):
 
 def exported(handling: Handling) -> str:
     """A car as ``twinrig export`` writes it, with the sites that its user adds."""
-    text = of_handling("mujoco", handling, ExportSubject("car", "car.toml", ""), []).text
+    text = export_handling("mujoco", handling, ExportSubject("car", "car.toml", ""), []).text
     for tyre in handling.given.tyres:
         cornering = next(side.stiffness for side in handling.given.side_forces if side.name == tyre.name)
         site = f'<site name="tyre {tyre.name}" user="{tyre.stiffness} {tyre.damping} {cornering}"/>'

@@ -12,7 +12,7 @@ from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.relaxation import DAMPING, Lag, lag_on, lagging_slip, longest_step
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad
 from models.systems.braking.procedures import vehicle_and_start
-from models.systems.braking.run import marched_by
+from models.systems.braking.run import vehicle_in_engine
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import stacked_tables
@@ -45,7 +45,7 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference")
     vehicle, start = vehicle_and_start(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))
-    return marched_by(vehicle, engine).run(AllApplied(4), start, duration)
+    return vehicle_in_engine(vehicle, engine).run(AllApplied(4), start, duration)
 
 
 def test_a_j_turn_with_lag_tends_to_the_one_without_and_mirrors():

@@ -134,7 +134,7 @@ def test_a_manoeuvre_begins_with_the_speed_the_steering_and_the_weight_of_its_ca
 
 def test_a_scene_of_handling_reads_controls_and_ratios_as_they_are_written():
     scene = turn(drive=[[0.0, 0.0], [0.01, 500.0]], front_drive=0.25)
-    given, controls = scene.given(), scene.manoeuvres["turn"].controls()
+    given, controls = scene.file_vehicle(), scene.manoeuvres["turn"].controls()
     front = {tyre.name for tyre in R19.tyres if tyre.axle == 0}
     for mine, files in zip(given.side_forces, R19.side_forces, strict=True):
         assert mine.stiffness == pytest.approx((1.25 if files.name in front else 0.75) * files.stiffness, rel=1e-12)

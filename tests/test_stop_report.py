@@ -26,19 +26,22 @@ def circle() -> Stop:
 def test_a_circle_to_the_left_has_its_signs_and_sizes(circle: Stop) -> None:
     """Chords are shorter than arcs by (v dt / R)^2 / 24 = 3e-9, changes of velocity by as little."""
     assert np.allclose(circle.side_slip, SLIP, rtol=1e-12)
-    assert np.allclose(circle.across, SPEED**2 / RADIUS, rtol=1e-7)
+    assert np.allclose(circle.lateral_acceleration, SPEED**2 / RADIUS, rtol=1e-7)
     assert circle.way == pytest.approx(SPEED * circle.times, rel=1e-8)
-    told = circle.of_vehicle()
+    told = circle.vehicle_results()
     assert told["stopping distance [m]"] == pytest.approx(2.0 * SPEED, rel=1e-8)
     assert told["final yaw [deg]"] == pytest.approx(np.degrees(2.0 * SPEED / RADIUS), rel=1e-12)
     assert told["largest lateral acceleration [m/s^2]"] == pytest.approx(SPEED**2 / RADIUS, rel=1e-7)
 
 
 def test_it_stays_on_its_circle(circle: Stop) -> None:
-    told = circle.in_turn(RADIUS)
+    told = circle.results_in_turn(RADIUS)
     assert told["yaw rate by that of the circle"] == pytest.approx(1.0, rel=1e-12)
     assert told["outside of the circle [m]"] == pytest.approx(0.0, abs=1e-9)
     assert told["side slip [deg]"] == pytest.approx(np.degrees(SLIP), rel=1e-9)
     x, y = RADIUS * np.sin(SPEED / RADIUS), RADIUS * (1.0 - np.cos(SPEED / RADIUS))
     inside = np.hypot(x, y - 61.0) - 61.0
-    assert circle.in_turn(RADIUS + 1.0)["outside of the circle [m]"] == pytest.approx(inside, rel=1e-9) and inside < 0.0
+    assert (
+        circle.results_in_turn(RADIUS + 1.0)["outside of the circle [m]"] == pytest.approx(inside, rel=1e-9)
+        and inside < 0.0
+    )

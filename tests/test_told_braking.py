@@ -118,7 +118,7 @@ def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
     finer = ice.model_copy(update={"run": ice.run.model_copy(update={"substeps": 64})})
     assert errors_of(run(cycling, error=True)) == {}
     monkeypatch.setattr(errors, "same_commands", lambda path, other: True)
-    monkeypatch.setattr(errors, "other_command_nearby", lambda *given: False)
+    monkeypatch.setattr(errors, "commands_change_nearby", lambda *given: False)
     told, truth = run(cycling, error=True), run(finer).detail
     true = abs(float(Stop(told.detail).way[-1] - Stop(truth).way[-1]))
     assert true > 10.0 * errors_of(told)["stopping distance"].error

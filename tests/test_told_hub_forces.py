@@ -10,7 +10,7 @@ from models.core.assumptions import assumption_sentences, broken_of, with_assump
 from models.core.discretisation import errors_of
 from models.core.systems import load
 from models.core.time_series import write_time_series
-from models.systems.braking.of_scene import table_of
+from models.systems.braking.of_scene import tyre_table_of
 from models.systems.braking.scene import build as build_braking
 from models.systems.hub_forces import run as module
 from models.systems.hub_forces.comparison import compare
@@ -172,7 +172,7 @@ def test_a_table_of_a_tyre_has_no_steps_and_says_where_it_ends(tmp_path):
     own = build_braking({**table, "road": {"stretches": [{"left": "ice"}]}}, "s.toml", tmp_path)
     results = read_tyre(own, (), tmp_path, lambda what, share: None)["results"]
     assert broken_of(results["ice"]) == [] and "a table has no steps" in told.message_lines(results)[0]
-    whole = table_of(own, "ice")
+    whole = tyre_table_of(own, "ice")
     short = whole.refined(whole.angles[:3], whole.slips, np.array([5e3, 2e4]))
     beyond = {one.name: one for one in broken_of(with_assumptions(results["ice"], of_table(short, 3e4)))}
     assert set(beyond) == {"slip angles in the table", "loads in the table"}

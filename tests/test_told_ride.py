@@ -102,8 +102,8 @@ def test_lift_off_and_longer_tables_take_the_assumptions_away():
     far = Curve((-99.0, 0.0, 99.0), (-99e3, 0.0, 99e3))
     springs = tuple(replace(spring, travel_force=None, rate_force=far) for spring in car.springs)
     for vehicle, engine in ((car, "mujoco"), (car, "exudyn"), (replace(car, springs=springs), "mujoco")):
-        assert "tyres press" not in names(nonlinear.in_engine(lifting, engine, vehicle, SHORT))
-    assert names(nonlinear.in_engine(lifting, "mujoco", replace(car, springs=springs), SHORT)) == set()
+        assert "tyres press" not in names(nonlinear.engine_result(lifting, engine, vehicle, SHORT))
+    assert names(nonlinear.engine_result(lifting, "mujoco", replace(car, springs=springs), SHORT)) == set()
     assert (
         names(run(scene("quarter_car_nonlinear", level=1e-6, study="ride_nonlinear"), "mujoco", sampling=SHORT))
         == set()

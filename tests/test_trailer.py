@@ -13,7 +13,7 @@ from models.engines.free_vehicle import free_model, native_elements_and_joints
 from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
-from models.systems.handling.energy import drive_energy, unaccounted
+from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.plan import describe
 from models.systems.handling.run import build as build_model
 from models.systems.handling.run import drive_run, driven_by, run
@@ -66,7 +66,7 @@ def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_ca
 
 def test_energy_is_accounted_for():
     drive = drive_run("mujoco", Handling(train(), controls=TURN_CONTROLS), 20.0, 0.04)
-    assert np.abs(unaccounted(drive)).max() < 1e-7 * drive_energy(drive)[0]
+    assert np.abs(unaccounted_energy(drive)).max() < 1e-7 * drive_energy(drive)[0]
 
 
 def test_wheels_of_a_trailer_are_not_driven_nor_steered_and_brake_with_those_behind_the_first_axle():

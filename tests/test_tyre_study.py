@@ -5,7 +5,7 @@ import json
 import pytest
 
 from models.core.errors import InputError
-from models.systems.braking.of_scene import braked_vehicle, table_of
+from models.systems.braking.of_scene import braked_vehicle, tyre_table_of
 from models.systems.braking.scene import build
 from models.tyre.tyre_file import tyre_table
 
@@ -23,7 +23,7 @@ def test_the_study_draws_a_tyre_and_writes_it_as_a_table_that_a_scene_takes(tmp_
     assert answer["slope [1/deg]"] == pytest.approx(0.162 * 28.4 * 1.48 * 0.0174533, rel=0.01)
     assert (tmp_path / "tyre.png").stat().st_size > 10_000
     again = tyre_table(tmp_path / "ice.csv").friction([0.0], [0.055], 2e4)[0][0, 0]
-    assert again == table_of(scene, "ice").friction([0.0], [0.055], 1e4)[0][0, 0]
+    assert again == tyre_table_of(scene, "ice").friction([0.0], [0.055], 1e4)[0][0, 0]
     mine = build(
         {
             **SCENE,
@@ -33,7 +33,7 @@ def test_the_study_draws_a_tyre_and_writes_it_as_a_table_that_a_scene_takes(tmp_
         "s.toml",
         tmp_path,
     )
-    assert table_of(mine, "mine").mu_x.max() == pytest.approx(0.086, abs=1e-4)
+    assert tyre_table_of(mine, "mine").mu_x.max() == pytest.approx(0.086, abs=1e-4)
 
 
 def test_rear_wheels_have_tyres_of_their_own_where_asked(tmp_path):
@@ -54,4 +54,4 @@ def test_rear_wheels_have_tyres_of_their_own_where_asked(tmp_path):
 def test_tyres_that_cannot_be_are_told(tmp_path, tyres, said):
     (tmp_path / "a.txt").write_text("x\n")
     with pytest.raises(InputError, match=said):
-        table_of(build({**SCENE, "tyres": tyres}, "s.toml", tmp_path), "ice")
+        tyre_table_of(build({**SCENE, "tyres": tyres}, "s.toml", tmp_path), "ice")

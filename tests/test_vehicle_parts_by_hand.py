@@ -132,5 +132,5 @@ def test_results_of_a_measured_drive_begin_at_the_time_of_its_file(tmp_path: Pat
     (tmp_path / "drive.csv").write_text(f"time [s],steer [rad],speed [m/s]\n{rows}\n")
     table = {"title": "t", "system": "handling", "manoeuvres": {"way": {"measured": "drive.csv"}}}
     scene = of_table(table, "s.toml", tmp_path)
-    assert scene.begins("way") == pytest.approx(5.25, rel=1e-12)
+    assert scene.start_time("way") == pytest.approx(5.25, rel=1e-12)
     assert (scene.manoeuvres["way"].speed, scene.manoeuvres["way"].duration) == pytest.approx((8.5, 2.0), rel=1e-9)

@@ -88,7 +88,7 @@ def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], byte
     system = system_with_weightings(
         vehicle_with_road(of_scene.linear_vehicle(vehicle, engine)(SPEED), road, SPEED), scene.weighting
     )
-    in_time = of_scene.goes_in_time(scene)
+    in_time = of_scene.needs_run_in_time(scene)
     counts = {
         "states": len(system.A),
         "preloads": int(vehicle.gravity > 0.0),

@@ -29,8 +29,8 @@ FRICTION_BY_LOAD = np.array([1.1, 1.0, 0.8])
 
 def load_dependent_tyre(surface_name: str) -> TyreTable:
     """Tyre table of a surface, changed so that friction falls with the load."""
-    tables_of = table_of_surface(surface_name)
-    spread = tables_of.refined(tables_of.angles, tables_of.slips, LOADS)
+    tyre_tables_of = table_of_surface(surface_name)
+    spread = tyre_tables_of.refined(tyre_tables_of.angles, tyre_tables_of.slips, LOADS)
     return replace(spread, mu_x=spread.mu_x * FRICTION_BY_LOAD[None, :, None], h=spread.h * FRICTION_BY_LOAD)
 
 

@@ -188,7 +188,7 @@ def _ice_rows() -> list[Row]:
         Stop(braked_vehicle(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
         for engine in ("mujoco", None)
     ]
-    distances = [stop.of_vehicle()["stopping distance [m]"] for stop in stops]
+    distances = [stop.vehicle_results()["stopping distance [m]"] for stop in stops]
     return [
         Observed(
             "braking_suspension.ice.locks",

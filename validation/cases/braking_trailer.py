@@ -116,7 +116,7 @@ def _slip_control_rows() -> list[Row]:
     controlled, locked = (
         Stop(vehicle.run(controller, speed)) for controller in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
     )
-    distances = [stop.of_vehicle()["stopping distance [m]"] for stop in (controlled, locked)]
+    distances = [stop.vehicle_results()["stopping distance [m]"] for stop in (controlled, locked)]
     return [
         Observed(
             "braking_trailer.ice.locks",

@@ -14,7 +14,7 @@ import numpy as np
 from models.contact.accuracy import BEST_CHOICES, remaining_errors, rolled
 from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
-from models.systems.contact.cases_table import answer_table
+from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
@@ -249,7 +249,7 @@ def _long_table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    answers = answer_table(path, out, partial(Built, MATERIAL_PAIR), Method())
+    answers = solve_table(path, out, partial(Built, MATERIAL_PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()

@@ -19,7 +19,13 @@ from models.ensemble.statistics import quantile_with_interval
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assembly_of_scene
-from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, GrowthCurve, interpolation, model_error_curve, noise
+from models.systems.pitch_plane.trust import (
+    UNTRUSTED_PITCH,
+    GrowthCurve,
+    interpolation_error_curve,
+    model_error_curve,
+    noise_error_curve,
+)
 from models.systems.pitch_plane.virtual_measurement import PAPER_FACTORS, perturbed_parameters
 from models.vehicles.pitch_plane import Parameters
 from validation.common.grounds import allowing_breaches
@@ -119,7 +125,7 @@ def _drift_by_noise(combination: Combination, folder: Path, path_count: int) -> 
     scene = force_scene(folder, duration=combination.duration, effects=effects)
     times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), path_count)["drift_off"]
     quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
-    return [noise(quiet, combination.noise_deviation).passing_time()], times.tolist()
+    return [noise_error_curve(quiet, combination.noise_deviation).passing_time()], times.tolist()
 
 
 def _drift_by_sampling(
@@ -137,7 +143,7 @@ def _drift_by_sampling(
         assembly = assembly_of_scene(
             force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
         )
-        predicted.append(interpolation(assembly).passing_time())
+        predicted.append(interpolation_error_curve(assembly).passing_time())
         measured.append(_drift_off_time(assembly, true))
     return predicted, measured
 

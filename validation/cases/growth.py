@@ -98,7 +98,7 @@ def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
     }
     if not quick:
         job = noise_paths(_noisy_scene(folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
-        off = run_paths(job, PATH_COUNT)["states"] - path_of(quiet).carry_errors(np.zeros((1, 8)))[0][at]
+        off = run_paths(job, PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
 

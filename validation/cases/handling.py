@@ -18,7 +18,7 @@ from models.machine.timing import interleave, median
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.energy import drive_energy, unaccounted
+from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.run import Drive, drive_run, driven_by
 from models.systems.handling.single_track import steady_turn
 from models.tyre.bristles import FIRST_FLEXIBILITY, brush_forces, net, tyre_forces
@@ -248,7 +248,7 @@ def _energy_rows() -> list[Row]:
             drive = drive_run(
                 "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
             )
-            gaps[name, step] = float(np.abs(unaccounted(drive)).max())
+            gaps[name, step] = float(np.abs(unaccounted_energy(drive)).max())
     start_energy = drive_energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
     return [

@@ -17,7 +17,7 @@ from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import FILTERED_RUN, Comparison, compare
 from models.systems.hub_forces.measurement import HubForces, hub_model, recorded_measurement, true_run, two_tracks
-from models.systems.hub_forces.run import with_angles
+from models.systems.hub_forces.run import inputs_with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
@@ -57,7 +57,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
         rows += [*_stabilised_rows(frame, comparison), _prescribed_angles_row(frame, comparison)]
-    return rows + _fault_rows(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
+    return rows + _fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
 
 
 def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
@@ -174,7 +174,7 @@ def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
     """Row: difference between the runs of all engines under the same noisy forces, without a stabiliser."""
     steps = round(duration / STEP)
     hub_inputs = static_forces(vehicle, steps + 1)
-    noisy = HubForces(hub_inputs.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
+    noisy = HubForces(hub_inputs.hubs, STEP, "hub").with_noise(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
     paths = [hub_model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
     return Observed(
         "hub_forces.engines_on_noise",
@@ -231,7 +231,7 @@ def _growth_rows(vehicle: CutVehicle) -> list[Row]:
     still = HubForces(rest.hubs, step, "hub")
     ends = np.array(
         [
-            hub_model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, NOISE_SECONDS).run().states[-1]
+            hub_model("mujoco", vehicle, still.with_noise(deviation, SEED, path), step, NOISE_SECONDS).run().states[-1]
             for path in range(PATH_COUNT)
         ]
     )
@@ -273,7 +273,7 @@ def _stabilised_rows(frame: str, comparison: Comparison) -> list[Row]:
             f"hub_forces.engines_{frame}",
             SYSTEM,
             f"largest difference between the engines before drift-off, noisy road run of 8 s, frame {frame!r}",
-            comparison.engines_apart(),
+            comparison.largest_engine_difference(),
             "m, rad, 1/s",
         ).at_most(1e-9, "same tableau, same step", "shared kernel"),
         *(
@@ -313,8 +313,8 @@ def _prescribed_angles_row(frame: str, comparison: Comparison) -> Row:
     """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
     measurement = comparison.measurement
     assert measurement.truth is not None
-    steps = measurement.scene.steps
-    hub_inputs = with_angles(
+    steps = measurement.scene.step_count
+    hub_inputs = inputs_with_angles(
         measurement.forces.hub_inputs(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP
     )
     run = build("mujoco", measurement.vehicle, hub_inputs, STEP, steps * STEP).run()

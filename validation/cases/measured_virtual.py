@@ -21,7 +21,7 @@ from models.systems.measured.run import read_files as read_files
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Sections
-from models.systems.measured.trust import Level, predicted_drift
+from models.systems.measured.trust import MeasurementErrors, predicted_drift
 from models.systems.measured.verdict import errors_of_run, judge, judge_beside_truth
 from models.systems.measured.virtual import (
     VirtualMeasurement,
@@ -257,7 +257,7 @@ def _other_run_rows(
             f"sample of noise: {judge_beside_truth(last_run, true_measurement, chain_test.hold).word}",
         ),
     ]
-    level = Level(NOISE_LEVELS["force"], NOISE_LEVELS["moment"])
+    level = MeasurementErrors(NOISE_LEVELS["force"], NOISE_LEVELS["moment"])
     until = predicted_drift(
         true_measurement.vehicle, level, recording.period, recording.duration, chain_test.frame
     ).trusted_time
@@ -286,9 +286,9 @@ def _trust_time_rows() -> list[Row]:
     bias = np.zeros(6 * len(vehicle.hubs))
     bias[2] = 3.0
     cases = (
-        ("noise", "inertial", 3.0, Level(8.0, 1.0)),
-        ("bias", "hub", 5.0, Level(20.0, 4.0, bias)),
-        ("tilt", "inertial", 1.6, Level(8.0, 1.0, tilt=(0.004, 0.0))),
+        ("noise", "inertial", 3.0, MeasurementErrors(8.0, 1.0)),
+        ("bias", "hub", 5.0, MeasurementErrors(20.0, 4.0, bias)),
+        ("tilt", "inertial", 1.6, MeasurementErrors(8.0, 1.0, tilt=(0.004, 0.0))),
     )
     for name, frame, duration, level in cases:
         virtual = read(
@@ -311,7 +311,9 @@ def _trust_time_rows() -> list[Row]:
     return rows
 
 
-def _drift_off_time(vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: Level, path: int) -> float:
+def _drift_off_time(
+    vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: MeasurementErrors, path: int
+) -> float:
     samples = true_measurement.run.wrenches.reshape(len(true_measurement.run.times), -1)
     forces = HubForces(
         samples + (0.0 if drift_level.bias is None else drift_level.bias),
@@ -324,7 +326,7 @@ def _drift_off_time(vehicle: CutVehicle, true_measurement: VirtualMeasurement, d
     run = hub_model(
         "mujoco",
         vehicle,
-        forces.noisy(deviation, SEED, path),
+        forces.with_noise(deviation, SEED, path),
         true_measurement.step,
         float(true_measurement.run.times[-1]),
         "smooth",
@@ -376,7 +378,7 @@ def _quick_rows(folder: Path) -> list[Row]:
     recording = recording_from_files(true, samples, proof.vehicle, "csv", folder / "quick")
     run = march(stabilised_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
     wrong = errors_of_run(run, true)
-    level = Level(8.0, 1.0)
+    level = MeasurementErrors(8.0, 1.0)
     law = rigid_vehicle(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
     deviations = predicted_drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
     return [

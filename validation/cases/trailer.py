@@ -7,7 +7,7 @@ import numpy as np
 
 from models.multibody.numbers import Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.energy import drive_energy, unaccounted
+from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.run import Drive, drive_run
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_row
@@ -97,7 +97,7 @@ def _energy_row() -> Row:
         "trailer.ledger",
         SYSTEM,
         "error of the energy balance of a turn with the caravan, relative to its total energy",
-        float(np.abs(unaccounted(drive)).max() / drive_energy(drive)[0]),
+        float(np.abs(unaccounted_energy(drive)).max() / drive_energy(drive)[0]),
         "",
     ).at_most(1e-7, "Simpson's rule over springs, dampers, tyres, drag, brakes and steering", "closed form")
 

@@ -132,7 +132,7 @@ def normalised_estimation_error(estimated: PitchEstimate, states: np.ndarray) ->
     """Normalised estimation error squared (NEES) of the six relative states, once a second from 2 s on."""
     rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
     wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE_STATES.T)[:, :, None]
-    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.errors()[rows, :6, :6], wrong))[:, 0, 0]
+    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.error_covariances()[rows, :6, :6], wrong))[:, 0, 0]
 
 
 def closed_loop_covariance(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
@@ -295,7 +295,7 @@ def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str,
     clean = true.states
     measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
     estimated = estimate(assembly, Measurement(measured_rate[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force)
-    p, sure = assembly.parameters, np.sqrt(estimated.errors()[:, PITCH, PITCH])
+    p, sure = assembly.parameters, np.sqrt(estimated.error_covariances()[:, PITCH, PITCH])
     inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
     growth = root_mean_square(true["pitch_rate"]) * np.sqrt(p.I / inertia)
     push = (force**2 * COARSE_PERIOD * (p.a**2 + p.b**2)) / inertia**2

@@ -101,7 +101,7 @@ def certain_start_error(engine: str, folder: Path) -> float:
     estimated = estimate(
         assembly, Measurement(measured_pitch, SAMPLE_PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0
     )
-    P = estimated.errors()
+    P = estimated.error_covariances()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
     values = np.linalg.eigvalsh(P / (scale[:, :, None] * scale[:, None, :]))
     if not np.isfinite(values).all() or values.min() < -1e-6:

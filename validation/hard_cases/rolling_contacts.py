@@ -29,7 +29,7 @@ from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULARISED_SPEED
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.handling.energy import drive_energy
-from models.systems.handling.run import Drive, build, drive_run, read_run
+from models.systems.handling.run import Drive, build, drive_of_fixed_steps, drive_run
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
 from validation.hard_cases.rolling import built_wheelset, displaced_state
@@ -127,7 +127,7 @@ def car_run(implementation: str, handling: Handling, speed: float, duration: flo
         return drive_run(implementation, handling, speed, duration, step)
     model, start = build("mujoco", handling), handling.straight(speed)
     states = march(lambda _, q, v: model.acceleration(0.0, q, v), *start, round(duration / step), step)
-    return read_run(handling, Trajectory(step * np.arange(len(states)), states))
+    return drive_of_fixed_steps(handling, Trajectory(step * np.arange(len(states)), states))
 
 
 def violates_friction(run: Drive) -> bool:

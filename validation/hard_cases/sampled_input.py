@@ -20,7 +20,7 @@ from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
 from models.road.signal import RoadUnderWheels
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.run import run_away
+from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
@@ -262,7 +262,7 @@ def _over_waves(engine: str, step: float, error: bool = False) -> Result:
     damped = {"parameters": "itwm_drift", "override": {"d1": 3000.0, "d2": 3000.0}}
     run = {"duration": 0.2, "step": 0.2 / math.ceil(0.2 / step - 1e-9)}
     road = {"road": {"source": "study", "speed": 560.0}}
-    return run_away(build_scene({"title": "", "vehicle": damped, "run": run, "effects": road}), engine, error)
+    return run_with_drift(build_scene({"title": "", "vehicle": damped, "run": run, "effects": road}), engine, error)
 
 
 def passed_waves_ratio(engine: str, folder: Path) -> float:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from models.contact.material import MaterialPair
 from models.ensemble.workers import process_pool
-from models.systems.contact.cases_table import answer_table
+from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from validation.common.peak_memory import peak_memory
@@ -47,7 +47,7 @@ def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
     returns the cost."""
     write_table(folder / "cases.csv", row_count)
     start_time = time.perf_counter()
-    counts = answer_table(
+    counts = solve_table(
         folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
     )
     if counts != {"rows": row_count, "wrong": 0}:

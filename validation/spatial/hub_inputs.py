@@ -80,7 +80,7 @@ def samples(vehicle: CutVehicle) -> HubForces:
     """Hub force samples in axes fixed in space: static loads, with noise of 400 N and 40 N m."""
     static_inputs = static_forces(vehicle, SAMPLE_COUNT, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
-    return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
+    return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").with_noise(deviations, SEED)
 
 
 def centre_of_mass_error(

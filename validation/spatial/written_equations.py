@@ -186,7 +186,7 @@ def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, r
         deviation = np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs))
         hub_inputs = (
             HubForces(static_forces(vehicle, steps + 1).hubs, STEP, "hub")
-            .noisy(deviation, SEED)
+            .with_noise(deviation, SEED)
             .hub_inputs(STEP, steps)
         )
     paths = [hub_model(name, vehicle, hub_inputs, STEP, duration).run().states for name in (engine, PLAIN_ENGINE)]

@@ -23,7 +23,7 @@ from models.advice.choice.variants import Variants, system_of
 from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import describe, paired_ratio
-from models.systems.ride.of_scene import goes_in_time
+from models.systems.ride.of_scene import needs_run_in_time
 
 MOST_PRICED_STEPS = 960
 """Number of steps of a run, at most, over which effects are priced."""
@@ -91,7 +91,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     """Price list of effects from runs of the scene, and of every variant with one effect more or one less. Raises
     InputError or RunFailed where the scene itself cannot be run.
     """
-    if scene.system == "ride" and not goes_in_time(scene):
+    if scene.system == "ride" and not needs_run_in_time(scene):
         from models.advice.price.effects_of_ride import price_list_of_ride
 
         return price_list_of_ride(scene)

@@ -20,7 +20,7 @@ from models.ride.nonlinear_copies import STEPS_PER_READING, CopiesMarch, settlin
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import BentSpring, statistically_linear
 from models.road.excitation import Excitation
-from models.systems.ride.of_scene import in_time_only
+from models.systems.ride.of_scene import has_no_linear_equivalent
 from models.systems.ride.omissions import effects_of, wheels_of
 from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
 from models.systems.ride.reduced_scene import reduced_without as without_effects
@@ -176,7 +176,7 @@ def in_time(scene: ReducedScene) -> CopiesInTime:
 
 def _check(scene: ReducedScene) -> None:
     ride = scene.ride
-    if ride.vehicle.small_motion or not in_time_only(scene.vehicle):
+    if ride.vehicle.small_motion or not has_no_linear_equivalent(scene.vehicle):
         raise InputError(ride.file, "vehicle.file", ride.vehicle.file, "is linear, and has a closed form")
     if ride.speeds is None:
         raise InputError(ride.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
@@ -221,7 +221,7 @@ def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]
     return replace(
         scene.vehicle,
         springs=tuple(
-            _linearised_spring(s, scene.straight, motion_of_spring) for s in springs if s.name not in scene.rigid
+            _linearised_spring(s, scene.linearised_laws, motion_of_spring) for s in springs if s.name not in scene.rigid
         ),
         bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda any_body: any_body.name in seats)),
     )

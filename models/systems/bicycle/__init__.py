@@ -1,4 +1,5 @@
-"""A bicycle with a rigid rider, hands off: Whipple's, on tyres in engines, rolling ideally in the reference.
+"""A bicycle with a rigid rider, hands off the handlebar (Whipple bicycle). It rides on tyres in the engines, and rolls
+without slip in the reference.
 
 Axes of ISO 8855: x forward, y left, z up; lean to the right and steer to the left are positive. Parameters and linear
 equations keep to the paper's axes, z down and steer to the right (``models.bicycle.whipple``).
@@ -6,4 +7,6 @@ equations keep to the paper's axes, z down and steer to the right (``models.bicy
 
 ENGINES = ("exudyn", "mujoco")
 ON_REQUEST = ("reference",)
-"""Plain equations with ideal rolling, the limit of stiff tyres; a second for every second of motion."""
+"""Engines that run only where the user names them: the reference, with equations of rolling without slip, the limit of
+stiff tyres. It computes for a second for every second of motion.
+"""

@@ -13,7 +13,7 @@ def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
     check_effects(scene)
     if set(engines) != {REFERENCE}:
         try:
-            scene.rolling()
+            scene.bicycle_on_tyres()
         except InputError as error:
             raise InputError(error.file or scene.bicycle.parameters, error.place, error.value, error.allowed) from None
     scene.whipple.eigenvalues(scene.run.speed, scene.control)
@@ -31,9 +31,9 @@ def _stability_text(scene: BicycleScene) -> str:
 
 
 def describe(scene: BicycleScene) -> str:
-    """The scene's plan as text."""
+    """Returns the plan of a bicycle scene as text: bicycle, stability, run, tyres, engines, effects, assumptions."""
     bicycle, run, speeds, tyres = scene.whipple, scene.run, scene.speeds, scene.tyres
-    rear, front = scene.rolling().loads()
+    rear, front = scene.bicycle_on_tyres().loads()
     critical = {"weave": bicycle.weave_speed, "capsize": bicycle.capsize_speed}
     speed_texts = ", ".join(f"{name} {'none' if v is None else f'{v:.6g} m/s'}" for name, v in critical.items())
     rows = {

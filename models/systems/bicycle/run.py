@@ -1,4 +1,6 @@
-"""A bicycle in an engine or with ideal rolling: motion, tyre forces, energy ledger; and its linearised motion."""
+"""Runs of a bicycle on tyres in an engine, or rolling without slip: motion, tyre forces, energy and work; and
+eigenvalues of the motion linearised in an engine.
+"""
 
 import time
 
@@ -20,27 +22,33 @@ from models.systems.bicycle.scene import BicycleScene
 REFERENCE = "reference"
 COORDINATES = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
 COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
-"""Channels in the order of ``models.bicycle.four_bodies``; each with its rate, whose name ends in _rate."""
+"""Channels of the bicycle's coordinates with their units, in the order of ``models.bicycle.four_bodies``. Each has a
+second channel for its rate, whose name ends in _rate.
+"""
 LATERAL_COORDINATES = [Y, YAW, LEAN, STEER]
 LINEARISATION_STEP = 1e-7
-"""m, rad and per s by which states are moved to linearise: stiff bristles begin to slide at more."""
+"""Displacement (m, rad, m/s, rad/s) of a state in the central differences that linearise. With a larger one the stiff
+bristles of the tyres begin to slide.
+"""
 CHANNELS_WITH_ERROR = ("lean", "steer", "yaw")
-"""Channels whose error is told."""
+"""Channels whose discretisation error is stated in the result."""
 UNACCOUNTED_ENERGY_SHARE = 1e-3
-"""Share of the energy that a run may leave unaccounted for: below 0.1 m/s tyres are stiff, and long steps wander."""
-ROWS_APART = 0.01
-"""s between rows, at most."""
-LARGEST_LEAN = 1.0
-"""rad: beyond, the frame or the pedals touch the ground."""
+"""Largest share of the energy that a run may leave unaccounted for. Below 0.1 m/s the equations of the tyres are stiff,
+and long steps lose more.
+"""
+LARGEST_ROW_SPACING = 0.01
+"""Largest time (s) between recorded rows."""
+LEAN_AT_GROUND_CONTACT = 1.0
+"""Lean angle (rad) beyond which the frame or the pedals touch the ground."""
 
 
 def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
-    """The scene's run in "exudyn", "mujoco" or "reference"; its detail is the ``Ride``. Raises RunFailed.
+    """Run a bicycle scene in "exudyn", "mujoco" or "reference"; the result's detail is the ``Ride``. Raises RunFailed.
 
-    error : whether the error of the steps is estimated, by further runs in longer steps.
+    error : whether the error of the time steps is estimated, by further runs in longer steps.
     """
     start_time = time.process_time()
-    ride = ride_with_ideal_rolling(scene) if engine == REFERENCE else ride_on_tyres(scene, engine, scene.run.step)
+    ride = run_with_ideal_rolling(scene) if engine == REFERENCE else run_on_tyres(scene, engine, scene.run.step)
     seconds = time.process_time() - start_time
     channels = dict[str, Channel]()
     for i, (name, unit) in enumerate(COORDINATES.items()):
@@ -67,7 +75,7 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
 
 
 def assumptions(scene: BicycleScene) -> list[Assumption]:
-    """Assumptions of a run, with the limits within which they hold."""
+    """Assumption of a bicycle run that only the wheels touch the ground, with its limits of the lean angle (rad)."""
     return [
         Assumption(
             "upright",
@@ -75,19 +83,19 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
             "start with a smaller lean rate, or nearer the speeds at which the bicycle steadies itself",
             lambda run: {"bicycle": run["lean"]},
             "rad",
-            -LARGEST_LEAN,
-            LARGEST_LEAN,
+            -LEAN_AT_GROUND_CONTACT,
+            LEAN_AT_GROUND_CONTACT,
         )
     ]
 
 
-def ride_on_tyres(
+def run_on_tyres(
     scene: BicycleScene, engine: str, step: float, duration: float | None = None, stride: int | None = None
 ) -> Ride:
-    """Run the bicycle on its tyres in an engine with a step (s). The work counts all steps; recorded rows are
-    ``stride`` steps apart, or if that is not given at most ROWS_APART (s), the last one at the run's end.
+    """Run the bicycle on its tyres in an engine with a step (s). The work is summed over all steps. Recorded rows are
+    ``stride`` steps apart, by default at most LARGEST_ROW_SPACING (s); the last row is the end of the run.
     """
-    rolling, run = scene.rolling(), scene.run
+    rolling, run = scene.bicycle_on_tyres(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
     path = model.run(*straight_rolling(rolling.bicycle, run.speed, run.lean_rate))
     fallen = np.abs(path.positions[:, LEAN]) > FALLEN_LEAN
@@ -95,12 +103,18 @@ def ride_on_tyres(
         raise RunFailed(engine, "the bicycle has fallen over", float(path.times[np.argmax(fallen)]))
     tyres, ledger = rolling.report(path.positions, path.rates)
     work = cumulative_simpson(ledger[:, DISSIPATED] + ledger[:, STEER_POWER], x=path.times, initial=0.0)
-    steps = len(path.times) - 1
-    kept_rows = slice(None, None, stride or _steps_between_rows(steps, step))
+    step_count = len(path.times) - 1
+    kept_rows = slice(None, None, stride or _steps_between_rows(step_count, step))
     plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept_rows], path.rates[kept_rows]
     motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
     ride = Ride(
-        path.times[kept_rows], q, v, motion + ledger[kept_rows, POTENTIAL], work[kept_rows], steps, tyres[kept_rows]
+        path.times[kept_rows],
+        q,
+        v,
+        motion + ledger[kept_rows, POTENTIAL],
+        work[kept_rows],
+        step_count,
+        tyres[kept_rows],
     )
     if not ride.unaccounted() < UNACCOUNTED_ENERGY_SHARE:
         why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
@@ -108,24 +122,26 @@ def ride_on_tyres(
     return ride
 
 
-def _steps_between_rows(steps: int, step: float) -> int:
-    """Largest number of steps (s) between rows that are at most ROWS_APART (s) and a twentieth of the run apart, and
-    end with the run.
+def _steps_between_rows(step_count: int, step: float) -> int:
+    """Returns the largest number of steps between recorded rows such that rows are at most LARGEST_ROW_SPACING (s) and
+    a twentieth of the run apart, and the last row is the end of the run.
+
+    step_count : number of steps of the run; step : their length (s).
     """
-    most_steps = max(1, min(int(ROWS_APART / step * (1.0 + 1e-9)), steps // 20))
-    return next(stride for stride in range(most_steps, 0, -1) if steps % stride == 0)
+    most_steps = max(1, min(int(LARGEST_ROW_SPACING / step * (1.0 + 1e-9)), step_count // 20))
+    return next(stride for stride in range(most_steps, 0, -1) if step_count % stride == 0)
 
 
-def ride_with_ideal_rolling(scene: BicycleScene) -> Ride:
-    """Run the bicycle with ideal rolling, which is without slip; rows of the result are ROWS_APART (s) apart."""
-    rolling, run = scene.rolling(), scene.run
+def run_with_ideal_rolling(scene: BicycleScene) -> Ride:
+    """Run the bicycle with wheels that roll without slip; recorded rows are about LARGEST_ROW_SPACING (s) apart."""
+    rolling, run = scene.bicycle_on_tyres(), scene.run
     bicycle = IdealBicycle(rolling.bicycle, rolling.control)
-    rows = max(3, round(run.duration / ROWS_APART) + 1)
+    rows = max(3, round(run.duration / LARGEST_ROW_SPACING) + 1)
     return bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
 
 
 def _with_step_error(run: Result, scene: BicycleScene) -> Result:
-    """The result with the error that its finite time steps cause, estimated by runs in longer steps."""
+    """Returns the result with the error that its finite time steps cause, estimated by runs in longer steps."""
     ride, engine, duration = run.detail, run.data.attrs["engine"], scene.run.duration
     stride = _steps_between_rows(
         ride.steps, scene.run.step
@@ -137,19 +153,19 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
 
     def rerun(factor: float, share: float) -> Series:
         step = factor * scene.run.step
-        steps = int(share * duration / step * (1.0 + 1e-9))
-        if factor > 1.0 and steps < 2 * stride:
+        step_count = int(share * duration / step * (1.0 + 1e-9))
+        if factor > 1.0 and step_count < 2 * stride:
             raise RunFailed(engine, f"steps of {step:g} s are too long for {share * duration:g} s")
-        steps = max(steps, 2 * stride)
-        return series(ride_on_tyres(scene, engine, step, steps * step, stride))
+        step_count = max(step_count, 2 * stride)
+        return series(run_on_tyres(scene, engine, step, step_count * step, stride))
 
     estimates, method_text = step_errors(series(ride), rerun, 4.0, scene.run.step)
     return with_stated_errors(run, estimates, method_text)
 
 
 def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
-    """State matrix (8, 8) of an engine's model, linearised about straight rolling at a speed (m/s). The state holds
-    lateral position, yaw, lean and steer, then their rates.
+    """State matrix (8, 8) of an engine's model, linearised about straight upright rolling at a speed (m/s). The state
+    is lateral position (m), yaw, lean and steer (rad), then their rates.
     """
     q, v = straight_rolling(rolling.bicycle, speed)
     matrix = np.eye(8, 8, 4)
@@ -164,11 +180,11 @@ def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> n
 
 
 def engine_eigenvalues(engine: str, rolling: RollingBicycle, speed: float) -> np.ndarray:
-    """Four eigenvalues (1/s) of the bicycle on its tyres in an engine. Each is the one nearest to an eigenvalue of the
-    linear equations, in the order of these.
+    """Eigenvalues (4,) in 1/s of the bicycle on its tyres in an engine: the nearest to each eigenvalue of the linear
+    (Whipple) equations, in the same order.
 
-    The other four are left out: two decay far faster and belong to the tyres, and position and yaw give a double
-    zero.
+    The other four eigenvalues are not returned. Two of them belong to the tyres and decay far faster; lateral position
+    and yaw give a double zero.
     """
     values = np.linalg.eigvals(lateral_matrix(free_model(engine, rolling.driven), rolling, speed))
     kept_rows = np.sort(np.argsort(np.abs(values))[2:])  # without the double zero

@@ -1,4 +1,6 @@
-"""Scenes of a bicycle: its parameters, tyres, control, the speeds of its eigenvalues, and one run from upright."""
+"""Scenes of a bicycle: parameters, tyres, control, speeds at which eigenvalues are computed, and one run that begins
+upright.
+"""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -15,18 +17,18 @@ from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Strict, quantity
 
-FASTEST_LEAN = 3.0
-"""rad/s: beyond, a bicycle lies on the ground before it steers."""
+LARGEST_LEAN_RATE = 3.0
+"""Largest lean rate (rad/s) at the start of a run. With a higher rate a bicycle lies on the ground before it steers."""
 
 
 class BicycleTable(Strict):
-    """[bicycle]: a parameter set or the user's own file."""
+    """[bicycle]: the bicycle's parameters, by the name of a parameter set or of the user's file."""
 
     parameters: str = Field(default="benchmark", description="a parameter set, or a TOML file with every parameter")
 
 
 class RunTable(Strict):
-    """[run]: straight and upright, with a lean rate."""
+    """[run]: a run that begins straight ahead and upright, with a lean rate."""
 
     speed: float = quantity("m/s", "speed at the start, backwards below 0", default=4.6, signed=True)
     lean_rate: float = quantity("rad/s", "lean rate at the start, to the right", default=0.5, signed=True)
@@ -35,7 +37,7 @@ class RunTable(Strict):
 
 
 class SpeedsTable(Strict):
-    """[speeds]: those of the eigenvalues, from start to stop."""
+    """[speeds]: forward speeds at which eigenvalues are computed, evenly spaced from start to stop."""
 
     start: float = quantity("m/s", "first speed", default=0.0, signed=True)
     stop: float = quantity("m/s", "last speed", default=10.0, signed=True)
@@ -43,7 +45,7 @@ class SpeedsTable(Strict):
 
 
 class BicycleScene(SceneFile):
-    """One scene of a bicycle."""
+    """A scene of a bicycle: all tables of its scene file."""
 
     system: Literal["bicycle"] = "bicycle"
     study: str = Field(default="bicycle", description="the study that runs the scene")
@@ -59,18 +61,20 @@ class BicycleScene(SceneFile):
         """Parameters of the bicycle for the linear (Whipple) equations."""
         return load_bicycle(self.bicycle.parameters, self.folder, self.file, "bicycle.parameters")
 
-    def rolling(self) -> RollingBicycle:
-        """The bicycle on its tyres with the scene's control and effects."""
+    def bicycle_on_tyres(self) -> RollingBicycle:
+        """Returns the bicycle on its tyres with the scene's control and effects."""
         return extended_by_effects(RollingBicycle(self.whipple, self.tyres, self.control), self)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BicycleScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked bicycle scene from the nested tables of a scene file. Raises InputError for unknown keys and for
+    values outside their ranges.
+    """
     scene = checked(BicycleScene, table, file, folder)
     run, speeds = scene.run, scene.speeds
     for key_path, value, largest, unit in (
         ("run.speed", run.speed, HIGHEST_SPEED, "m/s"),
-        ("run.lean_rate", run.lean_rate, FASTEST_LEAN, "rad/s"),
+        ("run.lean_rate", run.lean_rate, LARGEST_LEAN_RATE, "rad/s"),
         ("speeds.start", speeds.start, HIGHEST_SPEED, "m/s"),
         ("speeds.stop", speeds.stop, HIGHEST_SPEED, "m/s"),
     ):

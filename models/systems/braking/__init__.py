@@ -1,3 +1,3 @@
-"""A braked vehicle with a controller in the loop, in test procedures."""
+"""Braking of a vehicle with an anti-lock controller in the loop, in test procedures."""
 
 ENGINES = ("reference", "exudyn", "mujoco")

@@ -1,7 +1,8 @@
-"""Adhesion utilisation measured as test engineers do it: first k of each axle braked alone, then z with the system on.
+"""Adhesion utilisation of an anti-lock system, measured as in a road test: adhesion k of each axle braked alone, then
+braking rate z with the anti-lock system.
 
-The procedure of UN R13, Annex 13, appendix 2, in a simulation that repeats exactly; not checked against the text of the
-regulation.
+The procedure is that of UN R13, Annex 13, appendix 2, in a simulation that repeats exactly; not checked against the
+text of the regulation.
 """
 
 from dataclasses import astuple, dataclass
@@ -33,11 +34,11 @@ from models.systems.braking.stop_report import Stop
 
 AXLE_NAMES = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
 PRESSURE_HALVINGS = 9
-"""Of the interval in which the pressure lies at which an axle locks: 1/500 of the supply pressure."""
+"""Halvings of the interval that contains the pressure at which an axle locks, to 1/500 of the supply pressure."""
 LONGEST_RUN = 120.0
-"""s: for which a run that measures adhesion may last, however long those of the scene are."""
-BELOW_LOCK = (1.0, 0.98, 0.96)
-"""Pressures of the three runs, by the largest that does not lock."""
+"""Longest duration (s) of a run that measures adhesion, in place of the scene's duration."""
+PRESSURE_SHARES_BELOW_LOCK = (1.0, 0.98, 0.96)
+"""Pressures of the three runs that measure k, divided by the largest pressure at which no wheel locks."""
 
 
 class NoAdhesion(RunFailed):
@@ -49,8 +50,8 @@ class NoAdhesion(RunFailed):
 
 @dataclass(frozen=True)
 class Adhesion:
-    """Adhesion coefficients k on one surface: of the front axle, of the rear axle, and of the trailer's axles if there
-    is one.
+    """Adhesion coefficients k on a surface: of the front axle, of the rear axle, and of the trailer's axles if there
+    are any.
     """
 
     front: float
@@ -59,8 +60,9 @@ class Adhesion:
 
 
 @dataclass(frozen=True)
-class Utilised:
-    """Braking rate z with the anti-lock system on, adhesion k_M of the vehicle, and their ratio epsilon = z / k_M.
+class AdhesionUtilisation:
+    """Braking rate z (deceleration divided by g) with the anti-lock system, adhesion k_M of the vehicle, and their
+    ratio epsilon = z / k_M.
 
     With a trailer all three are those of the train.
     """
@@ -71,14 +73,14 @@ class Utilised:
 
     @property
     def epsilon(self) -> float:
-        """Adhesion utilisation by the anti-lock system. Category 1 requires at least 0.75; above 1, k must be measured
-        again.
+        """Adhesion utilisation by the anti-lock system, z / k_M. Category 1 requires at least 0.75; above 1, k must be
+        measured again.
         """
         return self.z / self.k_vehicle
 
 
-def axles(scene: BrakingScene) -> Axles:
-    """Axle loads, wheelbase and height of the centre of mass of the scene's vehicle."""
+def axle_geometry(scene: BrakingScene) -> Axles:
+    """Axle loads (N), wheelbase (m) and height of the centre of mass (m) of the scene's vehicle."""
     truck = vehicle_of(scene)
     weight = truck.mass * GRAVITY
     front = weight * -truck.rear.x / truck.wheelbase
@@ -86,41 +88,43 @@ def axles(scene: BrakingScene) -> Axles:
 
 
 def trailer_loads(vehicle: BrakedVehicle, z: float) -> np.ndarray:
-    """Loads (2,) in N of the trailer's axles at a deceleration z g; (0,) without one."""
+    """Loads (2,) in N of the trailer's axles at a deceleration z g; shape (0,) without a trailer."""
     loads = vehicle.plane.static - vehicle.plane.by_x * z * GRAVITY
     return loads[4:].reshape(-1, 2).sum(axis=1)
 
 
 def vehicle_on_one_surface(scene: BrakingScene, surface: str, **changes: Any) -> BrakedVehicle:
-    """The scene's vehicle on the same surface everywhere; ``changes`` replace values of the scene, for example its
-    trailer.
+    """Returns the scene's vehicle on a road of a single surface; ``changes`` replace values of the scene, for example
+    its trailer.
     """
     road = RoadTable(stretches=[Stretch(left=surface)])
     return braked_vehicle(scene.model_copy(update={"road": road, **changes}), Procedure())
 
 
 def measured_adhesion(scene: BrakingScene, surface: str) -> Adhesion:
-    """Adhesion k of both axles on a surface: each axle is braked alone from 50 km/h without locking. Raises
+    """Measure the adhesion k of every axle on a surface: each axle is braked alone from 50 km/h without locking. Raises
     NoAdhesion.
     """
-    vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axles(scene)
+    vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axle_geometry(scene)
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         raise NoAdhesion("axles are braked without trailer: name a vehicle.file whose vehicle tows nothing")
     front, rear = (
-        adhesion_front(_braking_rate(scene, vehicle, 0), lengths),
-        adhesion_rear(_braking_rate(scene, vehicle, 1), lengths),
+        adhesion_front(_single_axle_braking_rate(scene, vehicle, 0), lengths),
+        adhesion_rear(_single_axle_braking_rate(scene, vehicle, 1), lengths),
     )
     if scene.trailer is None:
         return Adhesion(front, rear)
     train = vehicle_on_one_surface(scene, surface)
-    rates, weight = [_braking_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
+    rates, weight = [_single_axle_braking_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
     trailer = (adhesion_trailer(z, weight, float(trailer_loads(train, z)[i])) for i, z in enumerate(rates))
     return Adhesion(front, rear, tuple(trailer))
 
 
-def _by_system(scene: BrakingScene, name: str, vehicle: BrakedVehicle, speeds: tuple[float, float, float]) -> float:
-    """Braking rate z between the last two of three speeds (km/h), braked from the first one. The scene's controller
-    brakes, or what is connected to its port, which writes no log.
+def _controlled_braking_rate(
+    scene: BrakingScene, name: str, vehicle: BrakedVehicle, speeds: tuple[float, float, float]
+) -> float:
+    """Braking rate z with the scene's controller, or with what is connected to its port. ``speeds`` (km/h) : at which
+    braking begins, and between which z is measured.
     """
     port = None if scene.port is None else scene.port.model_copy(update={"log": None})
     lasting = scene.model_copy(update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST_RUN})})
@@ -129,8 +133,8 @@ def _by_system(scene: BrakingScene, name: str, vehicle: BrakedVehicle, speeds: t
     return braking_rate(high * METRES_PER_SECOND_OF_KMH, low * METRES_PER_SECOND_OF_KMH, _slowing_time(path, high, low))
 
 
-def _braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle: int) -> float:
-    """Braking rate z with one axle braked, from the mean time of the fastest runs between 40 and 20 km/h."""
+def _single_axle_braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle: int) -> float:
+    """Braking rate z with a single braked axle, from the mean time of the fastest runs between 40 and 20 km/h."""
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
 
     def run(pressure: float) -> BrakingPath:
@@ -142,7 +146,7 @@ def _braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle: int) -> flo
     for _ in range(PRESSURE_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _wheel_locks(run(middle)) else (middle, high)
-    braking_times = [_slowing_time(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
+    braking_times = [_slowing_time(run(share * low), 40.0, 20.0) for share in PRESSURE_SHARES_BELOW_LOCK]
     if not np.isfinite(braking_times).any():
         raise NoAdhesion(f"the {AXLE_NAMES[axle]} alone does not slow the vehicle down to 20 km/h")
     return braking_rate(
@@ -157,30 +161,34 @@ def _wheel_locks(path: BrakingPath) -> bool:
 
 
 def _slowing_time(path: BrakingPath, high: float, low: float) -> float:
-    """Time (s) in which the vehicle slows from one speed to another (km/h); not a number if it never reaches the
-    second.
-    """
+    """Time (s) in which the vehicle slows from ``high`` to ``low`` (km/h); NaN if it never reaches ``low``."""
     stop = Stop(path)
     return crossing_time(stop.times, stop.speed, low * METRES_PER_SECOND_OF_KMH) - crossing_time(
         stop.times, stop.speed, high * METRES_PER_SECOND_OF_KMH
     )
 
 
-def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion") -> Utilised:
-    """Adhesion utilisation epsilon of the scene's anti-lock system on a surface. z is measured from 45 to 15 km/h after
-    braking from 55 km/h; ``name`` is the name of the run at the port.
+def utilisation(
+    scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion"
+) -> AdhesionUtilisation:
+    """Measure the adhesion utilisation epsilon of the scene's anti-lock system on a surface. z is measured from 45 to
+    15 km/h after braking from 55 km/h.
+
+    k : adhesion of the axles, measured if None; name : of the run at the port.
     """
-    lengths, k = axles(scene), k or measured_adhesion(scene, surface)
+    lengths, k = axle_geometry(scene), k or measured_adhesion(scene, surface)
     train = vehicle_on_one_surface(scene, surface)
-    z = _by_system(scene, name, train, (55.0, 45.0, 15.0))
+    z = _controlled_braking_rate(scene, name, train, (55.0, 45.0, 15.0))
     loads = np.concatenate(([lengths.weight], trailer_loads(train, z)))
     axle_adhesions = np.array([adhesion_of_vehicle(z, k.front, k.rear, lengths), *k.trailer])
-    return Utilised(z, k, float(axle_adhesions @ loads / loads.sum()))
+    return AdhesionUtilisation(z, k, float(axle_adhesions @ loads / loads.sum()))
 
 
 @dataclass(frozen=True)
-class Split:
-    """Braking rate z on split friction and the required one: at least the larger of 0.75 (4 k_L + k_H)/5 and k_L."""
+class SplitAdhesion:
+    """Braking rate z on split friction, and adhesion of the vehicle on the surface of lower (k_L) and higher (k_H)
+    friction. The required z is the larger of 0.75 (4 k_L + k_H) / 5 and k_L.
+    """
 
     z: float
     k_low: float
@@ -188,34 +196,37 @@ class Split:
 
     @property
     def required_braking_rate(self) -> float:
-        """Smallest braking rate z that the regulation requires."""
+        """Smallest braking rate z on split friction that the regulation requires."""
         return split_rate(self.k_low, self.k_high)
 
 
-def split_adhesion(scene: BrakingScene, name: str) -> Split:
-    """Braking rate z of a split procedure, braked from 50 km/h and measured between 40 and 20 km/h. The adhesion k_M of
-    the vehicle is that on each of the two surfaces of the first stretch.
+def split_adhesion(scene: BrakingScene, name: str) -> SplitAdhesion:
+    """Measure the braking rate z of a split procedure, braked from 50 km/h, between 40 and 20 km/h, and the vehicle's
+    adhesion on each of the two surfaces of the first stretch.
     """
     procedure, scene_without_trailer = scene.procedures[name], scene.model_copy(update={"trailer": None})
     adhesions = [
         measured_adhesion(scene_without_trailer, surface)
         for surface in surfaces_of_stretch(procedure, scene.road.stretches[0])
     ]
-    z = _by_system(scene_without_trailer, name, braked_vehicle(scene_without_trailer, procedure), (50.0, 40.0, 20.0))
-    return Split(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axles(scene)) for k in adhesions))
+    z = _controlled_braking_rate(
+        scene_without_trailer, name, braked_vehicle(scene_without_trailer, procedure), (50.0, 40.0, 20.0)
+    )
+    return SplitAdhesion(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axle_geometry(scene)) for k in adhesions))
 
 
 def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
-    """Figures of merit of a procedure, by name and unit; none where they have no meaning.
+    """Figures of merit of a procedure, by name and unit: response in a turn or J-turn, adhesion utilisation of straight
+    braking. Empty where they have no meaning.
 
-    Figures that need further runs are left out where a client that connects once, or a log, is behind the port, and
-    where the pressures were measured.
+    Figures that need further runs are left out where the port has a client that connects once or a log, and where the
+    pressures were measured.
     """
     procedure, port = scene.procedures[name], scene.port
     if procedure.radius is not None:
         if stop.times[-1] < 1.0:
             return {}
-        return {f"after 1 s: {key}": value for key, value in stop.in_turn(procedure.radius).items()}
+        return {f"after 1 s: {key}": value for key, value in stop.results_in_turn(procedure.radius).items()}
     if procedure.kind == "j_turn":
         response = step_steer(scene, name)
         time, overshoot, steady = (np.nan,) * 3 if response is None else astuple(response)

@@ -1,6 +1,6 @@
-"""Assumptions of a braked vehicle on its road.
+"""Assumptions of a braked vehicle on its road, with the limits that decide whether a run breaks them.
 
-Limits without a source are chosen: where what is left out would change a stopping distance by some per cent.
+Limits without a source are chosen such that a neglected effect would change a stopping distance by some per cent.
 """
 
 import math
@@ -14,53 +14,60 @@ from models.brake.plane_vehicle import GRAVITY, Truck
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.systems.braking.march import BrakedVehicle
-from models.systems.braking.of_scene import measured_of, tables_of, vehicle_of
+from models.systems.braking.of_scene import measured_pressures_of, tyre_tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, Stop, wheel_names
 
 WITHOUT_VALVES = ("none", "slip_pi")
-"""Controllers that never switch valves to and fro."""
+"""Controllers that never switch valves on and off."""
 LEAST_WHEEL_LOAD = 1.0
-"""N: a wheel that bears less has left the road."""
+"""Wheel load (N) below which a wheel has left the road."""
 LARGEST_LOAD_TRANSFER = 0.3
-"""Of the load of a wheel at rest: by more, another axle locks first."""
+"""Largest load transfer divided by a wheel's load at rest: with more, another axle locks first."""
 LARGEST_PARALLEL_STEER = 0.25
-"""rad: inner and outer wheel of a truck are steered apart by 2 deg there, a third of the slip angle of most grip."""
+"""Largest steer angle (rad) at which both front wheels may be steered alike. Inner and outer wheel of a truck differ by
+2 deg there, a third of the slip angle of most grip.
+"""
 LARGEST_HINGE_ANGLE = 1.0
-"""rad: at 57 deg the corners of truck and trailer, or the drawbar and the frame, are usually in contact."""
+"""Largest hinge angle (rad) of a train: at 57 deg the corners of truck and trailer, or drawbar and frame, usually
+touch.
+"""
 HOOK_HEIGHT, LIFTED_LOAD_SHARE = 0.9, 0.1
-"""m, height of a usual hook above the ground; share of an axle's load that its force may move."""
+"""Height (m) of a usual trailer hook above the ground, and the largest share of an axle's load that its force may move.
+"""
 LARGEST_LEAN = 0.12
-"""rad: at 7 deg usual springs, 1 m apart, have used 60 mm, and stand on their stops."""
+"""Largest roll and pitch (rad): at 7 deg usual springs, 1 m apart, are compressed by 60 mm, to their stops."""
 FASTEST_PRESSURE_RATE = 100.0
-"""bar/s: fastest filling of air chambers, 6 bar in 0.06 s."""
+"""Fastest pressure rise (bar/s) of air chambers: 6 bar in 0.06 s."""
 FADING_WORK = 4e6
-"""J: what 40 kg of drum or disc take up in 200 K, by which linings begin to fade."""
+"""Brake work (J) of a wheel beyond which linings fade: it heats 40 kg of drum or disc by 200 K."""
 DRAG_COEFFICIENT, AIR_DENSITY, NEGLECTED_ENERGY_SHARE = 0.6, 1.2, 0.1
-"""Drag coefficient of a box, density (kg/m^3), share of the kinetic energy that the air may take."""
+"""Drag coefficient of a box, density of air (kg/m^3), and largest share of the kinetic energy that
+air drag may take.
+"""
 LARGEST_LOAD_FACTOR = 3.0
-"""By which factor a load may be above that of friction which is known at one load only."""
+"""Largest ratio of a wheel's load to the load of a tyre table that has a single load."""
 FULL_CIRCLE = 1.5
-"""rad: tables that go on to here know every slip angle."""
+"""Slip angle (rad) from which on a tyre table counts as complete."""
 LEAST_SLIP_ANGLE = 1e-3
-"""rad of slip angle: below, tyres have no side force to mistake."""
+"""Slip angle (rad) below which side forces are too small to be wrong."""
 
 
 def assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> list[Assumption]:
-    """Assumptions of a braking procedure with a given vehicle."""
-    parts = (
-        _of_loads(scene),
-        _of_bodies(scene, vehicle),
-        _of_tyres(scene, vehicle),
-        _of_brakes(scene, procedure, vehicle),
-    )
-    return [*chain.from_iterable(parts), *_of_drive(scene, vehicle)]
-
-
-def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
-    """Assumptions on the wheel loads of a plane vehicle; none for a vehicle on its suspension, whose springs carry the
-    loads.
+    """Assumptions of a braking procedure, about loads, course, tyres, brakes, steering, air drag and the end of the
+    stop.
     """
+    parts = (
+        _load_assumptions(scene),
+        _body_assumptions(scene, vehicle),
+        _tyre_assumptions(scene, vehicle),
+        _brake_assumptions(scene, procedure, vehicle),
+    )
+    return [*chain.from_iterable(parts), *_drive_assumptions(scene, vehicle)]
+
+
+def _load_assumptions(scene: BrakingScene) -> Iterator[Assumption]:
+    """Yields assumptions on the wheel loads of a plane vehicle; none for a vehicle on its suspension."""
     if scene.vehicle.file is not None:
         return
     if scene.load_transfer is None:
@@ -77,15 +84,15 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "wheels on the road",
             "every wheel stays on the road, as the body in the plane does not roll",
             "use a vehicle on its suspension, vehicle.file",
-            lambda run: _of_wheels(_loads(run)),
+            lambda run: _by_wheel_name(_wheel_loads(run)),
             "N",
             lower_limit=LEAST_WHEEL_LOAD,
         )
 
 
-def _loads(run: Result) -> np.ndarray:
-    """Wheel loads (n, W) in N, NaN in the sample in which the vehicle comes to rest: what ends its motion within that
-    step is no force of a tyre.
+def _wheel_loads(run: Result) -> np.ndarray:
+    """Wheel loads (n, W) in N; NaN in the sample in which the vehicle comes to rest, as its deceleration there is not
+    caused by tyre forces.
     """
     loads = np.array(run["load"])
     if run.detail.ended_at_rest:
@@ -94,8 +101,8 @@ def _loads(run: Result) -> np.ndarray:
 
 
 def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
-    """Shares of the load of the truck and of the trailer that the truck's accelerations would move, along and across
-    the vehicle, because the centre of mass is above the road.
+    """Load transfer divided by wheel load at rest, of truck and trailer over time, that the truck's accelerations would
+    cause by the height of the centre of mass.
     """
     states, path_times = run.detail.states, run.detail.times
     rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(path_times), 1e-9)[:, None]
@@ -110,14 +117,14 @@ def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
     }
 
 
-def _load_transfer_of_body(body: Truck, ahead: np.ndarray, aside: np.ndarray) -> np.ndarray:
+def _load_transfer_of_body(body: Truck, acceleration_along: np.ndarray, acceleration_across: np.ndarray) -> np.ndarray:
     lever = max(1.0 / body.front.x, -1.0 / body.rear.x)  # of the axle that bears less
     track = min(body.front.track, body.rear.track)
-    return body.height / GRAVITY * (ahead * lever + 2.0 * aside / track)
+    return body.height / GRAVITY * (acceleration_along * lever + 2.0 * acceleration_across / track)
 
 
-def _of_bodies(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
-    """Assumptions on the truck's course, its train and its springs."""
+def _body_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+    """Yields assumptions on the vehicle's direction, the angles of its train and the travel of its springs."""
     yield Assumption(
         "forwards",
         "the vehicle moves forwards",
@@ -169,9 +176,7 @@ def _of_bodies(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumpti
 
 
 def _has_spring_without_stops(vehicle: BrakedVehicle) -> bool:
-    """Whether a vehicle on its suspension has any spring without stops: a joint element, or a spring without
-    travel_force.
-    """
+    """Whether a suspended vehicle has any spring without stops: a joint element, or a spring without travel_force."""
     spatial_vehicle = vehicle.sprung.handling.vehicle
     return bool(spatial_vehicle.joint_elements) or any(
         spring.travel_force is None for spring in spatial_vehicle.springs
@@ -189,8 +194,8 @@ def _hitch_angles(run: Result) -> Watched:
 
 
 def _share_lifted_by_hook(scene: BrakingScene, run: Result) -> Watched:
-    """Share of the load on the trailer's lighter axle that the pull at the hook moves. The pull follows from the
-    balance of longitudinal forces on the truck.
+    """Share of the load on the trailer's lighter axle that the hook force moves, over time. The hook force follows from
+    the balance of longitudinal forces on the truck.
     """
     trailer, path = scene.trailer, run.detail
     assert trailer is not None
@@ -211,15 +216,15 @@ def _lean_angles(run: Result) -> Watched:
     return dict(zip(("roll", "pitch"), lean.T, strict=True))
 
 
-def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
-    """Assumptions on the friction tables, and on the slip angles at which these are read."""
-    tables = tables_of(scene).values()
+def _tyre_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+    """Yields assumptions that loads and slip angles stay within the tyre tables, and that steps resolve slip angles."""
+    tables = tyre_tables_of(scene).values()
     largest = min(table.loads[-1] * (LARGEST_LOAD_FACTOR if table.loads.size == 1 else 1.0) for table in tables)
     yield Assumption(
         "loads of the friction",
         "friction is known at the loads that wheels bear",
         "give tyres.files with tables up to larger loads",
-        lambda run: _of_wheels(_loads(run)),
+        lambda run: _by_wheel_name(_wheel_loads(run)),
         "N",
         upper_limit=float(largest),
     )
@@ -229,7 +234,7 @@ def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
             "slip angles of the friction",
             "friction is known at the slip angles of the tyres",
             "give tyres.files with tables up to larger slip angles",
-            lambda run: _of_wheels(_while_moving(run, np.abs(run["slip_angle"]))),
+            lambda run: _by_wheel_name(_while_moving(run, np.abs(run["slip_angle"]))),
             "rad",
             upper_limit=widest,
         )
@@ -245,8 +250,8 @@ def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
 
 
 def _resolved_speed(vehicle: BrakedVehicle, run: Result) -> Watched:
-    """Least speed (m/s) at which the steps resolve slip angles, at the samples where tyres corner below this speed; NaN
-    elsewhere.
+    """Least speed (m/s) at which the time steps resolve slip angles, for samples where tyres corner below this speed;
+    NaN elsewhere.
     """
     lively = GRAVITY if vehicle.sprung is None else vehicle.engine.liveliness
     least_resolved = vehicle.slope * lively * vehicle.sample / vehicle.substeps
@@ -258,15 +263,15 @@ def _resolved_speed(vehicle: BrakedVehicle, run: Result) -> Watched:
     }
 
 
-def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
-    """Assumptions on brake pressures, brake torques and the valves that set the pressures."""
+def _brake_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+    """Yields assumptions on brake pressures, brake work and the valves that set the pressures."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(
             "chambers",
             "chambers fill as fast as air flows",
             "name the effect pressure_dynamics, [pressure]",
-            lambda run: _of_wheels(_with_start_row(np.diff(run["pressure"], axis=0) / scene.run.sample)),
+            lambda run: _by_wheel_name(_with_start_row(np.diff(run["pressure"], axis=0) / scene.run.sample)),
             "bar/s",
             upper_limit=FASTEST_PRESSURE_RATE,
         )
@@ -275,7 +280,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
             "supply",
             "no brake has more pressure than the supply",
             "raise brakes.supply, or lower gain, offset and noise of port.pressures",
-            lambda run: _of_wheels(run["pressure"]),
+            lambda run: _by_wheel_name(run["pressure"]),
             "bar",
             upper_limit=scene.brakes.supply * (1.0 + 1e-9),
         )
@@ -284,11 +289,11 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
             "range of the signals",
             "wheel speeds are within the range of their converter",
             "raise port.signals.range",
-            lambda run: _of_wheels(np.abs(run["turning"]) * vehicle.plane.radius),
+            lambda run: _by_wheel_name(np.abs(run["turning"]) * vehicle.plane.radius),
             "m/s",
             upper_limit=port.signals.range,
         )
-    measured = measured_of(scene, procedure, vehicle.plane.wheels)
+    measured = measured_pressures_of(scene, procedure, vehicle.plane.wheels)
     if measured is not None:
         yield Assumption(
             "measured pressures",
@@ -312,11 +317,11 @@ def _brake_work(run: Result) -> Watched:
     """Work (n, W) in J that each wheel's brake has done up to each sample."""
     power = run["torque"] * np.abs(run["turning"])
     steps = np.diff(run.times)[:, None] * 0.5 * (power[1:] + power[:-1])
-    return _of_wheels(np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0))))
+    return _by_wheel_name(np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0))))
 
 
-def _of_drive(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
-    """Assumptions on the driver, the drag of the air and the end of the stop."""
+def _drive_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+    """Yields assumptions on the driver's steering, the drag of the air and the end of the stop."""
     yield Assumption(
         "parallel steering",
         "both front wheels are steered alike",
@@ -351,8 +356,8 @@ def _steer_angles(vehicle: BrakedVehicle, run: Result) -> Watched:
 
 
 def _drag_work_share(scene: BrakingScene, mass: float, run: Result) -> Watched:
-    """Work of the air's drag divided by the initial kinetic energy of the whole mass (kg). The drag is that of a box as
-    wide as the track and twice as high as the centre of mass.
+    """Work of air drag over a stop, divided by the initial kinetic energy of ``mass`` (kg). The drag is that of a box
+    as wide as the track and twice as high as the centre of mass.
     """
     truck, stop = vehicle_of(scene), Stop(run.detail)
     drag = 0.5 * AIR_DENSITY * DRAG_COEFFICIENT * truck.front.track * 2.0 * truck.height
@@ -360,16 +365,16 @@ def _drag_work_share(scene: BrakingScene, mass: float, run: Result) -> Watched:
     return {"vehicle": np.full(1, work / (0.5 * mass * stop.speed[0] ** 2))}
 
 
-def _of_wheels(values: np.ndarray) -> Watched:
-    """The columns of values (n, W) by the name of the wheel."""
+def _by_wheel_name(values: np.ndarray) -> Watched:
+    """Returns the columns of values (n, W) by wheel name."""
     return dict(zip(wheel_names(values.shape[1]), values.T, strict=True))
 
 
 def _while_moving(run: Result, values: np.ndarray) -> np.ndarray:
-    """Values (n, W) at the samples in which the vehicle is faster than SLOWEST_SLIP_SPEED, NaN at the others."""
+    """Returns values (n, W) with NaN at samples in which the vehicle is not faster than SLOWEST_SLIP_SPEED."""
     return np.where(Stop(run.detail).speed[:, None] > SLOWEST_SLIP_SPEED, values, np.nan)
 
 
 def _with_start_row(values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) after a row of NaN, which makes a row for every sample: the first sample has no value."""
+    """Returns values (n, ...) with a row of NaN before them, for the start of a run, which has no value."""
     return np.concatenate((np.full((1, *values.shape[1:]), np.nan), values))

@@ -1,10 +1,10 @@
-"""Errors that the step length leaves in a stop's results, where they can be told.
+"""Stated errors of a stop's motion and stopping distance by the length of the time steps, where they can be estimated.
 
-The sample of the controller belongs to the scene: only the steps within it become fewer. While two runs switch alike,
-the error falls with the step (Richardson). A controller of valves may switch at other samples in other steps; from
-there on runs are draws of one scatter, and there is no number: ensembles tell what such stops have in common. Whether
-shorter steps would do so, the controller itself tells: it is asked again, with signals that are as far from those of
-the run as those in longer steps, to the other side.
+The controller's sample time belongs to the scene; only the number of steps within a sample is reduced. While the
+valves of two runs switch alike, the error falls with the step (Richardson). In other steps a controller may switch
+valves at other samples. From there on the runs differ at random, and no error is estimated; ensembles of stops give
+their statistics. Whether the controller would switch otherwise in shorter steps is tested by its commands to signals
+that differ from the run's as those in longer steps do, in the opposite direction.
 """
 
 import itertools
@@ -30,34 +30,40 @@ from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
 LARGEST_ORDER, CAREFUL_ORDER = 1.5, 1.0
-"""Largest that is taken for the order of the steps, two between the kinks of brakes and tables of friction, and what is
-taken where two runs cannot tell."""
+"""Largest order of convergence that is assumed (order 2 is lowered by kinks of brakes and friction tables), and the
+order that is assumed where two runs do not show any.
+"""
 COARSE_WINDOW, FINE_WINDOW = 0.4, 0.3
-"""Shares of a stop that are run again with a quarter of the steps, and with twice as many where there is but one."""
+"""Shares of a stop that are repeated with a quarter of the steps per sample, and with two steps where the sample has a
+single one.
+"""
 LONGEST_REPEAT = 1.1
-"""Times of the stop, until which another run may take to stand."""
+"""Longest duration of a repeated run, divided by that of the stop."""
 EQUAL_PRESSURE_SHARE = 0.01
-"""Rms of the difference of the pressures by their deviation, up to which a controller has acted alike in two runs."""
+"""Largest rms difference of the pressures of two runs, divided by the size of the pressures, at which the controller
+has acted alike in both.
+"""
 STOPPING_DISTANCE = "stopping distance"
 UNIT_OF_CHANNEL = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", STOPPING_DISTANCE: "m"}
-"""Of what is told."""
+"""Channels whose error is stated, with their units."""
 LEAST_SIZES = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
-"""m, rad: errors of a course that moves by less are shares of this."""
-AT_ONCE = "the vehicle stands at once"
-ASKED_ONCE = "what stands behind the port answers one run alone"
+"""Least size (m, rad) by which the error of a channel is divided, for vehicles that hardly leave their course."""
+STANDSTILL_NOTE = "the vehicle stands at once"
+SINGLE_RUN_NOTE = "what stands behind the port answers one run alone"
 SINGLE_STEP_NOTE = "one step to a sample leaves no longer ones, and in shorter ones the controller may act otherwise"
 SUBSTEPS_REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
 LONGER_STEPS_NOTE = f"the controller acts otherwise in longer steps: {SUBSTEPS_REMEDY}"
 SHORTER_STEPS_NOTE = f"the controller may act otherwise in shorter steps: {SUBSTEPS_REMEDY}"
-"""Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
-distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of 81 that did, 23 were near to
-switching otherwise; among them 11 of the 12 whose true pressures, in 25 times as many steps, were others."""
+"""Reasons why no error is estimated. Measured: of 40 random stops whose commands differ in longer steps, the difference
+missed the error of the stopping distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of
+81 stops whose commands agree, 23 were near to switching otherwise; among them were 11 of the 12 whose true pressures,
+in 25 times as many steps, differ."""
 
 
-class OtherRuns(NamedTuple):
-    """Functions that repeat a stop. repeat_stop : the stop with a number of steps per sample, up to a time (s); raises
-    InputError or RunFailed. commands_for_speeds : the controller's commands to speeds of turning (n - 1, W) in rad/s
-    and speeds of the vehicle (n - 1,) in m/s at the samples of a run.
+class RepeatedRuns(NamedTuple):
+    """Functions that repeat a stop. repeat_stop : runs the stop with a number of steps per sample, up to a time (s);
+    raises InputError or RunFailed. commands_for_speeds : returns the controller's commands to angular speeds of wheels
+    (n - 1, W) in rad/s and speeds of the vehicle (n - 1,) in m/s at the samples of a run.
     """
 
     repeat_stop: Callable[[int, float], BrakingPath]
@@ -67,74 +73,77 @@ class OtherRuns(NamedTuple):
 Channels = dict[str, np.ndarray]
 
 
-def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
-    """The stop with the estimated errors of its motion and of its distance, or with the reason why none is estimated.
+def with_error(run: Result, scene: BrakingScene, repeats: RepeatedRuns) -> Result:
+    """Returns the result of a stop with the errors of its motion and stopping distance, or with the reason why none is
+    estimated.
 
-    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    Raises RunFailed, whose ``partial`` is the result, where the error of a channel is too large for it to be used.
     """
     path, steps = run.detail, scene.run.substeps
     if len(path.times) <= 2:
-        return not_estimated(run, AT_ONCE)
+        return not_estimated(run, STANDSTILL_NOTE)
     loop = pressures_are_controlled(scene, path)
     if not can_be_repeated(scene) or (loop and steps == 1):
-        return not_estimated(run, SINGLE_STEP_NOTE if can_be_repeated(scene) else ASKED_ONCE)
+        return not_estimated(run, SINGLE_STEP_NOTE if can_be_repeated(scene) else SINGLE_RUN_NOTE)
     try:
-        paths = _finer_runs(path, steps, repeats.repeat_stop)
+        paths = _runs_in_other_steps(path, steps, repeats.repeat_stop)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
     if steps == 1:
-        return with_stated_errors(run, _by_twice(path, paths[0], step), "a part in half the step")
+        return with_stated_errors(run, _errors_by_half_step(path, paths[0], step), "a part in half the step")
     if loop and not same_commands(path, paths[0]):
         return not_estimated(run, LONGER_STEPS_NOTE)
-    if loop and other_command_nearby(path, paths[0], repeats):
+    if loop and commands_change_nearby(path, paths[0], repeats):
         return not_estimated(run, SHORTER_STEPS_NOTE)
-    estimates = _by_fewer(path, steps, paths, step)
+    estimates = _errors_by_longer_steps(path, steps, paths, step)
     if rests_on_springs(scene):
         estimates.pop(STOPPING_DISTANCE, None)
     return with_stated_errors(run, estimates, "runs in longer steps")
 
 
 def rests_on_springs(scene: BrakingScene) -> bool:
-    """Whether the vehicle comes to rest on springs of its tyres or axles. One step may find it at rest while another
-    lets it rock on for a second: this, and some centimetres of the stopping distance, do not converge with the step.
+    """Whether the vehicle comes to rest on springs of its tyres or axles. It may rock on for a second with some time
+    steps and not with others, so that the time of the stop and some centimetres of its distance do not converge.
     """
     return scene.relaxation is not None or scene.vehicle.file is not None
 
 
 def can_be_repeated(scene: BrakingScene) -> bool:
-    """Whether the stop can be run again. It cannot where a client connects once, a log is replayed or a clock sets the
-    pace.
+    """Whether a stop of the scene can be repeated. It cannot where a client connects to the port once, a log is
+    replayed, or the run keeps to real time.
     """
     port = scene.port
     return port is None or (not (port.command or port.port or port.replay) and port.pace == "simulated")
 
 
 def pressures_are_controlled(scene: BrakingScene, path: BrakingPath) -> bool:
-    """Whether pressures fall in a run because a controller in the loop, or something unknown at the port, released
-    brakes.
-    """
+    """Whether a controller in the loop, or a client at the port, released brakes in a run, so that pressures fall."""
     without_controller = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
     return not without_controller and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
 def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
-    """Whether the controller acted alike in two runs: the pressures' root mean square difference is at most the share
-    EQUAL_PRESSURE_SHARE.
+    """Whether the controller acted alike in two runs: the rms difference of pressures, divided by their size, is at
+    most EQUAL_PRESSURE_SHARE.
     """
     pressures = _columns_at(path.times, other_path, other_path.pressures)
     return _rms(pressures - path.pressures) <= EQUAL_PRESSURE_SHARE * reference_size(path.pressures)
 
 
-def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
+def commands_change_nearby(path: BrakingPath, path_in_longer_steps: BrakingPath, repeats: RepeatedRuns) -> bool:
     """Whether the controller's commands change if the signals of a run are shifted by as much as longer steps shift
-    them, in the opposite direction. Valves change if any state differs, pressures if they differ by more than
-    EQUAL_PRESSURE_SHARE.
+    them, in the opposite direction.
+
+    Valve commands change if any state differs, pressures if they differ by more than EQUAL_PRESSURE_SHARE.
     """
-    path_times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
+    path_times, speeds = (
+        path.times[:-1],
+        [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, path_in_longer_steps)],
+    )
     turning, speed = path.turning[:-1], speeds[0][:-1]
-    shifted = 2.0 * turning - _columns_at(path_times, longer, longer.turning)
-    faster = np.maximum(2.0 * speed - np.interp(path_times, longer.times, speeds[1]), 0.0)
+    shifted = 2.0 * turning - _columns_at(path_times, path_in_longer_steps, path_in_longer_steps.turning)
+    faster = np.maximum(2.0 * speed - np.interp(path_times, path_in_longer_steps.times, speeds[1]), 0.0)
     plain_commands, shifted_commands = (
         repeats.commands_for_speeds(path, *signals) for signals in ((turning, speed), (shifted, faster))
     )
@@ -144,7 +153,7 @@ def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherR
 
 
 def motion_channels(path: BrakingPath, times: np.ndarray) -> Channels:
-    """Channels of the motion at times (n,) in s; after the end of the run they keep their last values."""
+    """Position, yaw, speed and hitch angle of a run at times (n,) in s; constant after the end of the run."""
     positions, rates = path.states[:, 0], path.states[:, 1]
     motion = {
         "x": positions[:, 0],
@@ -158,13 +167,15 @@ def motion_channels(path: BrakingPath, times: np.ndarray) -> Channels:
 
 
 def motion_and_distance(path: BrakingPath, times: np.ndarray) -> Channels:
-    """Channels of the motion, and the stopping distance (1,) if the vehicle comes to rest."""
+    """Channels of the motion at times (n,) in s, and the stopping distance (1,) in m if the vehicle comes to rest."""
     return motion_channels(path, times) | ({STOPPING_DISTANCE: Stop(path).way[-1:]} if path.ended_at_rest else {})
 
 
-def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
-    """The stop with half as many steps per sample and, over its first part, with a quarter, if commands stay alike. A
-    stop with a single step per sample is repeated with two over its first part.
+def _runs_in_other_steps(
+    path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]
+) -> list[BrakingPath]:
+    """Repeat a stop with half as many steps per sample and, over its first part and if commands stay alike, with a
+    quarter. A stop with a single step per sample is repeated with two over its first part.
     """
     end_time = float(path.times[-1])
     if steps == 1:
@@ -175,21 +186,25 @@ def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], Bra
     )
 
 
-def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:
-    """Error estimates by runs with half and a quarter of the steps. The error of the stopping distance is at least that
-    of the motion along the road.
+def _errors_by_longer_steps(
+    path: BrakingPath, steps: int, other_runs: list[BrakingPath], step: float
+) -> dict[str, Estimate]:
+    """Estimate errors by runs with half and a quarter of the steps per sample. The error of the stopping distance is at
+    least the error of x.
+
+    step : time step of the stop (s).
     """
     fine, coarse, counts = (
         motion_and_distance(path, path.times),
-        motion_and_distance(finer_runs[0], path.times),
+        motion_and_distance(other_runs[0], path.times),
         [steps, steps // 2, steps // 4],
     )
-    compared_times = path.times[path.times <= finer_runs[-1].times[-1]]
-    channels_of_runs = [motion_channels(run, compared_times) for run in (path, *finer_runs)]
+    compared_times = path.times[path.times <= other_runs[-1].times[-1]]
+    channels_of_runs = [motion_channels(run, compared_times) for run in (path, *other_runs)]
     estimates = dict[str, Estimate]()
     for name in [name for name in fine if name in coarse]:
         order = CAREFUL_ORDER
-        if len(finer_runs) > 1 and name != STOPPING_DISTANCE:
+        if len(other_runs) > 1 and name != STOPPING_DISTANCE:
             gaps = [_rms(first[name] - finer[name]) for first, finer in itertools.pairwise(channels_of_runs)]
             order = observed_order_of_stop(gaps[0], gaps[1], counts)
         least_error = 0.0
@@ -201,8 +216,8 @@ def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step
 
 
 def observed_order_of_stop(fine_difference: float, coarse_difference: float, step_counts: list[int]) -> float:
-    """Observed order of convergence, at most LARGEST_ORDER: from the differences of neighbouring runs, fine and coarse,
-    whose steps per sample are ``step_counts``.
+    """Observed order of convergence of a stop, at most LARGEST_ORDER, from the differences of three runs whose steps
+    per sample are ``step_counts``: between the two finer and between the two coarser ones.
     """
     if not (fine_difference > 0.0 and coarse_difference > 0.0):
         return CAREFUL_ORDER
@@ -212,9 +227,11 @@ def observed_order_of_stop(fine_difference: float, coarse_difference: float, ste
     return float(orders[np.argmin(np.abs(ratios - math.log(coarse_difference / fine_difference)))])
 
 
-def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[str, Estimate]:
-    """Error estimates by a run with twice as many steps over the first part of the stop. The relative error of this
-    part is taken for the whole stop.
+def _errors_by_half_step(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[str, Estimate]:
+    """Estimate errors by a run with twice as many steps over the first part of a stop. The relative error of this part
+    is assumed for the entire stop.
+
+    step : time step of the stop (s).
     """
     in_part = path.times <= other_path.times[-1]
     fine, finer, estimates = motion_channels(path, path.times), motion_channels(other_path, path.times[in_part]), {}
@@ -228,13 +245,13 @@ def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[s
 
 
 def _columns_at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.ndarray:
-    """Columns (n, W) of a run, interpolated at times (m,) in s."""
+    """Interpolates columns (n, W) of a run linearly at times (m,) in s."""
     return np.column_stack([np.interp(times, path.times, column) for column in values.T])
 
 
 def _size_of_channel(name: str, values: np.ndarray, share: float = 1.0) -> float:
-    """Size of a channel by which its error is divided, at least LEAST_SIZES; ``share`` reduces LEAST_SIZES for a part
-    of a run.
+    """Size of a channel by which its error is divided, at least LEAST_SIZES; ``share`` is the share of the run that the
+    values cover.
     """
     return max(reference_size(values), share * LEAST_SIZES.get(name, 0.0))
 

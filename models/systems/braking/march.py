@@ -1,4 +1,6 @@
-"""A braked vehicle with its controller in the loop, sample by sample, until it stands or its time is over."""
+"""Time integration of a braked vehicle with its controller in the loop, sample by sample, until it stands or the time
+is over.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -21,17 +23,18 @@ from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
 MOST_SAMPLES_AT_ONCE = 1024
-"""Samples of which a controller that is not asked knows nothing, at a time."""
+"""Most samples that are computed at a time where the controller's command is constant."""
 
 
 @dataclass(frozen=True, eq=False)
 class BrakingPath:
-    """Record of a braking run at every sample, the start included.
+    """Record of a braking run at every controller sample, the start included.
 
-    times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports : of the last step of every sample, each (n - 1, W); ended_at_rest : whether it ended at rest; coordinates :
-    names of those of the states, the first three always x, y (m) and heading (rad); clock : report of the real-time
-    clock on overruns, if the run kept to one.
+    times (n,) : s; states (n, 2, 2 + U) : positions and rates of the coordinates; turning, pressures, torques (n, W) :
+    angular speeds of the wheels (rad/s), brake pressures (bar), brake torques (N m); reports : forces, loads and slips
+    in the last time step of every sample, each (n - 1, W); ended_at_rest : whether the vehicle stands at the end;
+    coordinates : names of the coordinates, the first three always x, y (m) and heading (rad); clock : report of the
+    real-time clock on overruns, if the run kept to one.
     """
 
     times: np.ndarray
@@ -46,8 +49,8 @@ class BrakingPath:
 
 
 class StartState(NamedTuple):
-    """State from which a run continues: positions and rates (2, 2 + U), and the wheels' speeds of turning (W,) in
-    rad/s.
+    """State from which a run begins: positions and rates of the coordinates (2, 2 + U), and angular speeds of the
+    wheels (W,) in rad/s.
     """
 
     state: np.ndarray
@@ -56,12 +59,12 @@ class StartState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BrakedVehicle:
-    """A vehicle on a road with brakes, ready to run.
+    """A vehicle with brakes and tyres on a road, ready to run.
 
-    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
+    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in their place steering : such angles by time (s), evaluated
     in the middle of each sample; engine : ``models.engines.braking.EngineChassis`` if an engine is to carry the
     chassis.
-    sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then marches.
+    sprung : ``models.brake.sprung.Sprung`` of a vehicle on their suspension, which their engine then integrates.
     """
 
     plane: Plane
@@ -75,7 +78,7 @@ class BrakedVehicle:
     substeps: int = 4
     sample: float = SAMPLE
     speed_given: bool = True
-    switch: float = 0.0
+    switch_time: float = 0.0
     engine: Any = None
     relaxation: np.ndarray | None = None
     sprung: Any = None
@@ -83,24 +86,23 @@ class BrakedVehicle:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates of a state."""
+        """Names of the coordinates of the vehicle, in the order of its states."""
         if self.sprung is not None:
             return tuple(self.sprung.names)
         return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
 
     def rolling(self, speed: float) -> StartState:
-        """Start state of steady rolling along x at a speed (m/s)."""
+        """Returns the start state of steady rolling along x at a speed (m/s)."""
         state = np.zeros((2, len(self.coordinates)))
         state[1, 0] = speed
         return StartState(state, speed / self.plane.radius)
 
     def run(self, controller: Controller, start: float | StartState, duration: float = 60.0) -> BrakingPath:
-        """March the vehicle from a start, or from steady rolling along x at a speed (m/s); the brake switch closes at
-        ``switch``.
+        """Run the vehicle from a start state, or from steady rolling along x at a speed (m/s), for at most ``duration``
+        (s).
 
-        Until then no valve lets anything through, whatever the controller commands.
-
-        Raises RunFailed, which names the time and whose ``partial`` is the path until then.
+        The brake switch closes at ``switch_time``; until then no valve opens, whatever the controller commands. Raises
+        RunFailed, which names the time and whose ``partial`` is the path until then.
         """
         start_state, wheels = start if isinstance(start, StartState) else self.rolling(start), self.plane.wheels
         check_way(self.road, self.sample / self.substeps * float(np.hypot(*start_state.state[1, :2])))
@@ -127,10 +129,10 @@ class BrakedVehicle:
             for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, current_row, motion)):
                 if status in FATAL_ENDS:
                     raise RunFailed("braking", ending_sentence(status, self.plane, motion), time)
-                _take_rows(rows, record)
+                _move_rows(rows, record)
                 if status == AT_REST or time >= record.until:
                     break
-                braked = time >= self.switch - 1e-9
+                braked = time >= self.switch_time - 1e-9
                 commands.samples[0] = samples_at_once if braked else 1
                 known = speed if self.speed_given else math.nan
                 rims = np.abs(current_row.turning) * self.plane.radius
@@ -139,21 +141,21 @@ class BrakedVehicle:
                 if self.steering is not None:
                     commands.steer[:] = self.steering(time + 0.5 * self.sample)
         except RunFailed as error:
-            _take_rows(rows, record)
-            error.partial = _path(rows, current_row, False, self.coordinates)
+            _move_rows(rows, record)
+            error.partial = _braking_path(rows, current_row, False, self.coordinates)
             raise
-        return _path(rows, current_row, status == AT_REST, self.coordinates)
+        return _braking_path(rows, current_row, status == AT_REST, self.coordinates)
 
     @property
     def on_road(self) -> OnRoad:
-        """The vehicle and its road in the form that compiled functions take."""
+        """Vehicle, tyre tables and road in the form that compiled functions take."""
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
         self, commands: Commands, record: Record, row: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
-        """Start the loop that moves the vehicle sample by sample from the state in ``row`` and ``motion``; see
-        ``samples``.
+        """Returns the iterator that integrates the motion sample by sample from the state in ``row`` and ``motion``; it
+        yields status, time (s), speed (m/s) and supply pressure (bar).
         """
         air = resting_chambers(self.chambers, self.sample)._replace(pressure=row.pressure, torque=row.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
@@ -180,9 +182,9 @@ def on_tyres(
     road: Road = UNIFORM_ROAD,
     **other_fields: Any,
 ) -> BrakedVehicle:
-    """A vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
+    """Build a braked vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
 
-    tyres : tables, surface by surface and kind by kind; other_fields : as of ``BrakedVehicle``.
+    tyres : tyre tables, surface by surface and kind by kind; other_fields : further fields of ``BrakedVehicle``.
     """
     zeros = np.zeros(plane.wheels)
     slope = max(tyre.cornering for tyre in tyres)
@@ -197,7 +199,9 @@ def on_tyres(
 
 
 def _write_command(commands: Commands, command: Command, braked: bool) -> None:
-    """Write a command into the arrays for the next sample."""
+    """Write a controller's command into ``commands`` for the next sample; valves release until the brake switch
+    closes.
+    """
     if command.pressures is not None:
         commands.pressures[:] = command.pressures
     else:
@@ -205,13 +209,13 @@ def _write_command(commands: Commands, command: Command, braked: bool) -> None:
         commands.pressures[0] = math.nan
 
 
-def _take_rows(rows: list[np.ndarray], record: Record) -> None:
+def _move_rows(rows: list[np.ndarray], record: Record) -> None:
     """Append a copy of the recorded rows to ``rows``, and empty the record."""
     rows.append(record.rows[: record.left[0]].copy())
     record.left[0] = 0
 
 
-def _path(rows: list[np.ndarray], row: Row, stands: bool, names: tuple[str, ...]) -> BrakingPath:
+def _braking_path(rows: list[np.ndarray], row: Row, stands: bool, names: tuple[str, ...]) -> BrakingPath:
     all_of = parts(rows, row)
     return BrakingPath(
         all_of.time[:, 0],

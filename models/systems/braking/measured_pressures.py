@@ -1,7 +1,7 @@
-"""Measured chamber pressures that drive the vehicle open loop, and the measured wheel speeds to lay over its own.
+"""Measured chamber pressures that brake the vehicle open loop, and measured wheel speeds for comparison.
 
-A table has ``time``, and of every wheel ``pressure_NAME``; beside them it may have ``speed_NAME`` of every wheel. The
-names are those of ``wheel_names``. It begins at time 0, as the brake is applied; between its rows pressures are linear.
+A table has ``time`` and ``pressure_NAME`` of every wheel; it may also have ``speed_NAME`` of every wheel. The names are
+those of ``wheel_names``. It begins at time 0, when the brake is applied; between its rows pressures are linear.
 """
 
 from dataclasses import dataclass
@@ -15,22 +15,23 @@ from models.core.tables import SECONDS, read_table, write_table
 
 FACTOR_TO_BAR = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
 FACTOR_TO_METRES_PER_SECOND = {"m/s": 1.0, "km/h": 1.0 / 3.6}
+"""Units of pressures and speeds that files may have, with their factors to bar and m/s."""
 FASTEST_WHEEL_SPEED = 150.0
-"""m/s; no wheel of a road vehicle turns faster."""
+"""Largest circumferential speed (m/s) of a wheel that a file may have."""
 
 
 def wheel_names(wheels: int) -> tuple[str, ...]:
-    """Names of the wheels: fl, fr, rl, rr of a vehicle with two axles; 1l, 1r, 2l and so on of one with more."""
+    """Names of the wheels in files: fl, fr, rl, rr for four wheels; 1l, 1r, 2l and so on for another number."""
     axles = ("f", "r") if wheels == 4 else tuple(str(axle + 1) for axle in range((wheels + 1) // 2))
     return tuple(axles[i // 2] + "lr"[i % 2] for i in range(wheels))
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPressures:
-    """A controller that ignores the wheel speeds and commands measured pressures, each averaged over its sample.
+    """A controller that ignores the wheel speeds and commands measured pressures, averaged over each sample.
 
-    times (n,) : s, rising from 0; pressures (n, W) : bar; speeds (n, W) : m/s of the wheels' rims, None if they were
-    not measured. After the last row the last pressures stay.
+    times (n,) : s, rising from 0; pressures (n, W) : bar; speeds (n, W) : circumferential speeds of the wheels (m/s),
+    None if they were not measured. After the last row the last pressures stay.
     """
 
     times: np.ndarray
@@ -39,28 +40,30 @@ class MeasuredPressures:
     period: float = SAMPLE
 
     def sample(self, sample: Sample) -> Command:
-        """Command the pressures (W,) that are the means of the measured ones over the sample."""
+        """Returns the command of a sample: the means (W,) of the measured pressures over the sample."""
         start, end = sample.time * 1e-9, sample.time * 1e-9 + self.period
         times_within = self.times[(self.times > start) & (self.times < end)]
         interpolation_times = np.concatenate(([start], times_within, [end]))
         rows = np.column_stack([np.interp(interpolation_times, self.times, column) for column in self.pressures.T])
         return Command(pressures=np.trapezoid(rows, interpolation_times, axis=0) / self.period)
 
-    def rms(self, times: np.ndarray, rims: np.ndarray) -> np.ndarray:
-        """Root mean square difference (W,), m/s, between computed rim speeds ``rims`` (m, W) at times (m,) and measured
-        ones.
+    def wheel_speed_error(self, times: np.ndarray, wheel_speeds: np.ndarray) -> np.ndarray:
+        """Root mean square difference (W,) in m/s between computed wheel speeds (m, W) at times (m,) and the measured
+        wheel speeds.
 
-        Only the time of the measurement counts; not a number where no speeds were measured.
+        Only the time of the measurement counts; NaN where no speeds were measured.
         """
         if self.speeds is None:
-            return np.full(rims.shape[1], np.nan)
+            return np.full(wheel_speeds.shape[1], np.nan)
         shared = times <= self.times[-1]
         measured = np.column_stack([np.interp(times[shared], self.times, column) for column in self.speeds.T])
-        return np.sqrt(((rims[shared] - measured) ** 2).mean(axis=0))
+        return np.sqrt(((wheel_speeds[shared] - measured) ** 2).mean(axis=0))
 
 
 def read_pressures(path: str | Path, wheels: int, sample_period: float = SAMPLE) -> MeasuredPressures:
-    """Measured pressures from a CSV with units; raises InputError for a file that cannot be used."""
+    """Reads measured pressures of a number of wheels from a CSV file with units. Raises InputError for a file that
+    cannot be used.
+    """
     names, header = wheel_names(wheels), _header_line(path)
     columns = {"time": SECONDS, **{f"pressure_{name}": FACTOR_TO_BAR for name in names}}
     measured = "speed" in header
@@ -74,12 +77,12 @@ def read_pressures(path: str | Path, wheels: int, sample_period: float = SAMPLE)
     return MeasuredPressures(table["time"], pressures, speeds, sample_period)
 
 
-def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, rims: np.ndarray) -> None:
-    """Write a run's pressures to a file for ``read_pressures``: times (n,) in s, pressures and speeds of rims (n, W) in
-    bar, m/s."""
+def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, wheel_speeds: np.ndarray) -> None:
+    """Write a run's pressures to a file for ``read_pressures``: times (n,) in s, pressures (n, W) in bar, and wheel
+    speeds (n, W) in m/s."""
     names, later = wheel_names(pressures.shape[1]), np.diff(times, prepend=-1.0) > 0.0
     columns = {"time": ("s", times[later])}
-    for head, unit, values in (("pressure", "bar", pressures), ("speed", "m/s", rims)):
+    for head, unit, values in (("pressure", "bar", pressures), ("speed", "m/s", wheel_speeds)):
         columns |= {f"{head}_{name}": (unit, values[later, i]) for i, name in enumerate(names)}
     write_table(path, columns)
 
@@ -87,7 +90,9 @@ def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, 
 def _columns_of_wheels(
     path: str | Path, table: dict[str, np.ndarray], heading: str, names: tuple[str, ...], largest: float, unit: str
 ) -> np.ndarray:
-    """Columns (n, W) of one quantity for all wheels; InputError for a value that is not from 0 to ``largest``."""
+    """Returns the columns (n, W) of a quantity for all wheels. Raises InputError for a value that is not from 0 to
+    ``largest``.
+    """
     for name in names:
         column = table[f"{heading}_{name}"]
         wrong = np.flatnonzero((column < 0.0) | (column > largest))
@@ -98,8 +103,8 @@ def _columns_of_wheels(
 
 
 def _header_line(path: str | Path) -> str:
-    """First line of a file that is no comment, "" if the file cannot be read: ``read_table`` then says what is
-    wrong.
+    """Returns the first line of a file that is no comment; "" if the file cannot be read, as ``read_table`` then says
+    what is wrong.
     """
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()

@@ -1,4 +1,4 @@
-"""From a scene of braking to a vehicle on its road, ready to run."""
+"""Vehicle, road, tyres, brakes and controller of a braking scene."""
 
 import math
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from models.brake.controllers import CONTROLLERS
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane, Truck, plane_of_truck
 from models.brake.pressure import Chambers
 from models.brake.surfaces import Road, road
-from models.brake.surfaces import Stretch as Numbered
+from models.brake.surfaces import Stretch as NumberedStretch
 from models.brake.trailer import plane_of_train
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
@@ -26,25 +26,27 @@ from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, table_from_file
 from models.tyre.tyre_table import TyreTable
 
 SPRUNG_ENGINE = "mujoco"
-"""Marches a vehicle on its suspension where no engine is asked for."""
+"""Engine of a vehicle on its suspension where the user names none."""
 
 
 def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
-    """The scene's vehicle with its brakes on the road of a procedure; InputError for parts that are inconsistent."""
+    """Build the scene's vehicle with its brakes on the road of a procedure. Raises InputError for inconsistent
+    parts.
+    """
     plane, known = plane_of(scene), (*SURFACE_NAMES, *scene.tyres.files)
     for name, scale in scene.tyres.scale.items():
         if name not in known:
             raise InputError(scene.file, f"tyres.scale.{name}", scale, "no such surface", known)
-    names, kinds, lags = surfaces_of(scene, procedure), kinds_of(scene), scene.relaxation
+    names, kinds, lags = surfaces_of(scene, procedure), tyre_kinds_of(scene), scene.relaxation
     front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
     sprung = None if scene.vehicle.file is None else sprung_of(scene)
-    engine = None if sprung is None else on_springs(SPRUNG_ENGINE, sprung)
+    engine = None if sprung is None else suspended_in_engine(SPRUNG_ENGINE, sprung)
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
     on_front_unit = np.arange(plane.wheels) < 2
     vehicle = on_tyres(
         plane,
-        [table_of(scene, name, kind) for name in names for kind in kinds],
+        [tyre_table_of(scene, name, kind) for name in names for kind in kinds],
         of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
         chambers_of(scene, plane.wheels),
         road_of(scene, procedure, names),
@@ -62,8 +64,8 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
 
 
 def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest: float) -> None:
-    """Refuse steps so long that the vehicle at rest would start to rock on its tyres, whose slip angles lag over the
-    relaxation length ``shortest`` (m) or more.
+    """Raise InputError for time steps so long that the vehicle at rest would start to rock on its tyres. ``shortest`` :
+    shortest relaxation length (m).
     """
     from models.brake.relaxation import longest_step
 
@@ -80,7 +82,9 @@ def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest: float) ->
 
 
 def plane_of(scene: BrakingScene) -> Plane:
-    """Plane model of the truck, of truck and trailer, or of a vehicle on its suspension together with what it tows."""
+    """Returns the plane model of the truck, of truck and trailer, or of a vehicle on its suspension with what it
+    tows.
+    """
     transfer = scene.load_transfer is not None
     if scene.vehicle.file is not None:
         plane: Plane = sprung_of(scene).in_plane(transfer)
@@ -97,7 +101,9 @@ def plane_of(scene: BrakingScene) -> Plane:
 
 
 def spatial_vehicle_of(scene: BrakingScene) -> Any:
-    """The vehicle of the scene's file with what it tows, a ``SpatialVehicle``; None where the scene names no file."""
+    """Returns the vehicle of vehicle.file with what it tows, a ``SpatialVehicle``; None where the scene has no such
+    file.
+    """
     from models.own_model.scene_vehicle import scene_vehicle
 
     name = scene.vehicle.file
@@ -105,7 +111,7 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
 
 
 def sprung_of(scene: BrakingScene) -> Any:
-    """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; raises InputError."""
+    """Returns the scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; raises InputError."""
     from models.brake.sprung import suspended_vehicle
 
     return suspended_vehicle(
@@ -113,8 +119,8 @@ def sprung_of(scene: BrakingScene) -> Any:
     )
 
 
-def on_springs(engine: str, vehicle: Any) -> Any:
-    """A vehicle on its suspension in an engine, or by the independent reference."""
+def suspended_in_engine(engine: str, vehicle: Any) -> Any:
+    """Builds a vehicle on its suspension in "exudyn" or "mujoco", or by the independent reference."""
     if engine == "reference":
         from models.engines.braking_sprung_plain import PlainSprungVehicle
 
@@ -125,8 +131,8 @@ def on_springs(engine: str, vehicle: Any) -> Any:
 
 
 def vehicle_of(scene: BrakingScene) -> Truck:
-    """Parameters of the scene's vehicle, with the scene's overrides; a vehicle on its suspension has those of its plane
-    model.
+    """Returns the parameters of the scene's vehicle, with the scene's overrides; for a vehicle on its suspension the
+    parameters of its plane model.
     """
     if scene.vehicle.file is not None:
         plane: Truck = sprung_of(scene).plane
@@ -151,7 +157,9 @@ def vehicle_of(scene: BrakingScene) -> Truck:
 
 
 def merged_tables(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested tables with some of their values changed; a table that gives another ``kind`` replaces the old one."""
+    """Returns nested tables with some of their values changed; a table that gives another ``kind`` replaces the old
+    table.
+    """
     new = dict(table)
     for key, value in changes.items():
         old = table.get(key)
@@ -161,35 +169,40 @@ def merged_tables(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[
 
 
 def surfaces_of_stretch(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
-    """Names of the surfaces left and right of the line on a stretch; the procedure may name the right one."""
+    """Names of the surfaces left and right of the line on a stretch; a split procedure may name the right surface."""
     return stretch.left, procedure.right or stretch.right or stretch.left
 
 
 def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
-    """Names of all surfaces under a procedure, each once."""
+    """Names of all surfaces of the road of a procedure, without repetition."""
     return list(
         dict.fromkeys(name for stretch in scene.road.stretches for name in surfaces_of_stretch(procedure, stretch))
     )
 
 
 def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road:
-    """Road of a procedure; its surfaces are numbered by their index in ``names``."""
+    """Returns the road of a procedure, with surfaces numbered by their index in ``names``."""
     stretches = [
-        Numbered(s.x, *(names.index(name) for name in surfaces_of_stretch(procedure, s))) for s in scene.road.stretches
+        NumberedStretch(s.x, *(names.index(name) for name in surfaces_of_stretch(procedure, s)))
+        for s in scene.road.stretches
     ]
     try:
-        return road(stretches, scene.road.line, len(kinds_of(scene)))
+        return road(stretches, scene.road.line, len(tyre_kinds_of(scene)))
     except InputError as error:
         raise InputError(scene.file, "road.stretches", error.value, error.allowed) from None
 
 
-def kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
-    """Kinds of tyres in use: False for the front tyre and, if the rear wheels have another tyre, True for that."""
+def tyre_kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
+    """Kinds of tyres in use: False for the front tyre and, if the rear wheels have another tyre, True for the rear
+    tyre.
+    """
     return (False, True) if scene.tyres.own_rear else (False,)
 
 
-def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
-    """Tyre table of a surface, from the scene's file if it has one; the scene may scale its friction."""
+def tyre_table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
+    """Returns the tyre table (friction over slip) of a surface, from a file of the scene if it names one, scaled as in
+    [tyres].
+    """
     scale = scene.tyres.scale.get(name, 1.0)
     if not SCALE_BOUNDS[0] < scale <= SCALE_BOUNDS[1]:
         raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
@@ -202,14 +215,20 @@ def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
     return table if scale == 1.0 else table.scaled(scale)
 
 
-def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
-    """Tyre tables, by name, of all surfaces under all procedures; a different rear tyre has the name SURFACE/rear."""
+def tyre_tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
+    """Returns the tyre tables of all surfaces under all procedures, by name; a different rear tyre has the name
+    SURFACE/rear.
+    """
     names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
-    return {f"{name}/rear" if rear else name: table_of(scene, name, rear) for name in names for rear in kinds_of(scene)}
+    return {
+        f"{name}/rear" if rear else name: tyre_table_of(scene, name, rear)
+        for name in names
+        for rear in tyre_kinds_of(scene)
+    }
 
 
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
-    """Law of the brakes on one axle's wheels."""
+    """Returns the law of torque over pressure of the brakes of "front", "rear" or "trailer"."""
     brake: BrakeTable = getattr(scene.brakes, axle)
     return read(
         Brake,
@@ -225,7 +244,7 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
 
 
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
-    """Brake chambers of all wheels; without the table [pressure] their time constants are zero."""
+    """Returns the brake chambers of all wheels; without [pressure] their time constants are zero."""
     pressure, zeros = scene.pressure, np.zeros(wheels)
     if pressure is None:
         return Chambers(zeros, zeros, scene.brakes.supply)
@@ -238,8 +257,8 @@ def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     )
 
 
-def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
-    """Measured pressures that drive a procedure, None if there are none."""
+def measured_pressures_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
+    """Reads the measured pressures of a procedure; None if the scene has no [measured]."""
     if scene.measured is None:
         return None
     name = scene.measured.file.replace("{procedure}", procedure)
@@ -252,8 +271,8 @@ def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPre
 
 
 def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
-    """The controller of one run of a procedure: measured pressures, or a new controller of the scene."""
-    measured = measured_of(scene, procedure, wheels)
+    """Returns the controller of a procedure's run: measured pressures, or a new controller of the scene."""
+    measured = measured_pressures_of(scene, procedure, wheels)
     if measured is not None:
         return measured
     kind = scene.controller.kind

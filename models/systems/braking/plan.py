@@ -31,14 +31,16 @@ PROCEDURE_TEXTS = {
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Everything that can be refused before a run is refused here, before any file is written."""
+    """Raise InputError, before any file is written, for wrong vehicles, brakes, tyres, roads, controllers or ports, and
+    for circles that the tyres cannot hold.
+    """
     _check_parts(scene, engines_of(scene, engines))
     for name in scene.procedures:
         vehicle_and_start(scene, name)
 
 
 def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Check tyres, brakes, road, controller and port without marching the vehicle; raises InputError."""
+    """Raise InputError for wrong tyres, brakes, road, controller or port; the vehicle is not simulated."""
     for name, procedure in scene.procedures.items():
         known = (*SURFACE_NAMES, *scene.tyres.files)
         if procedure.right is not None and procedure.right not in known:
@@ -53,7 +55,9 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
-    """Refuse a name of the log under which several procedures or engines would write into the same file."""
+    """Raise InputError for a name of the port's log under which several procedures or engines would write the same
+    file.
+    """
     drives = {"procedure": len(scene.procedures), "engine": engines}
     for key, several in drives.items():
         if several > 1 and f"{{{key}}}" not in log:
@@ -62,7 +66,7 @@ def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse --engine without the reference, and a log at the port, where a study makes many drives by the
+    """Raise InputError for --engine without the reference, and for a log at the port, in studies of many runs by the
     reference.
     """
     if engines and "reference" not in engines:
@@ -74,7 +78,7 @@ def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: BrakingScene) -> tuple[Finding, ...]:
-    """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
+    """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
     if scene.vehicle.file is not None:
         return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
     return tuple(
@@ -83,12 +87,13 @@ def findings(scene: BrakingScene) -> tuple[Finding, ...]:
 
 
 REMEDY_OF_QUERY = {"mass": "Masses are in kg", "size": "Lengths are in m", "inertia": "Inertias are in kg m^2"}
+"""Advice for implausible parameters, by kind."""
 USUAL_RADIUS_RANGE = 0.1, 1.5
-"""m, of a usual wheel."""
+"""Smallest and largest radius (m) of usual wheels."""
 
 
 def _implausible_parameters(truck: Truck) -> Iterator[Finding]:
-    """Doubts about implausible parameters of a vehicle that brakes in the plane."""
+    """Yields doubts about implausible parameters of a vehicle in the plane."""
     gyration, span = (
         (truck.yaw_inertia / truck.mass) ** 0.5,
         tuple(g * truck.wheelbase for g in USUAL_GYRATION_RATIOS["rz"]),
@@ -113,9 +118,9 @@ def _implausible_parameters(truck: Truck) -> Iterator[Finding]:
 
 
 def describe(scene: BrakingScene) -> str:
-    """The scene's plan as text: vehicle, road, brakes, controller, procedure, effects and what is not computed.
+    """Returns the plan of a braking scene as text: vehicle, brakes, controller, procedures, step, assumptions, effects.
 
-    Raises InputError for parts that cannot be.
+    Raises InputError for inconsistent parts.
     """
     _check_parts(scene, engines_of(scene, ())[:1])
     vehicle, run, file = vehicle_of(scene), scene.run, scene.vehicle.file
@@ -128,14 +133,14 @@ def describe(scene: BrakingScene) -> str:
         "brakes": f"supply {scene.brakes.supply:g} bar",
         "controller": f"{controller_text(scene)}, every {1e3 * run.sample:g} ms",
     }
-    lines = [_line(*head_and_text) for head_and_text in texts.items()]
+    lines = [_plan_line(*head_and_text) for head_and_text in texts.items()]
     for name, procedure in scene.procedures.items():
         names = ", ".join(surfaces_of(scene, procedure))
-        lines.append(_line(name, f"{PROCEDURE_TEXTS[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
+        lines.append(_plan_line(name, f"{PROCEDURE_TEXTS[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
     length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
-    lines.append(_line("step", f"{length}; order two, wheels exact within it"))
+    lines.append(_plan_line("step", f"{length}; order two, wheels exact within it"))
     if file is not None:
-        lines += [_line(*line) for line in (*_towed_body_lines(scene), *_native_and_other_forces(scene))]
+        lines += [_plan_line(*line) for line in (*_towed_body_lines(scene), *_native_and_other_forces(scene))]
     assumed = {
         assumption.says: assumption for name in scene.procedures for assumption in _assumptions_of_scene(scene, name)
     }
@@ -143,8 +148,8 @@ def describe(scene: BrakingScene) -> str:
 
 
 def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
-    """Lines on the forces of a suspended vehicle: those that engines compute by native elements, those that all engines
-    share, and those that the reference computes independently.
+    """Lines (heading, text) on the forces of a suspended vehicle: computed by native elements of engines, shared by all
+    engines, and computed independently by the reference.
     """
     from models.engines.free_vehicle import ENGINES, native_share
     from models.engines.towed_springs import towed_division
@@ -166,8 +171,8 @@ def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
 
 
 def _towed_body_lines(scene: BrakingScene) -> list[tuple[str, str]]:
-    """Lines on the bodies that a suspended vehicle tows; hitch positions are measured forward from its centre of
-    mass.
+    """Lines (heading, text) on the bodies that a suspended vehicle tows; hitch positions are measured forward from its
+    centre of mass.
     """
     from models.vehicles.towing import hitch_line
 
@@ -180,18 +185,18 @@ def _assumptions_of_scene(scene: BrakingScene, name: str) -> list[Assumption]:
 
 
 def user_code(scene: BrakingScene) -> str:
-    """Name of the user's own code that a run of the scene executes, "" if there is none."""
+    """Name of the user's code (callable, command or FMU) that a run of the scene executes, "" if there is none."""
     named = [key for key in ("callable", "command", "fmu") if getattr(scene.port, key, None) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else ""
 
 
 def controller_text(scene: BrakingScene) -> str:
-    """Text that names the controller at the port, or the source of the measured pressures."""
+    """Text that names the scene's controller, what is connected to the port, or the file of measured pressures."""
     if scene.measured is not None:
         return f"measured pressures {scene.measured.file}"
     named = [] if scene.port is None else [key for key in PORT_KEYS if getattr(scene.port, key) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
 
 
-def _line(label: str, text: str) -> str:
+def _plan_line(label: str, text: str) -> str:
     return f"  {label:<10} {text}"

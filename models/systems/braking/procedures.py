@@ -1,4 +1,4 @@
-"""The driver's part of a test: straight braking, split friction, braking in a turn, J-turn, steered without looking."""
+"""Test procedures of braking: straight, split friction, in a turn, J-turn; the driver steers open loop."""
 
 import json
 from contextlib import ExitStack
@@ -20,21 +20,25 @@ from models.systems.braking.of_scene import SPRUNG_ENGINE, braked_vehicle, contr
 from models.systems.braking.scene import BrakingScene, Procedure
 
 UNBRAKED_DURATION = 4.0
-"""s: for which the response to steering is watched after its last knot."""
+"""Time (s) after the last steering knot over which the yaw response without brakes is computed."""
 STEERED_WHEELS = 2
-"""Wheels that are steered: those of the first axle, in parallel."""
+"""Number of steered wheels: the wheels of the first axle, in parallel."""
 ACCELERATION_INTERVAL = 1e-5
-"""s: time over which the accelerations of a steady turn are taken."""
+"""Time step (s) over which the accelerations of a steady turn are computed."""
 CONTINUATION_SHARES = np.linspace(0.1, 1.0, 10)
-"""Shares of the speed through which a steady turn is followed: other solutions slide beyond the tyres' peak."""
+"""Shares of the speed at which a steady turn is solved in turn, each from the solution before: solutions that are
+solved at once may slide beyond the tyres' peak.
+"""
 LARGEST_TURN_ANGLE = 0.5
-"""rad: steer angle, side slip and angles of hinges of a turn that is one."""
+"""Largest steer angle, side slip and hinge angle (rad) of a steady turn that is accepted."""
 STEADY_ACCELERATION = 1e-6
-"""m/s^2, and rad/s^2 times 1 m: what is left of a steady turn's accelerations."""
+"""Largest residual acceleration (m/s^2 and rad/s^2) of a steady turn."""
 
 
 def vehicle_and_start(scene: BrakingScene, name: str) -> tuple[BrakedVehicle, StartState]:
-    """Vehicle and start of a procedure; InputError for a circle that the tyres' side forces cannot hold."""
+    """Returns vehicle and start state of a procedure. Raises InputError for a circle that the tyres' side forces cannot
+    hold.
+    """
     procedure = scene.procedures[name]
     vehicle = braked_vehicle(scene, procedure)
     try:
@@ -52,14 +56,14 @@ def vehicle_and_start(scene: BrakingScene, name: str) -> tuple[BrakedVehicle, St
 
 
 def steering_of(procedure: Procedure, vehicle: BrakedVehicle) -> Steering:
-    """The driver's steering from time 0 on; a single angle is applied at once."""
+    """Returns the driver's steering over time from time 0 on; a single angle is applied at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     knot_times, angles = np.array(knots, float).T
     return Steering(knot_times, angles, steer_angles(vehicle, 1.0))
 
 
 def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
-    """Response of the yaw rate to the steering step of a J-turn without brakes; None where it does not settle."""
+    """Computes the yaw rate's response to the steering of a J-turn without brakes; None where it does not settle."""
     vehicle, start = vehicle_and_start(scene, name)
     steering = steering_of(scene.procedures[name], vehicle)
     path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED_DURATION)
@@ -67,7 +71,7 @@ def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
 
 
 def engines_of(scene: BrakingScene, requested_engines: tuple[str, ...]) -> tuple[str, ...]:
-    """The requested engines, or the usual engine if none was requested.
+    """Returns the engines in which a scene is run: the requested engines, or the usual engine if none was requested.
 
     The reference takes minutes for a stop on a suspension: there it is used only if no other engine is requested.
     """
@@ -83,8 +87,8 @@ def engines_of(scene: BrakingScene, requested_engines: tuple[str, ...]) -> tuple
 def controlled_run(
     scene: BrakingScene, name: str, vehicle: BrakedVehicle, start_state: StartState, engine: str = ""
 ) -> BrakingPath:
-    """One run from a start, with the scene's controller in the loop or with what is connected to the port. ``engine``
-    is only a name, for files.
+    """Run a procedure from a start state, with the scene's controller in the loop or with what is connected to the
+    port. ``engine`` : name of the engine in file names; the vehicle's engine is used.
     """
     usual = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
@@ -94,11 +98,16 @@ def controlled_run(
     return path if clock is None else replace(path, clock=clock.report())
 
 
-def controller_answers(
-    scene: BrakingScene, name: str, vehicle: BrakedVehicle, times: np.ndarray, rims: np.ndarray, speeds: np.ndarray
+def controller_commands(
+    scene: BrakingScene,
+    name: str,
+    vehicle: BrakedVehicle,
+    times: np.ndarray,
+    wheel_speeds: np.ndarray,
+    speeds: np.ndarray,
 ) -> np.ndarray:
-    """Commands (n, W), of valves or pressures, with which a run's controller answers given speeds (m/s) of rims (n, W)
-    and of the vehicle (n,) at times (n,) in s. No vehicle is simulated.
+    """Returns the commands (n, W), valve states or pressures (bar), of a run's controller to given wheel speeds (n, W)
+    and vehicle speeds (n,) in m/s at times (n,) in s. No vehicle is simulated.
     """
     usual, supply = controller_of(scene, vehicle.plane.wheels, name), vehicle.chambers.supply
     with ExitStack() as stack:
@@ -108,14 +117,16 @@ def controller_answers(
             )
         known = speeds if vehicle.speed_given else np.full(speeds.shape, np.nan)
         commands = [
-            usual.sample(Sample(k, round(time * 1e9), rims[k], True, supply, float(known[k])))
+            usual.sample(Sample(k, round(time * 1e9), wheel_speeds[k], True, supply, float(known[k])))
             for k, time in enumerate(times)
         ]
     return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
 def port_of(scene: BrakingScene, name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
-    """Facts of a run that the port needs. A log belongs to a vehicle and its drive, whatever controller answered."""
+    """Returns the facts of a run that the port needs. The key of a log depends on vehicle and procedure, not on the
+    controller.
+    """
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
     return ControllerRun(
@@ -131,26 +142,26 @@ def port_of(scene: BrakingScene, name: str, vehicle: BrakedVehicle, engine: str)
 
 
 def steer_angles(vehicle: BrakedVehicle, angle: float) -> np.ndarray:
-    """Steer angles (W,) with the front wheels at one angle (rad)."""
+    """Steer angles (W,) of all wheels with the front wheels at an angle (rad), the other wheels straight."""
     return np.where(np.arange(vehicle.plane.wheels) < STEERED_WHEELS, angle, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class SteadyTurn:
-    """A steady circle: steer angles (W,) in rad, and a start state in which the first unit heads along x."""
+    """A steady circle: steer angles (W,) in rad, and a start state in which the towing vehicle heads along x."""
 
     steer: np.ndarray
     start: StartState
 
 
 @dataclass(frozen=True, eq=False)
-class Circle:
-    """Motion of a vehicle at a speed (m/s) whose first unit's centre of mass follows a circle (radius in m, positive to
-    the left).
+class CircleMotion:
+    """Motion of a vehicle whose towing unit's centre of mass follows a circle at a speed (m/s); radius in m, positive
+    to the left.
 
-    All wheels roll freely: the drive that holds the speed (m/s) is not there, so that the vehicle slows down by the
-    drag of its slip angles. Unknown (n - 1,) are the steer angle, the side slip (rad) and all n coordinates but the
-    first unit's place and heading: headings of the units behind, or, if it is ``sprung``, those on the springs.
+    All wheels roll freely: no drive holds the speed, so that the vehicle slows down by the drag of its slip angles.
+    Unknowns (n - 1,) are the steer angle, the side slip (rad) and all n coordinates but position and heading of the
+    towing unit: headings of towed units or, if ``sprung``, the coordinates of the suspension.
     """
 
     vehicle: BrakedVehicle
@@ -159,7 +170,7 @@ class Circle:
     sprung: bool = False
 
     def state(self, unknowns: np.ndarray) -> np.ndarray:
-        """Positions and rates (2, n) for these unknowns."""
+        """Returns positions and rates (2, n) of the coordinates for given unknowns."""
         positions_and_rates = np.zeros((2, unknowns.size + 1))
         positions_and_rates[0, 3:], positions_and_rates[1, 2 : 3 if self.sprung else None] = (
             unknowns[2:],
@@ -169,39 +180,45 @@ class Circle:
         return positions_and_rates
 
     def motion(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) for these unknowns, and the wheels' speeds of turning (W,)."""
+        """Returns accelerations (n,) of the coordinates for given unknowns, and angular speeds of the wheels (W,) in
+        rad/s.
+        """
         vehicle, state, steer = self.vehicle, self.state(unknowns), steer_angles(self.vehicle, unknowns[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
         motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(state, steer, vehicle.on_road)
         return motion
 
-    def left(self, unknowns: np.ndarray) -> np.ndarray:
-        """Residual accelerations (n - 1,), zero on a steady circle: first that across the path, then those of the other
-        coordinates.
+    def residual_accelerations(self, unknowns: np.ndarray) -> np.ndarray:
+        """Residual accelerations (n - 1,) for given unknowns, zero on a steady circle: across the path, then of the
+        coordinates from the heading on.
         """
         rates, _ = self.motion(unknowns)
         across = rates[1] * np.cos(unknowns[1]) - rates[0] * np.sin(unknowns[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
     def solve_steady_circle(self, unknowns_guess: np.ndarray) -> tuple[np.ndarray, bool]:
-        """Solution for the unknowns of a steady circle from a guess, and whether its residual accelerations vanish."""
+        """Solves for the unknowns of a steady circle from a guess. Returns them, and whether the residual accelerations
+        vanish.
+        """
         from scipy.optimize import root
 
-        unknown: np.ndarray = root(self.left, unknowns_guess, tol=1e-12).x
-        return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY_ACCELERATION)
+        unknown: np.ndarray = root(self.residual_accelerations, unknowns_guess, tol=1e-12).x
+        return unknown, bool(np.abs(self.residual_accelerations(unknown)).max() <= STEADY_ACCELERATION)
 
-    def turn(self, unknowns: np.ndarray) -> SteadyTurn:
-        """The steady turn, with which a procedure begins, for these unknowns."""
+    def steady_turn(self, unknowns: np.ndarray) -> SteadyTurn:
+        """Returns the steady turn for given unknowns, with which a procedure begins."""
         return SteadyTurn(
             steer_angles(self.vehicle, unknowns[0]), StartState(self.state(unknowns), self.motion(unknowns)[1])
         )
 
 
 def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTurn | None:
-    """The steady circle (see ``Circle``) of a vehicle; None if there is none.
+    """Solve the steady circle of a vehicle (see ``CircleMotion``) at a speed (m/s) and radius (m); None if there is
+    none.
 
-    That of the plane vehicle is followed from a low speed on, and is the first guess of one on its suspension.
+    The circle of the plane vehicle is followed from a low speed on; it is the first guess for a vehicle on its
+    suspension.
     """
     plane, units = vehicle.plane, vehicle.plane.masses.size
     rearmost_x = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
@@ -209,21 +226,23 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
     unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -rearmost_x[0] / radius
     unknown[2:] = (rearmost_x[1:] - rearmost_x[0]) / radius
     for slower in speed * CONTINUATION_SHARES:
-        unknown, steady = Circle(vehicle, slower, radius).solve_steady_circle(unknown)
+        unknown, steady = CircleMotion(vehicle, slower, radius).solve_steady_circle(unknown)
         if not steady or np.abs(unknown).max() > LARGEST_TURN_ANGLE:
             return None
-    circle, state = Circle(vehicle, speed, radius), Circle(vehicle, speed, radius).state(unknown)
+    circle, state = CircleMotion(vehicle, speed, radius), CircleMotion(vehicle, speed, radius).state(unknown)
     if vehicle.sprung is not None:
         guess = np.zeros(vehicle.engine.size - 1)
         guess[0], guess[1] = unknown[0], np.arctan2(state[1, 1], state[1, 0])
         guess[vehicle.sprung.turns - 1] = np.diff(state[0, 2:])
-        circle = Circle(vehicle, speed, radius, sprung=True)
+        circle = CircleMotion(vehicle, speed, radius, sprung=True)
         unknown, steady = circle.solve_steady_circle(guess)
-    return circle.turn(unknown) if steady else None
+    return circle.steady_turn(unknown) if steady else None
 
 
 def _rolling_speeds(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
-    """Speeds of turning (W,) in rad/s of wheels that roll without slip."""
+    """Angular speeds (W,) in rad/s of wheels that roll without slip, for positions and rates (2, 2 + U) of a plane
+    vehicle.
+    """
     headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
     forward = np.column_stack((np.cos(headings), np.sin(headings)))
     leftward = np.column_stack((-forward[:, 1], forward[:, 0]))
@@ -235,8 +254,8 @@ def _rolling_speeds(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.nd
 
 
 def _accelerations(vehicle: BrakedVehicle, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations (2 + U,) of a plane vehicle whose unbraked wheels roll freely, and the wheels' speeds of turning
-    (W,).
+    """Returns accelerations (2 + U,) of a plane vehicle whose wheels roll freely without brakes, and angular speeds of
+    the wheels (W,) in rad/s.
     """
     plane, no_torques, turning = (
         vehicle.plane,

@@ -1,4 +1,4 @@
-"""One procedure of a scene of braking, from scene to result: built, driven in an engine, labelled."""
+"""Run of a procedure of a braking scene in an engine, and its result."""
 
 import time
 from dataclasses import replace
@@ -9,29 +9,29 @@ from models.core.assumptions import with_assumptions
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.systems.braking.assumptions import assumptions
-from models.systems.braking.errors import OtherRuns, with_error
+from models.systems.braking.errors import RepeatedRuns, with_error
 from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
-from models.systems.braking.of_scene import on_springs
-from models.systems.braking.procedures import controlled_run, controller_answers, engines_of, vehicle_and_start
+from models.systems.braking.of_scene import suspended_in_engine
+from models.systems.braking.procedures import controlled_run, controller_commands, engines_of, vehicle_and_start
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import wheel_names
 
 REPORT_CHANNELS = {"force_x": "N", "force_y": "N", "load": "N", "slip": "1", "slip_angle": "rad"}
-"""Channels of what wheels report of the last step of every sample, with their units."""
+"""Channels of the wheels in the last time step of every controller sample, with their units."""
 
 
 def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bool = False) -> Result:
-    """Drive one of the scene's procedures, by default the first, with its controller or with what is connected to the
-    port.
+    """Run a procedure of the scene, by default the first, with the scene's controller or with what is connected to the
+    port. The result's detail is its ``BrakingPath``.
 
-    engine : the usual one of such a vehicle if none is named; error : whether that of the steps is estimated, by
-    further runs. What the run assumes is judged always. The result's detail is its ``BrakingPath``. Raises InputError,
-    Refused, or RunFailed, whose ``partial`` is the result until then, None where nothing was recorded.
+    engine : by default the usual engine for the vehicle; error : whether the error of the time steps is estimated, by
+    further runs. Assumptions are always checked. Raises InputError, Refused, or RunFailed, whose ``partial`` is the
+    result until then, None where nothing was recorded.
     """
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
     vehicle, start = vehicle_and_start(scene, name)
-    vehicle = marched_by(vehicle, engine)
+    vehicle = vehicle_in_engine(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
         path = controlled_run(scene, name, vehicle, start, engine)
@@ -42,13 +42,15 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
         raise
     stop = with_assumptions(_labelled_result(scene, name, engine, path, time.perf_counter() - begun), assumed)
 
-    return with_error(stop, scene, _other_runs(scene, name, vehicle, start, engine)) if error else stop
+    return with_error(stop, scene, _repeated_runs(scene, name, vehicle, start, engine)) if error else stop
 
 
-def marched_by(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
-    """The vehicle with the engine that marches it. In the plane, "reference" means the vehicle's own steps."""
+def vehicle_in_engine(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
+    """Returns the vehicle with the engine that integrates its motion. For a plane vehicle "reference" means its own
+    equations.
+    """
     if vehicle.sprung is not None:
-        return replace(vehicle, engine=on_springs(engine, vehicle.sprung))
+        return replace(vehicle, engine=suspended_in_engine(engine, vehicle.sprung))
     if engine == "reference":
         return vehicle
     from models.engines.braking import EngineChassis
@@ -56,8 +58,10 @@ def marched_by(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
     return replace(vehicle, engine=EngineChassis(engine, vehicle.plane))
 
 
-def _other_runs(scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str) -> OtherRuns:
-    """Functions that repeat the procedure in other steps and write no log."""
+def _repeated_runs(
+    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str
+) -> RepeatedRuns:
+    """Returns functions that repeat the procedure in other time steps, and the controller's commands, without a log."""
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
@@ -65,15 +69,17 @@ def _other_runs(scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: S
         shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": end_time})})
         return controlled_run(shorter, name, replace(vehicle, substeps=steps), start, engine)
 
-    def answered(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-        return controller_answers(scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds)
+    def commands_for_speeds(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+        return controller_commands(
+            scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds
+        )
 
-    return OtherRuns(rerun, answered)
+    return RepeatedRuns(rerun, commands_for_speeds)
 
 
 def _labelled_result(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:
-    """Result with the motion of each coordinate and with the turning, pressure, torque, forces, load and slips of each
-    wheel.
+    """Returns the result of a procedure: motion of each coordinate; turning, brake pressure, torque, forces, load and
+    slips of each wheel.
     """
     units = ", ".join("rad" if coordinate.split()[-1][0] in "hr" else "m" for coordinate in path.coordinates)
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))

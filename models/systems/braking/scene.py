@@ -1,4 +1,4 @@
-"""Scenes of braking: a vehicle, the road under its tyres, brakes, a controller in the loop, and a test procedure."""
+"""Scenes of braking: a vehicle, surfaces of the road, brakes, a controller in the loop, and test procedures."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -19,21 +19,21 @@ from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.own_model.scene_vehicle import MJCF_EXTENSION
 
 LARGEST_SPEED = 100.0
-"""m/s; no road vehicle brakes from more."""
+"""Largest speed (m/s) at which braking may begin; no road vehicle is faster."""
 LARGEST_TORQUE = 1e6
-"""N m; no brake of one wheel gives more, by a factor of twenty."""
+"""Largest brake torque of a wheel (N m) that a scene may have: twenty times that of a real brake."""
 LONGEST_STEP = 0.02
-"""s: up to which light braking and braking from rolling were held to their closed forms."""
+"""Longest time step (s) for which light braking and braking from rolling were compared with closed forms."""
 MOST_SUBSTEPS = 1000
-"""Steps within a sample."""
-Procedures = Literal["straight", "split", "turn", "j_turn"]
+"""Most time steps within a sample of the controller."""
+ProcedureKind = Literal["straight", "split", "turn", "j_turn"]
 
 
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+TimeAnglePair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class VehicleTable(Strict):
-    """[vehicle]: mass, place of the axles, wheels."""
+    """[vehicle]: parameters of a vehicle in the plane, or the file of a vehicle on its suspension."""
 
     parameters: str = Field(default="paper", description="paper, or a TOML file with every parameter")
     override: dict[str, Any] = Field(default_factory=dict, description="parameters that are changed")
@@ -47,13 +47,15 @@ class VehicleTable(Strict):
 
 
 class LoadTransfer(Strict):
-    """[load_transfer]: semi-static, from the accelerations of the body; not named, loads stay as they are at rest."""
+    """[load_transfer]: quasi-static load transfer by the accelerations of the body; without this table wheel loads are
+    those at rest.
+    """
 
     front: float = Field(default=0.3, ge=0.0, le=1.0, description="share of the front axle in that of cornering")
 
 
 class Stretch(Strict):
-    """One of [[road.stretches]]: surfaces from x on."""
+    """[[road.stretches]]: surfaces of the road from x on, left and right of the line."""
 
     x: float = quantity("m", "where it begins; the first also holds before", default=0.0, signed=True)
     left: str = Field(description="surface left of the line")
@@ -68,7 +70,7 @@ class RoadTable(Strict):
 
 
 class TyreTables(Strict):
-    """[tyres]: friction of the surfaces."""
+    """[tyres]: friction of tyres on the surfaces of the road."""
 
     scale: dict[str, float] = Field(default_factory=dict, description="factor on the friction of a surface")
     files: dict[str, str] = Field(default_factory=dict, description="CSV or .tir file of the friction on a surface")
@@ -76,7 +78,9 @@ class TyreTables(Strict):
 
 
 class BrakeTable(Strict):
-    """[brakes.front], [brakes.rear]: torque by pressure, a straight line where no more is said."""
+    """[brakes.front], [brakes.rear], [brakes.trailer]: torque of a wheel's brake over pressure, linear unless falling
+    pressure has another line.
+    """
 
     gradient: float = quantity("N m/bar", "of the torque while pressure rises")
     push_out: float = quantity("bar", "pressure above which torque rises from none", default=0.0, zero=True)
@@ -89,7 +93,7 @@ class BrakeTable(Strict):
 
 
 class BrakesTable(Strict):
-    """[brakes]: brakes of each axle and of the towed vehicle's wheels, and the supply pressure."""
+    """[brakes]: brakes of the front axle, the rear axle and the trailer's wheels, and the supply pressure."""
 
     front: BrakeTable = BrakeTable(gradient=1500.0)
     rear: BrakeTable = BrakeTable(gradient=1200.0)
@@ -98,7 +102,9 @@ class BrakesTable(Strict):
 
 
 class PressureTable(Strict):
-    """[pressure]: first-order chambers; not named, they follow their valves at once."""
+    """[pressure]: brake chambers that fill and empty with first-order lag; without this table pressures follow the
+    valves at once.
+    """
 
     fill: float = quantity("s", "time constant of filling", default=0.15)
     empty: float = quantity("s", "time constant of emptying", default=0.1)
@@ -115,34 +121,34 @@ class PressureTable(Strict):
 
 
 class Relaxation(Strict):
-    """[relaxation]: slip angles lag; not named, tyres answer at once."""
+    """[relaxation]: relaxation lengths over which slip angles lag; without this table side forces build up at once."""
 
     front: float = quantity("m", "relaxation length across the front wheels")
     rear: float = quantity("m", "relaxation length across all others")
 
 
 class ControllerTable(Strict):
-    """[controller]: what is in the loop; its parameters are checked by itself."""
+    """[controller]: the brake controller in the loop, with parameters that the controller checks."""
 
     kind: str = Field(default="none", description="none, or the name of a controller")
     parameters: dict[str, Any] = Field(default_factory=dict, description="of the controller")
     true_speed: bool = Field(default=True, description="the vehicle's speed is given to it")
 
 
-class Measured(Strict):
-    """[measured]: chamber pressures drive the vehicle open loop, in place of a controller."""
+class MeasuredTable(Strict):
+    """[measured]: measured chamber pressures that brake the vehicle in place of a controller."""
 
     file: str = Field(description="CSV of them, and of wheel speeds if they were measured; {procedure} is its name")
 
 
 class Procedure(Strict):
-    """[procedures.NAME]: what the driver does. Left is positive."""
+    """[procedures.NAME]: a test procedure: initial speed, and steering of the driver, positive to the left."""
 
-    kind: Procedures = Field(default="straight", description="straight, split, turn or j_turn")
+    kind: ProcedureKind = Field(default="straight", description="straight, split, turn or j_turn")
     speed: float = quantity("m/s", "at which the brake is applied", default=11.11)
     right: str | None = Field(default=None, description="surface right of the line on every stretch (split)")
     steer: float | None = quantity("rad", "fixed angle of the front wheels (j_turn)", default=None, signed=True)
-    steering: list[Pair] | None = Field(
+    steering: list[TimeAnglePair] | None = Field(
         default=None,
         min_length=1,
         description="angle of the front wheels by time in place of steer, linear between: [[s, rad], ...] (j_turn)",
@@ -151,7 +157,7 @@ class Procedure(Strict):
 
 
 class RunTable(Strict):
-    """[run]."""
+    """[run]: sample time of the controller, time steps within a sample, and duration."""
 
     sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
     substeps: int = Field(default=4, ge=1, le=MOST_SUBSTEPS, description="steps of the vehicle within a sample")
@@ -163,7 +169,9 @@ class RunTable(Strict):
 
 
 class BrakingScene(SceneFile):
-    """One scene of braking; tables that are effects are None where the scene does not name them."""
+    """A scene of braking: all tables of its scene file. Tables that are effects are None where the scene does not have
+    them.
+    """
 
     system: Literal["braking"] = "braking"
     study: str = Field(default="braking", description="the study that runs the scene")
@@ -177,16 +185,20 @@ class BrakingScene(SceneFile):
     pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
     controller: ControllerTable = ControllerTable()
     port: PortTable | None = Field(default=None, description="what stands behind the port, its signals and faults")
-    measured: Measured | None = Field(default=None, description="pressures that were measured, instead of a controller")
+    measured: MeasuredTable | None = Field(
+        default=None, description="pressures that were measured, instead of a controller"
+    )
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
     run: RunTable = RunTable()
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked braking scene from the nested tables of a scene file. Raises InputError for unknown keys and for
+    values outside their ranges.
+    """
     scene = checked(BrakingScene, table, file, folder)
-    parts = (_of_procedures, _of_vehicle, _of_brakes, _refusals_of_run)
+    parts = (_procedure_refusals, _vehicle_refusals, _brake_refusals, _run_refusals)
     for key_path, value, allowed in chain.from_iterable(refusals_of(scene) for refusals_of in parts):
         raise InputError(scene.file, key_path, value, allowed)
     check(scene)
@@ -194,19 +206,19 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Br
 
 
 KEYS_OF_PROCEDURE = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
-"""Keys that a procedure reads beside its speed; it needs one of them."""
-STEEPEST_STEER = 1.0
-"""rad; no wheel is steered further."""
-RefusedPlaces = Iterator[tuple[str, Any, str]]
-"""Places that cannot be so, their values, and what is allowed."""
+"""Keys that each kind of procedure has besides its speed; exactly one of them is needed."""
+LARGEST_STEER_ANGLE = 1.0
+"""Largest steer angle (rad) of the front wheels in a scene."""
+Refusals = Iterator[tuple[str, Any, str]]
+"""Wrong keys of a scene, their values, and what is allowed there."""
 
 
-def _of_procedures(scene: BrakingScene) -> RefusedPlaces:
+def _procedure_refusals(scene: BrakingScene) -> Refusals:
     for name, procedure in scene.procedures.items():
-        yield from ((f"procedures.{name}.{key}", *wrong) for key, *wrong in _of_procedure(procedure))
+        yield from ((f"procedures.{name}.{key}", *wrong) for key, *wrong in _refusals_of_procedure(procedure))
 
 
-def _of_procedure(procedure: Procedure) -> RefusedPlaces:
+def _refusals_of_procedure(procedure: Procedure) -> Refusals:
     if procedure.speed > LARGEST_SPEED:
         yield "speed", procedure.speed, f"must be at most {LARGEST_SPEED:g} m/s"
     read = KEYS_OF_PROCEDURE[procedure.kind]
@@ -218,20 +230,22 @@ def _of_procedure(procedure: Procedure) -> RefusedPlaces:
         yield read[0], None, f"is missing: {procedure.kind} needs {' or '.join(read)}"
     if len(named) > 1:
         yield named[1], None, f"has no meaning beside {named[0]}: leave one out"
-    if procedure.steer is not None and abs(procedure.steer) > STEEPEST_STEER:
-        yield "steer", procedure.steer, f"must be at most {STEEPEST_STEER:g} rad, of either sign"
+    if procedure.steer is not None and abs(procedure.steer) > LARGEST_STEER_ANGLE:
+        yield "steer", procedure.steer, f"must be at most {LARGEST_STEER_ANGLE:g} rad, of either sign"
     if procedure.steering is not None:
         knot_times, angles = np.array(procedure.steering, float).T
         if (np.diff(knot_times) <= 0.0).any() or knot_times[0] < 0.0:
             yield "steering", knot_times.tolist(), "times must rise from knot to knot, from 0 on, in s"
-        if np.abs(angles).max() > STEEPEST_STEER:
-            yield "steering", angles.tolist(), f"angles must be at most {STEEPEST_STEER:g} rad, of either sign"
+        if np.abs(angles).max() > LARGEST_STEER_ANGLE:
+            yield "steering", angles.tolist(), f"angles must be at most {LARGEST_STEER_ANGLE:g} rad, of either sign"
     if procedure.radius is not None and abs(procedure.radius) < 10.0:
         yield "radius", procedure.radius, "must be at least 10 m, of either sign"
 
 
-def _of_vehicle(scene: BrakingScene) -> RefusedPlaces:
-    """Refusals of keys that repeat what vehicle.file defines, and of keys that have no meaning without this file."""
+def _vehicle_refusals(scene: BrakingScene) -> Refusals:
+    """Yields refusals of [vehicle] keys that repeat what vehicle.file defines, and of keys that have no meaning without
+    this file.
+    """
     vehicle = scene.vehicle
     if vehicle.file is None:
         if vehicle.spin_inertia is not None:
@@ -246,8 +260,8 @@ def _of_vehicle(scene: BrakingScene) -> RefusedPlaces:
             yield f"vehicle.{key}", None, "has no meaning beside vehicle.file, which says it all"
 
 
-def _of_brakes(scene: BrakingScene) -> RefusedPlaces:
-    """Refusals of a supply pressure that no vehicle has, and of torques that no brake gives."""
+def _brake_refusals(scene: BrakingScene) -> Refusals:
+    """Yields refusals of a supply pressure that no vehicle has, and of torques that no brake gives."""
     supply = scene.brakes.supply
     if supply > LARGEST_PRESSURE:
         yield "brakes.supply", supply, f"must be at most {LARGEST_PRESSURE:g} bar"
@@ -260,7 +274,7 @@ def _of_brakes(scene: BrakingScene) -> RefusedPlaces:
             yield f"brakes.{axle}.{key}", value, torque_limit
 
 
-def _refusals_of_run(scene: BrakingScene) -> RefusedPlaces:
+def _run_refusals(scene: BrakingScene) -> Refusals:
     run, pressure = scene.run, scene.pressure
     if not 1e-4 <= run.sample <= 0.1:
         yield "run.sample", run.sample, "must be from 0.0001 to 0.1 s"

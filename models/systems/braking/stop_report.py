@@ -1,4 +1,4 @@
-"""A stop in the paper's terms: distances, turning, decelerations, and of each wheel slips, locks and pressures.
+"""Results of a stop: distances, yaw, decelerations, side slip; slips, locks and pressures of each wheel.
 
 Source: the tables beside Figs 2 and 3 of G. Palmkvist and O. Nordstrom, A hybrid laboratory test method for anti-lock
 systems. Both decelerations are given that may be called mean: v0^2 / 2d and v0 / T differ by a few per cent.
@@ -17,42 +17,43 @@ TOWED_WHEELS = {
     2: ("trailer left", "trailer right"),
     4: ("trailer front left", "trailer front right", "trailer rear left", "trailer rear right"),
 }
-"""Names of the wheels of what is towed, by their number."""
+"""Names of the wheels of towed vehicles, by the number of these wheels."""
 HITCH_SUFFIX = " hitch rz"
-"""End of the names of coordinates by which a towed body yaws beside what tows it."""
+"""Ending of the names of coordinates that are the yaw of a towed body relative to its towing vehicle."""
 SLOWEST_SLIP_SPEED = 1.0
-"""m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
+"""Speed (m/s) below which slips and slip angles are left out, as they mean nothing for a vehicle that hardly moves."""
 SLIP_LIMITS = (0.2, 0.5)
-"""Slips of which it is told how much of the time they are exceeded: chosen, the paper's are not legible."""
+"""Slips for which the report gives the share of time above them: chosen, as the paper's are not legible."""
 
 
 def wheel_names(wheel_count: int) -> tuple[str, ...]:
-    """Names of a vehicle's ``wheel_count`` wheels, those of towed vehicles included."""
+    """Names of a vehicle's ``wheel_count`` wheels, including wheels of towed vehicles."""
     return (*WHEEL_NAMES, *TOWED_WHEELS[wheel_count - len(WHEEL_NAMES)])
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Time histories of a braking run, for the first unit's centre of mass, along and across its path.
+    """Time histories of a braking run for the centre of mass of the towing vehicle, along and across its path.
 
-    times, speed, way, side_slip, across (n,): s, m/s, m, rad, m/s^2 to the left; lengths (n - 1,): of the samples (s).
+    times, speed, way, side_slip (n,): s, m/s, m, rad; lateral_acceleration (n - 1,): m/s^2 to the left; lengths (n -
+    1,): of the samples (s).
     """
 
     path: BrakingPath
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the samples (n,) in s."""
+        """Times (n,) of the samples in s."""
         return self.path.times
 
     @property
     def lengths(self) -> np.ndarray:
-        """Lengths of the samples (n - 1,) in s."""
+        """Durations (n - 1,) of the samples in s."""
         return np.diff(self.path.times)
 
     @property
     def speed(self) -> np.ndarray:
-        """Speed (n,) of the first unit's centre of mass in m/s."""
+        """Speed (n,) of the towing vehicle's centre of mass in m/s."""
         return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
 
     @property
@@ -63,7 +64,7 @@ class Stop:
 
     @property
     def side_slip(self) -> np.ndarray:
-        """Side slip angle (n,) in rad, from the vehicle's x axis to its velocity; 0 where it is slower than
+        """Side slip angle (n,) in rad, from the vehicle's x axis to its velocity; 0 where the vehicle is slower than
         SLOWEST_SLIP_SPEED.
         """
         course = np.arctan2(self.path.states[:, 1, 1], self.path.states[:, 1, 0])
@@ -71,17 +72,17 @@ class Stop:
         return np.where(self.speed > SLOWEST_SLIP_SPEED, angle, 0.0)
 
     @property
-    def across(self) -> np.ndarray:
+    def lateral_acceleration(self) -> np.ndarray:
         """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, positive to the left."""
         rates_before, rates_after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
         size = np.maximum(self.speed[:-1], 1e-9)
         change = (rates_after - rates_before) / np.maximum(self.lengths, 1e-12)[:, None]
         return (rates_before[:, 0] * change[:, 1] - rates_before[:, 1] * change[:, 0]) / size
 
-    def of_vehicle(self) -> dict[str, float]:
-        """Results of the whole vehicle over a stop, by name and unit."""
+    def vehicle_results(self) -> dict[str, float]:
+        """Results of the vehicle over a stop, by name and unit: distance, time, decelerations, yaw, side slip."""
         path, speed, distances = self.path, self.speed, self.way
-        slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.across)
+        slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.lateral_acceleration)
         time, distance = float(path.times[-1]), float(distances[-1])
         return {
             "initial speed [m/s]": float(speed[0]),
@@ -97,20 +98,20 @@ class Stop:
             "MFDD [m/s^2]": mean_fully_developed(path.times, distances, speed),
             "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
             "largest side slip at [s]": float(path.times[slip]),
-            "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
+            "largest lateral acceleration [m/s^2]": float(self.lateral_acceleration[lateral]),
             "largest lateral acceleration at [s]": float(path.times[lateral]),
-        } | self.of_body()
+        } | self.body_results()
 
     @property
     def lean(self) -> np.ndarray | None:
-        """Angles (n, 2) in rad of a vehicle on its suspension: roll to the right, and pitch nose down; None for a plane
+        """Roll to the right and pitch nose down (n, 2) in rad of a vehicle on its suspension; None for a plane
         vehicle.
         """
         columns = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
         return self.path.states[:, 0, columns] if columns else None
 
-    def of_body(self) -> dict[str, float]:
-        """Results for the sprung body over a stop, by name and unit; empty for a plane vehicle."""
+    def body_results(self) -> dict[str, float]:
+        """Largest roll, largest pitch and least wheel load over a stop, by name and unit; empty for a plane vehicle."""
         if self.lean is None:
             return {}
         roll, pitch = np.degrees(self.lean).T
@@ -122,8 +123,8 @@ class Stop:
 
     @property
     def units(self) -> np.ndarray:
-        """Positions (n, 2 + U): of the first unit's centre (m), then the headings (rad) of all units; also for a
-        vehicle on its suspension.
+        """Position (m) of the towing vehicle's centre of mass, then headings (rad) of all units, shape (n, 2 + U); also
+        for a vehicle on its suspension.
         """
         coordinates = self.path.states[:, 0]
         if self.lean is None:
@@ -139,8 +140,8 @@ class Stop:
         units = self.units
         return units[:, 3] - units[:, 2] if units.shape[1] > 3 else None
 
-    def of_hitch(self) -> dict[str, float]:
-        """Results for the hitch of a train over a stop, by name and unit; empty for a vehicle that tows nothing."""
+    def hitch_results(self) -> dict[str, float]:
+        """Largest and final hitch angle over a stop, by name and unit; empty for a vehicle that tows nothing."""
         hitch = self.hitch
         if hitch is None:
             return {}
@@ -151,9 +152,9 @@ class Stop:
             "final hitch angle [deg]": float(np.degrees(hitch[-1])),
         }
 
-    def of_wheels(self) -> dict[str, np.ndarray]:
-        """Results of each wheel (W,) at speeds above SLOWEST_SLIP_SPEED, or above half of a lower initial speed, by
-        name and unit."""
+    def wheel_results(self) -> dict[str, np.ndarray]:
+        """Slips, locks and pressures of each wheel (W,) over a stop, by name and unit. Slips count at speeds above
+        SLOWEST_SLIP_SPEED, or above half of a lower initial speed."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST_SLIP_SPEED, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports.slip[fast]
         pressures, fast_duration = path.pressures[1:][fast], float(self.lengths[fast].sum())
@@ -170,7 +171,7 @@ class Stop:
             "final pressure [bar]": path.pressures[-1],
         }
 
-    def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
+    def results_in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
         """Results at ``time`` (s) after the brake is applied on a circle (radius in m, positive to the left), by name
         and unit.
 
@@ -191,7 +192,7 @@ class Stop:
         }
 
     def locks(self) -> Locks:
-        """Table of the wheels' locks above 15 km/h."""
+        """Times for which wheels lock at speeds above 15 km/h."""
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 

@@ -1,4 +1,6 @@
-"""Many stops of one scene whose initial speeds scatter: anti-lock braking on ice does not repeat run by run."""
+"""Ensembles of stops with scattered initial speeds, their statistics and tests, as anti-lock stops on ice do not
+repeat.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,15 +25,15 @@ KEPT_QUANTITIES = {
     "aside": "y [m]",
     "yaw": "final yaw [deg]",
 }
-"""Names of arrays, and the quantities of every stop that they hold."""
+"""Quantities of every stop that an ensemble stores: array name -> name in ``Stop.vehicle_results``."""
 COURSE_SIZES = {"aside": 1.0, "yaw": 5.0}
-"""m, deg: standard errors of a mean course that is less are shares of this."""
+"""Least size (m, deg) by which the standard error of a mean deviation from the course is divided."""
 
 
 @dataclass(frozen=True)
 class Stops:
-    """Ensemble of stops: path i brakes from speed (1 + spread e_i), where e_i is standard normal and depends on the
-    seed and i alone. ``table`` : the scene's tables.
+    """Ensemble of stops of a procedure: stop i begins at the procedure's speed times (1 + spread e_i), where e_i is
+    standard normal and depends on the seed and i alone. ``table`` : the scene's tables.
     """
 
     table: Mapping[str, Any]
@@ -42,14 +44,16 @@ class Stops:
     seed: int
 
     def __call__(self, paths: range) -> dict[str, np.ndarray]:
-        """Named arrays (len(paths),) of ``KEPT_QUANTITIES`` and of the initial speed (m/s)."""
+        """Runs the stops with these numbers. Returns KEPT_QUANTITIES and the initial speed (m/s) as arrays
+        (len(paths),) by name.
+        """
         scene = build(self.table, self.file, Path(self.folder))
         rows = [self._quantities_of_stop(scene, number) for number in paths]
         kept_keys = {**KEPT_QUANTITIES, "speed": "initial speed [m/s]"}
         return {name: np.array([row[key] for row in rows]) for name, key in kept_keys.items()}
 
     def facts(self) -> dict[str, Any]:
-        """Everything that the result depends on."""
+        """Returns everything on which the ensemble's results depend."""
         return {
             "scene": str(sorted(self.table.items())),
             "procedure": self.procedure,
@@ -68,12 +72,12 @@ class Stops:
             raise PathFailed(path_number, str(error)) from None
         if not path.ended_at_rest:
             raise PathFailed(path_number, f"does not stand after {scene.run.duration:g} s")
-        return Stop(path).of_vehicle()
+        return Stop(path).vehicle_results()
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Mean with its standard error, and standard deviation of n values."""
+    """Number, mean and standard deviation of a sample of values."""
 
     count: int
     mean: float
@@ -81,7 +85,7 @@ class Scatter:
 
     @property
     def error(self) -> float:
-        """Standard error of the mean over all stops."""
+        """Standard error of the mean."""
         return self.deviation / sqrt(self.count)
 
 
@@ -91,8 +95,8 @@ def scatter_of(values: np.ndarray) -> Scatter:
 
 
 def statistical_errors(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
-    """Statistical errors of the mean results: the standard error divided by the mean, or by COURSE_SIZES where the mean
-    is smaller.
+    """Statistical errors of the means of an ensemble, by quantity. Relative errors refer to the mean, or to
+    COURSE_SIZES where the mean is smaller.
     """
     units = {key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}
     return {
@@ -106,7 +110,9 @@ def statistical_errors(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
 
 @dataclass(frozen=True)
 class Welch:
-    """Difference of two means (second less first) with its 95 % interval, t, degrees of freedom, two-sided p."""
+    """Result of Welch's test: difference of two means (second less first), half width of its 95 % interval, statistic
+    t, degrees of freedom, two-sided p.
+    """
 
     difference: float
     half_width: float
@@ -116,7 +122,7 @@ class Welch:
 
 
 def welch_test(first_scatter: Scatter, second_scatter: Scatter) -> Welch:
-    """Welch's test of two means whose variances may differ; B. L. Welch, Biometrika 34 (1947)."""
+    """Welch's test for the difference of two means with different variances; B. L. Welch, Biometrika 34 (1947)."""
     from scipy.stats import t as student
 
     a, b = first_scatter.error**2, second_scatter.error**2

@@ -23,31 +23,33 @@ from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES
 from models.systems.contact.scene import ContactScene
 
 DISSIMILARITY_COST = 0.02
-"""Of mu N: what it may cost to leave out that two bodies differ."""
+"""Largest error of a force, divided by mu N, that comes from treating different materials as alike."""
 
 
-def assumptions(scene: ContactScene, body: RollingContact) -> list[Assumption]:
-    """Assumptions that the scene's theory makes of its contact."""
-    listed = [*of_pressing(scene, body), *_creepages(body)]
-    if isinstance(body, LinearTheory):
-        listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, body)}))
-    if isinstance(body, LinearTheory | Fastsim):
-        listed.append(_slender_assumption(lambda run: {"contact": np.array([body.a / body.b])}))
-    if body.pair.mismatch != 0.0 and body.friction > 0.0:
-        listed.append(_bodies_alike(body))
+def assumptions(scene: ContactScene, contact: RollingContact) -> list[Assumption]:
+    """Assumptions of the scene's theory about its contact: half-space, elasticity, small creepages, shape, friction."""
+    listed = [*pressing_assumptions(scene, contact), *_creepage_assumptions(contact)]
+    if isinstance(contact, LinearTheory):
+        listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, contact)}))
+    if isinstance(contact, LinearTheory | Fastsim):
+        listed.append(_slender_assumption(lambda run: {"contact": np.array([contact.a / contact.b])}))
+    if contact.pair.mismatch != 0.0 and contact.friction > 0.0:
+        listed.append(_like_bodies_assumption(contact))
     return listed
 
 
-def of_pressing(scene: ContactScene, body: RollingContact) -> list[Assumption]:
-    """Assumptions about bodies that are pressed together, whether they roll or not."""
-    listed = [_half_space(_by_radii(scene, body))]
+def pressing_assumptions(scene: ContactScene, contact: RollingContact) -> list[Assumption]:
+    """Assumptions of the normal problem: half-spaces, elastic bodies, and patches within the profiles."""
+    listed = [_half_space_assumption(_axes_divided_by_radii(scene, contact))]
     if yield_is_known(scene.bodies.wheel, scene.bodies.rail):
-        listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
-    return listed + (_on_profiles(body) if scene.profiles is not None and isinstance(body, OnPatches) else [])
+        listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * contact.pressing.peak])}))
+    return listed + (
+        _profile_assumptions(contact) if scene.profiles is not None and isinstance(contact, OnPatches) else []
+    )
 
 
 def table_assumptions(file: Path) -> list[Assumption]:
-    """Assumptions of the contacts in a table of cases, judged by the rows that a result keeps: its first block."""
+    """Assumptions about the contacts in a table of cases, checked on its first block of rows only."""
     rows = next(iter(table_blocks(file, (BY_AXES, BY_CURVATURES))), None)
     values = {} if rows is None else {name: np.asarray(column, float) for name, column in rows.values.items()}
     listed = []
@@ -56,10 +58,14 @@ def table_assumptions(file: Path) -> list[Assumption]:
         peak = 1.5e-6 * values["load"] / (np.pi * a * b)
         listed = [_slender_assumption(lambda run: {"rows": a / b}), _elastic_assumption(lambda run: {"rows": peak})]
     creepages = {name: values.get(name, np.zeros(0)) for name in ("xi_x", "xi_y")}
-    return [*listed, _small_creepage(lambda run: creepages), _constant_friction(lambda run: creepages)]
+    return [
+        *listed,
+        _small_creepage_assumption(lambda run: creepages),
+        _constant_friction_assumption(lambda run: creepages),
+    ]
 
 
-def _half_space(watch: Callable[[Result], Watched]) -> Assumption:
+def _half_space_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "half-space",
         "the contact is small beside the bodies' radii",
@@ -70,20 +76,20 @@ def _half_space(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _by_radii(scene: ContactScene, body: RollingContact) -> Callable[[Result], Watched]:
-    """Return the watch function of the semi-axes divided by the known radii of curvature.
+def _axes_divided_by_radii(scene: ContactScene, contact: RollingContact) -> Callable[[Result], Watched]:
+    """Returns a function of a result that gives the contact's semi-axes divided by the radii of curvature.
 
     The radii are those of both bodies, or else of the distance between the undeformed surfaces.
     """
     shares: dict[str, np.ndarray] = {}
-    if isinstance(body, OnEllipse):
-        axes = {"x": body.a, "y": body.b}
+    if isinstance(contact, OnEllipse):
+        axes = {"x": contact.a, "y": contact.b}
         if scene.radii is not None:
             shares = {f"radii.{name}": np.array([axes[name[-1]] / abs(r)]) for name, r in scene.radii if r is not None}
         else:
-            shares = {"along": 2.0 * body.a * body.hertz.A, "across": 2.0 * body.b * body.hertz.B}
-    elif isinstance(body, OnPatches):
-        for k, patch_pressure in enumerate(body.pressed.patches, 1):
+            shares = {"along": 2.0 * contact.a * contact.hertz.A, "across": 2.0 * contact.b * contact.hertz.B}
+    elif isinstance(contact, OnPatches):
+        for k, patch_pressure in enumerate(contact.pressed.patches, 1):
             curvature_along, across = patch_pressure.patch.distance.curvatures
             x0, x1, y0, y1 = patch_pressure.box
             shares[f"patch {k} along"] = np.array([0.5 * (x1 - x0) * curvature_along])
@@ -103,22 +109,22 @@ def _elastic_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _creepages(body: RollingContact) -> list[Assumption]:
+def _creepage_assumptions(contact: RollingContact) -> list[Assumption]:
     """Assumptions that creepages are small and, where friction is constant, that slip is slow."""
-    longer = body.lever
+    longer = contact.lever
 
     def creepages(run: Result) -> Mapping[str, np.ndarray]:
         return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
 
-    if isinstance(body, LinearTheory) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
-        return [_small_creepage(creepages)]
+    if isinstance(contact, LinearTheory) or (isinstance(contact, Fastsim) and contact.choices["falling"] is not None):
+        return [_small_creepage_assumption(creepages)]
     return [
-        _small_creepage(creepages),
-        _constant_friction(lambda run: {name: np.abs(run[name]) for name in ("xi_x", "xi_y")}),
+        _small_creepage_assumption(creepages),
+        _constant_friction_assumption(lambda run: {name: np.abs(run[name]) for name in ("xi_x", "xi_y")}),
     ]
 
 
-def _small_creepage(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+def _small_creepage_assumption(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "small creepage",
         "creepages, and spin times the semi-axis, are so small that their squares do not count",
@@ -129,7 +135,7 @@ def _small_creepage(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assu
     )
 
 
-def _constant_friction(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+def _constant_friction_assumption(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "constant friction",
         "friction is the same however fast the contact slips",
@@ -151,9 +157,9 @@ def _no_slip_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _utilised_friction(run: Result, body: RollingContact) -> np.ndarray:
-    """Tangential forces divided by mu N; without friction any force is too large."""
-    force, limit = np.hypot(run["fx"], run["fy"]), body.friction * body.pressing.load
+def _utilised_friction(run: Result, contact: RollingContact) -> np.ndarray:
+    """Tangential force divided by mu N at every creepage; infinite for any force without friction."""
+    force, limit = np.hypot(run["fx"], run["fy"]), contact.friction * contact.pressing.load
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
 
 
@@ -168,8 +174,8 @@ def _slender_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _bodies_alike(body: RollingContact) -> Assumption:
-    cost = np.array([body.pair.quasi_identity_error(body.friction)])
+def _like_bodies_assumption(contact: RollingContact) -> Assumption:
+    cost = np.array([contact.pair.quasi_identity_error(contact.friction)])
     return Assumption(
         "bodies alike",
         "both bodies stretch alike under the pressure",
@@ -180,9 +186,9 @@ def _bodies_alike(body: RollingContact) -> Assumption:
     )
 
 
-def _on_profiles(body: OnPatches) -> list[Assumption]:
-    """Assumptions that contact patches lie within the given profiles and do not overlap."""
-    parts = sorted(body.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
+def _profile_assumptions(contact: OnPatches) -> list[Assumption]:
+    """Assumptions that contact patches lie within the profiles, and do not overlap."""
+    parts = sorted(contact.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
     free_distances = {}
     for k, patch_pressure in enumerate(parts, 1):
         known, (_, _, low, high) = patch_pressure.patch.distance, patch_pressure.box

@@ -1,8 +1,8 @@
-"""Tables of contacts: a row each with an ellipse, a load, friction and creepages; answered block by block.
+"""Tables of contacts, solved by FASTSIM block by block: each row has an ellipse, a load, friction and creepages.
 
 Columns in any order, each with its unit: either ``a``, ``b`` (semi-axes) or ``A``, ``B`` (curvatures of the undeformed
-distance), and ``load``, ``friction``, ``xi_x``, ``xi_y``, ``spin``. The answer has a row for each row, in the same
-order: forces, moment, errors and a status, which is ``ok`` or what is wrong with that row.
+distance), and ``load``, ``friction``, ``xi_x``, ``xi_y``, ``spin``. The output has a row for each row of the input, in
+the same order: forces, moment, errors and a status, which is ``ok`` or what is wrong with that row.
 """
 
 import csv
@@ -37,7 +37,8 @@ from models.systems.contact.scene import Method
 MOTION_COLUMNS = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
 BY_AXES = {"a": METRES, "b": METRES, **MOTION_COLUMNS}
 BY_CURVATURES = {"A": PER_METRE, "B": PER_METRE, **MOTION_COLUMNS}
-ANSWER_HEADINGS = (
+"""Input columns with their units, where the ellipse is given by its semi-axes or by the curvatures."""
+OUTPUT_HEADINGS = (
     "line [-]",
     "fx [N]",
     "fy [N]",
@@ -50,21 +51,21 @@ ANSWER_HEADINGS = (
     "moment_error_of_theory [N m]",
     "status",
 )
-ANSWER_COLUMNS = tuple(head.partition(" ")[0] for head in ANSWER_HEADINGS[1:-1])
-"""Names of the columns of numbers, in the order of ``forces`` of ``solved_rows``."""
+OUTPUT_COLUMNS = tuple(head.partition(" ")[0] for head in OUTPUT_HEADINGS[1:-1])
+"""Names of the output's columns of numbers, in the order of ``forces`` of ``solved_rows``."""
 ROW_FORMAT = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g}", ",{:.4g},{:.4g},{:.4g},{:.4g}", ",ok\n"
-"""A row: numbers, errors if they are asked for, status."""
+"""Format of an output row: line number and forces, then errors if they are requested, then the status."""
 ERROR_COLUMNS = slice(6, 10)
-"""Columns of errors."""
+"""Columns of the output that hold errors."""
 ROWS_PER_BLOCK = 10_000
-"""Rows of an answer that are read at once, and those that a result keeps."""
+"""Rows of an output file that are read at once, and most rows that a result contains."""
 BLOCKS_IN_ADVANCE = 8
-"""Blocks under way at once."""
+"""Most blocks of rows that are computed in advance of the block being written."""
 Build = Callable[[Array, Array], Any]
-"""Makes ``Built`` of the friction and the load (N) of some rows."""
+"""Function that makes ``Built`` from the coefficients of friction and the loads (N) of some rows."""
 
 
-def answer_table(
+def solve_table(
     path: Path,
     output_path: Path,
     build: Build,
@@ -75,11 +76,12 @@ def answer_table(
     executor: Executor | None = None,
     store: Store | None = None,
 ) -> dict[str, int]:
-    """Answer the table at ``path`` into ``output_path``; returns the numbers of all rows and of refused rows.
+    """Compute the creep forces of all contacts in the CSV file ``path`` and write them to ``output_path``. Returns the
+    numbers of all rows and of refused rows.
 
-    errors : whether the answer has columns of errors, which take the forces again on half the cells. executor :
-    computes the blocks of rows; store : keeps those that are finished (see ``models.ensemble.runner``). Raises
-    InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
+    errors : whether the output has columns of errors, for which forces are computed again on half the cells. executor :
+    computes the blocks of rows; store : keeps the finished blocks (see ``models.ensemble.runner``). Raises InputError
+    for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
     build(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
@@ -90,53 +92,55 @@ def answer_table(
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(output_path) as partial_path, partial_path.open("w") as file:
         heads = (
-            ANSWER_HEADINGS
+            OUTPUT_HEADINGS
             if errors
-            else tuple(head for head in ANSWER_HEADINGS if head not in ANSWER_HEADINGS[ERROR_COLUMNS])
+            else tuple(head for head in OUTPUT_HEADINGS if head not in OUTPUT_HEADINGS[ERROR_COLUMNS])
         )
         file.write(",".join(heads) + "\n")
         for block, answers in values_in_order(solve, chain(first, reading), executor, store, BLOCKS_IN_ADVANCE):
             wrong = dict(zip(answers["wrong"].tolist(), answers["why"].tolist(), strict=True))
             rows = enumerate(zip(block.lines, answers["forces"].tolist(), strict=True))
-            file.writelines(_line(line, row, wrong.get(i)) for i, (line, row) in rows)
+            file.writelines(_output_line(line, row, wrong.get(i)) for i, (line, row) in rows)
             counts["rows"] += len(block.lines)
             counts["wrong"] += len(wrong)
             progress(counts["rows"])
     return counts
 
 
-def compile_first(build: Build, method: Method) -> None:
-    """Compile or load the kernels, so that the measured time is that of the rows alone."""
+def compile_kernels(build: Build, method: Method) -> None:
+    """Compile the contact kernels or load them from the cache, so that a time measured later is that of the rows."""
     unit = np.ones(1)
     _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION_COLUMNS, unit)}, build, method)
 
 
 def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> Arrays:
-    """Answers to a block of rows: ``forces`` (rows, columns), the numbers ``wrong`` (m,) of refused rows, and reasons
-    ``why`` (m,).
+    """Solve a block of rows. Returns ``forces`` (rows, columns), the indices ``wrong`` (m,) of refused rows, and the
+    reasons ``why`` (m,).
     """
-    columns = len(ANSWER_HEADINGS) - 2 - (0 if errors else ERROR_COLUMNS.stop - ERROR_COLUMNS.start)
-    forces, wrong = _answers_or_refusals(block, partial(_forces, build=build, method=method, errors=errors), columns)
+    columns = len(OUTPUT_HEADINGS) - 2 - (0 if errors else ERROR_COLUMNS.stop - ERROR_COLUMNS.start)
+    forces, wrong = _forces_or_refusals(block, partial(_forces, build=build, method=method, errors=errors), columns)
     return {"forces": forces, "wrong": np.array([*wrong], dtype=int), "why": np.array([*wrong.values()], dtype=str)}
 
 
-def _answers_or_refusals(
+def _forces_or_refusals(
     block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int
 ) -> tuple[Array, dict[int, str]]:
-    """Answers (rows, columns), NaN in refused rows, and the reason for each refusal by the number of its row."""
+    """Solve the sound rows of a block. Returns forces (rows, columns), NaN in refused rows, and the reason for each
+    refusal by row index.
+    """
     answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.faulty_rows)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
-    answers[good], refused = _answers_of_rows(
+    answers[good], refused = _forces_of_rows(
         {name: column[good] for name, column in block.values.items()}, solve, columns
     )
     return answers, wrong | {int(good[i]): text for i, text in refused.items()}
 
 
-def _answers_of_rows(
+def _forces_of_rows(
     values: dict[str, Array], solve: Callable[[dict[str, Any]], Array], columns: int
 ) -> tuple[Array, dict[int, str]]:
-    """Answers to all rows, and reasons by row where the theory refuses one. Refused rows are found by halving the
-    block.
+    """Solve all rows. Returns forces (rows, columns), and the reason for each row that the theory refuses, by row
+    index. Refused rows are located by halving the block.
     """
     count = len(next(iter(values.values())))
     if count == 0:
@@ -148,14 +152,16 @@ def _answers_of_rows(
             return np.full((1, columns), np.nan), {0: str(error).replace("[0]", "")}
     half = count // 2
     (low, wrong), (high, wrong_in_high) = (
-        _answers_of_rows({name: column[rows] for name, column in values.items()}, solve, columns)
+        _forces_of_rows({name: column[rows] for name, column in values.items()}, solve, columns)
         for rows in (slice(half), slice(half, None))
     )
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in wrong_in_high.items()}
 
 
 def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool = True) -> Array:
-    """Answers (rows, columns); raises InputError if a row is outside the range of the theory."""
+    """Creep forces, moment, stick share, dissipation and errors by FASTSIM, shape (rows, columns). Raises InputError if
+    a row is outside the range of the theory.
+    """
     load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION_COLUMNS)
     touching = build(friction, load)
     load, friction, pair = touching.load, touching.friction, touching.pair
@@ -182,8 +188,8 @@ def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool =
 def _force_errors(
     fine_forces: Any, coarse_forces: Any, friction_limit: Array, a: Array, b: Array, share: Array, method: Method
 ) -> list[Array]:
-    """Errors of forces (N) and moments (N m) from the finite cells and from the theory; friction_limit : mu N; share :
-    spin's share of the creepage.
+    """Errors of the cells and of the theory in the forces (N), then in the moments (N m). friction_limit : mu N; share
+    : share of the creepage that is due to spin.
     """
     moment_limit = friction_limit * np.maximum(a, b)
     relative, relative_coarse = (
@@ -202,8 +208,8 @@ def _force_errors(
     return [friction_limit * left, theory, moment_limit * left, moment]
 
 
-def _line(line_number: int, row: list[float], wrong: str | None) -> str:
-    """One row of the answer's file; a text that says what is wrong is put into quotation marks."""
+def _output_line(line_number: int, row: list[float], wrong: str | None) -> str:
+    """Returns a line of the output file; the reason for a refused row is put into quotation marks."""
     if wrong is None:
         numbers, errors, status = ROW_FORMAT
         return (numbers + (errors if len(row) > ERROR_COLUMNS.start else "") + status).format(line_number, *row)
@@ -212,8 +218,8 @@ def _line(line_number: int, row: list[float], wrong: str | None) -> str:
 
 
 def column_sizes(path: Path) -> dict[str, dict[str, Any]]:
-    """Largest magnitude and rms of every column of an answer, with its unit, over the rows without error; read block by
-    block.
+    """Largest magnitude and root mean square of every column of an output file, with its unit, over the rows with
+    status ``ok``. The file is read block by block.
     """
     with path.open(newline="") as file:
         rows = csv.reader(file)
@@ -230,8 +236,8 @@ def column_sizes(path: Path) -> dict[str, dict[str, Any]]:
     }
 
 
-def kept_rows(path: Path) -> dict[str, tuple[str, np.ndarray]]:
-    """Columns name -> (unit, values) of the first ROWS_PER_BLOCK rows of an answer; numbers of wrong rows are NaN."""
+def first_rows(path: Path) -> dict[str, tuple[str, np.ndarray]]:
+    """Columns of the first ROWS_PER_BLOCK rows of an output file, as name -> (unit, values); NaN in refused rows."""
     with path.open(newline="") as file:
         heads, *rows = islice(csv.reader(file), ROWS_PER_BLOCK + 1)
     *columns, status = np.array(rows, dtype=object).reshape(-1, len(heads)).T

@@ -18,12 +18,12 @@ THEORY_TEXTS = {
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, materials that differ too much for the half-space theories."""
+    """Raise InputError, before any file is written, for materials that differ too much for the half-space theories."""
     _ = scene.pair.G
 
 
 def findings(scene: ContactScene) -> tuple[Finding, ...]:
-    """A doubt for every radius of curvature that is not large compared with the contact."""
+    """Returns a doubt for every radius of curvature that is not large compared with the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
     from models.systems.contact.run import hertz_of
@@ -42,7 +42,7 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
 
 
 def describe(scene: ContactScene) -> str:
-    """The scene's plan as text: bodies, geometry, contact, creepage and theory."""
+    """Returns the plan of a contact scene as text: bodies, geometry, load, friction, creepage, theory, assumptions."""
     bodies = {
         name: f"E = {body.E / 1e9:g} GPa, nu = {body.nu:g}, G = {body.G / 1e9:.4g} GPa" for name, body in scene.bodies
     }
@@ -63,10 +63,10 @@ def describe(scene: ContactScene) -> str:
     method = _values_text(scene.method, {"name", *scene.method.unread()})
     heads["theory"] = THEORY_TEXTS[scene.method.name] + (f"; {method}" if method else "")
     lines = [scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)]
-    return "\n".join([*lines, *assumption_lines(_assumed(scene))])
+    return "\n".join([*lines, *assumption_lines(_contact_assumptions(scene))])
 
 
-def _assumed(scene: ContactScene) -> list[Assumption]:
+def _contact_assumptions(scene: ContactScene) -> list[Assumption]:
     """Assumptions of the scene's contact; none where its normal problem has no solution."""
     from models.systems.contact.assumptions import assumptions, table_assumptions
 
@@ -80,7 +80,7 @@ def _assumed(scene: ContactScene) -> list[Assumption]:
 
 
 def _values_text(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
-    """Text of a table: its keys, values and units, without keys that are not given."""
+    """Text of a scene table: its keys, values and units, without keys that have no value."""
     model = type(table)
     parts = []
     for name, value in table:  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""One contact over its creepages, or a table of contacts: from scene to result."""
+"""Runs of a contact scene: creep forces of a contact at all creepages, or of a table of contacts."""
 
 import json
 import time
@@ -35,12 +35,12 @@ from models.core.assumptions import with_assumptions
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.scene_effects import extended_by_effects
-from models.core.tables import ROWS_PER_BLOCK as TABLE_BLOCK
+from models.core.tables import ROWS_PER_BLOCK as ROWS_PER_TABLE_BLOCK
 from models.ensemble.store import Store, named_files
 from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.contact.assumptions import assumptions
 from models.systems.contact.assumptions import table_assumptions as assumptions_of_rows
-from models.systems.contact.cases_table import answer_table, column_sizes, compile_first, kept_rows
+from models.systems.contact.cases_table import column_sizes, compile_kernels, first_rows, solve_table
 from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
@@ -66,22 +66,24 @@ this order.
 """
 FIELD_UNITS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
 CELL_POWER = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
-"""By theory, of the cells along an axis: what a call goes through. Of a half-space every cell feels every other."""
+"""Power of the number of cells along an axis with which the work of a call grows, by theory; in the exact theory each
+cell acts on every other cell.
+"""
 BLOCKS_FOLDER = "blocks"
-"""Folder of the finished blocks of a long table, beside its answers."""
+"""Folder of the finished blocks of a long table, beside the output file."""
 LARGE_TABLE_BYTES = 8_000_000
-"""Bytes of a table from which on its blocks are kept, and computed by several: four blocks or so."""
+"""Size in bytes (about four blocks) above which a table's blocks are stored, and computed by several processes."""
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
 class Built:
-    """Data of a contact before its normal problem is solved, which effects may extend: bodies, friction, load or
-    approach.
+    """Inputs of a contact before its normal problem is solved: materials, friction, load or approach. Effects may
+    change them.
 
-    pair : elastic constants; friction : its coefficient; load (N) or approach (m): the other one is None.
+    pair : elastic constants; friction : its coefficient; load (N) or approach (m) : the other of the two is None.
     falling : friction that falls with the speed of slip, of FASTSIM alone; profiles : cross-sections of "wheel" and
-    "rail", none where an ellipse is given. In a table of cases friction and load are (n,), those of its rows.
+    "rail", none where an ellipse is given. In a table of cases friction and load are arrays (n,) over its rows.
     """
 
     pair: MaterialPair
@@ -94,17 +96,17 @@ class Built:
 
 @dataclass(frozen=True)
 class ContactResults:
-    """A contact with its forces at every motion, and their errors if these were requested.
+    """A contact with its creep forces at every creepage, and their errors if these were requested.
 
-    pressing : seconds that the normal problem took; rolling (n,) : seconds for each motion, errors included.
+    pressing_seconds : time of the normal problem; rolling_seconds (n,) : time of each creepage, errors included.
     """
 
     contact: RollingContact
     motions: list[Motion]
     rolled: Sequence[Rolled]
     errors: Sequence[Error]
-    pressing: float
-    rolling: np.ndarray
+    pressing_seconds: float
+    rolling_seconds: np.ndarray
 
 
 def run(
@@ -116,18 +118,19 @@ def run(
     answers: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> Result:
-    """Compute the forces of a scene at every creepage, with ``ContactResults`` as detail; or answer its table of cases.
+    """Compute the creep forces of a scene at every creepage, with ``ContactResults`` as detail, or those of its table
+    of cases.
 
-    error : whether to state how far forces are off, which takes another evaluation of each on half the cells; what is
-    assumed is judged always. fields : whether the
-    last motion shows its cells; everything is then compiled before times are taken. answers : the CSV into which a
-    table of cases is answered block by block; the result has its first rows, and sizes of all. There are no engines.
-    Raises InputError, or RunFailed where the exact theory is not solved.
+    error : whether errors are stated, for which each force is computed again on half the cells; assumptions are always
+    checked. fields : whether pressures and tractions of all cells are kept for the last creepage; everything is then
+    compiled before times are measured. answers : CSV file into which the forces of a table of cases are written block
+    by block; the result has its first rows, and sizes of all. There are no engines. Raises InputError, or RunFailed
+    where the exact theory is not solved.
     """
     if scene.cases is not None:
         if answers is None:
             raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
-        return _of_table(scene, answers, progress, error)
+        return _table_result(scene, answers, progress, error)
     motions, cells = creepages(scene), scene.method.cells
     progress("loading", 0.0)
     shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
@@ -143,11 +146,11 @@ def run(
         steps[-1] = shown
     forces, errors_of_forces = zip(*steps, strict=True)
     rolls = ContactResults(body, motions, forces, errors_of_forces if error else (), marks[0] - start, np.diff(marks))
-    labelled = with_assumptions(_result(scene, rolls, seconds), assumptions(scene, body))
+    labelled = with_assumptions(_labelled_result(scene, rolls, seconds), assumptions(scene, body))
     return with_error(labelled, scene, body, errors_of_forces) if error else labelled
 
 
-def _result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Result:
+def _labelled_result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Result:
     body, count, power = rolls.contact, len(rolls.motions), CELL_POWER[scene.method.name]
     errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in rolls.errors] or [()] * count
     rows = zip(rolls.motions, map(FORCES_OF_ROLLED, rolls.rolled), errors, strict=True)
@@ -177,7 +180,9 @@ def _result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Resul
 
 
 def cells_of(scene: ContactScene, rolls: ContactResults) -> Result | None:
-    """Pressure and tractions in every cell in contact at the last motion, patch after patch; None without fields."""
+    """Result with pressure and tractions (Pa) in every cell in contact at the last creepage, patch after patch; None if
+    ``run`` was called without fields.
+    """
     patches = rolls.rolled[-1].fields
     if not patches:
         return None
@@ -188,38 +193,40 @@ def cells_of(scene: ContactScene, rolls: ContactResults) -> Result | None:
     return result(scene, columns, {}, motion=list(rolls.motions[-1]))
 
 
-def _of_table(scene: ContactScene, answers_path: Path, progress: Progress, error: bool) -> Result:
-    """Answer the scene's table of cases into its file; the result has the first rows."""
+def _table_result(scene: ContactScene, answers_path: Path, progress: Progress, error: bool) -> Result:
+    """Solve the scene's table of cases, and write the forces to a file; the result has the first rows."""
     built = partial(table_contacts, scene)
-    compile_first(built, scene.method)  # no part of the time below
+    compile_kernels(built, scene.method)  # no part of the time below
     start = time.perf_counter()
-    counts = _answered(scene, answers_path, built, progress, error)
+    counts = _solved_table(scene, answers_path, built, progress, error)
     seconds = time.perf_counter() - start
-    rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers_path).items()}
+    rows = {name: Channel("row", values, unit) for name, (unit, values) in first_rows(answers_path).items()}
     table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(column_sizes(answers_path)))
     with_assumptions(table, assumptions_of_rows(scene.cases_file()))
     return with_error_of_rows(table, scene) if error else table
 
 
-def _answered(scene: ContactScene, answers_path: Path, built: Any, progress: Progress, error: bool) -> dict[str, int]:
-    """Answer a table of cases and count its rows. A table of many blocks is solved by the scene's worker processes, and
-    finished blocks are stored.
+def _solved_table(
+    scene: ContactScene, answers_path: Path, built: Any, progress: Progress, error: bool
+) -> dict[str, int]:
+    """Solve a table of cases, and return the numbers of its rows and of refused rows. A table of many blocks is solved
+    by the scene's worker processes, and finished blocks are stored.
     """
     file = scene.cases_file()
-    rows, several = _rows_of(file), file.stat().st_size > LARGE_TABLE_BYTES
+    rows, several = _line_count(file), file.stat().st_size > LARGE_TABLE_BYTES
     count = partial(_count_rows, progress, rows)
     if not several:
-        return answer_table(file, answers_path, built, scene.method, count, errors=error)
+        return solve_table(file, answers_path, built, scene.method, count, errors=error)
     store = Store(answers_path.parent / BLOCKS_FOLDER)
     facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
     with (
         store.reserved_folder(facts),
-        Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *folders_for_workers(scene)) as pool,
+        Crew.of(scene).at_work(rows // ROWS_PER_TABLE_BLOCK + 1, *folders_for_workers(scene)) as pool,
     ):
-        return answer_table(file, answers_path, built, scene.method, count, errors=error, executor=pool, store=store)
+        return solve_table(file, answers_path, built, scene.method, count, errors=error, executor=pool, store=store)
 
 
-def _rows_of(file: Path) -> int:
+def _line_count(file: Path) -> int:
     """Number of line ends in a file, which is about its number of rows."""
     with file.open("rb") as lines:
         return sum(block.count(b"\n") for block in iter(partial(lines.read, 1 << 20), b""))
@@ -230,12 +237,12 @@ def _count_rows(progress: Progress, total_rows: int, rows: int) -> None:
 
 
 def table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
-    """The contacts in the rows of a table of cases."""
+    """Inputs of the contacts in the rows of a table of cases, with the scene's materials and effects."""
     return extended_by_effects(Built(scene.pair, friction, load), scene)
 
 
 def scene_contact(scene: ContactScene) -> Built:
-    """The contact of a scene, with the scene's effects."""
+    """Inputs of a scene's contact (materials, friction, load or approach, profiles), changed by the scene's effects."""
     table = scene.contact
     assert table is not None
     kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()
@@ -246,7 +253,7 @@ def scene_contact(scene: ContactScene) -> Built:
 
 
 def solved_contact(scene: ContactScene) -> RollingContact:
-    """The scene's contact after its normal problem is solved, with the theory that the scene names."""
+    """Solve the normal problem of a scene's contact. Returns the contact, ready to roll by the scene's theory."""
     method, built = scene.method, scene_contact(scene)
     friction, pair = built.friction, built.pair
     if built.falling is not None and method.name != "fastsim":
@@ -272,15 +279,15 @@ def solved_contact(scene: ContactScene) -> RollingContact:
 
 
 def creepages(scene: ContactScene) -> list[Motion]:
-    """The creepages of the scene, one or a sweep of them."""
+    """Creepages (xi_x, xi_y, spin) of a scene, with spin in 1/m: a single triple, or one for each value of [sweep]."""
     fixed = scene.creepage.model_dump()
     values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
     return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
 def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN) -> NormalContact:
-    """The contact of an ellipse, pressed by the simplified theory of 1983, on a rectangle that is larger than the
-    ellipse.
+    """Solve the normal problem of a Hertzian contact by the simplified theory of 1983 (interpenetration), on a
+    rectangle larger than the ellipse.
     """
     A, B = float(hertz.A), float(hertz.B)
     x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
@@ -288,7 +295,7 @@ def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: Simplif
 
 
 def touching_places(scene: ContactScene, built: Built) -> list[TouchingPlace]:
-    """Places at which the wheel's and the rail's profile touch."""
+    """Points at which the profiles of wheel and rail touch."""
     p = scene.profiles
     assert p is not None
     return wheel_on_rail(
@@ -302,7 +309,7 @@ def touching_places(scene: ContactScene, built: Built) -> list[TouchingPlace]:
 
 
 def _profile_by_name(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProfile:
-    """A built-in profile by its name, or the user's file."""
+    """Returns the profile of "wheel" or "rail": a built-in profile, or the profile in the user's file."""
     assert scene.profiles is not None
     name = getattr(scene.profiles, kind)
     if name in BUILT_IN[kind]:
@@ -313,7 +320,7 @@ def _profile_by_name(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Con
 
 
 def hertz_of(scene: ContactScene) -> Hertz:
-    """Hertz' contact from semi-axes, curvatures or radii, under a load or at an approach."""
+    """Solve the Hertzian contact of a scene from semi-axes, curvatures or radii, under a load or at an approach."""
     built = scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:

@@ -1,4 +1,4 @@
-"""Scenes of rolling contact: two bodies, where they touch, how they roll, and by which theory they are computed."""
+"""Scenes of rolling contact: materials, geometry, load, friction, creepages, and the theory of the creep forces."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -17,32 +17,32 @@ from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 
 GEOMETRY_TABLES = ("ellipse", "curvatures", "radii", "profiles", "cases")
-"""Tables that say where the bodies touch; a scene has one of them."""
+"""Scene tables that describe the geometry of the contact; a scene has exactly one of them."""
 
 
 class Bodies(Strict):
-    """[bodies]: elastic constants, steel where nothing else is said."""
+    """[bodies]: elastic constants of wheel and rail, by default steel."""
 
     wheel: Material = Field(default=STEEL, description="E in Pa and nu of body 1")
     rail: Material = Field(default=STEEL, description="E in Pa and nu of body 2")
 
 
 class Ellipse(Strict):
-    """[ellipse]: the contact area itself."""
+    """[ellipse]: semi-axes of the contact area."""
 
     a: float = quantity("m", "semi-axis along x, the direction of rolling")
     b: float = quantity("m", "semi-axis along y")
 
 
 class Curvatures(Strict):
-    """[curvatures]: undeformed distance A x^2 + B y^2."""
+    """[curvatures]: coefficients A and B of the undeformed distance A x^2 + B y^2 between the bodies."""
 
     A: float = quantity("1/m", "curvature along x, half the sum of both bodies' curvatures")
     B: float = quantity("1/m", "curvature along y, half the sum of both bodies' curvatures")
 
 
 class Radii(Strict):
-    """[radii]: of both bodies, positive where convex; a radius that is left out is a flat direction."""
+    """[radii]: radii of curvature of both bodies, positive where convex; flat in a direction without a radius."""
 
     wheel_x: float | None = quantity("m", "rolling radius of the wheel", default=None, signed=True)
     wheel_y: float | None = quantity("m", "radius of the wheel's profile", default=None, signed=True)
@@ -50,7 +50,9 @@ class Radii(Strict):
     rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
 
     def curvatures(self, file: str) -> tuple[float, float]:
-        """Curvatures A and B (1/m); InputError for a radius of zero, or bodies that do not touch on an ellipse."""
+        """Coefficients A and B (1/m) of the undeformed distance A x^2 + B y^2. Raises InputError for a radius of zero,
+        or bodies that do not touch on an ellipse.
+        """
         for name, radius in self:
             if radius == 0:
                 raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
@@ -70,7 +72,7 @@ class Radii(Strict):
 
 
 class Profiles(Strict):
-    """[profiles]: cross-sections of wheel and rail, and how they stand to each other."""
+    """[profiles]: cross-sections of wheel and rail, and their position relative to each other."""
 
     wheel: str = Field(default="S1002", description="S1002, or a file of a profile")
     rail: str = Field(default="UIC60", description="UIC60, or a file of a profile")
@@ -85,13 +87,13 @@ class Profiles(Strict):
 
 
 class Cases(Strict):
-    """[cases]: a table with a contact, its load, friction and creepages in every row."""
+    """[cases]: file of a table in which each row has a contact, its load, friction and creepages."""
 
     file: str = Field(description="CSV file, beside the scene or in the folder in which the command runs")
 
 
 class Contact(Strict):
-    """[contact]: how hard the bodies press, and what friction there is."""
+    """[contact]: normal load or approach of the bodies, and coefficient of friction."""
 
     load: float | None = quantity("N", "normal load, on profiles the vertical one", default=None)
     approach: float | None = quantity("m", "approach of the bodies instead of a load", default=None)
@@ -99,7 +101,7 @@ class Contact(Strict):
 
 
 class Creepage(Strict):
-    """[creepage]: velocity of the wheel relative to the rail by the rolling speed."""
+    """[creepage]: velocity of the wheel relative to the rail, divided by the rolling speed."""
 
     xi_x: float = quantity("", "longitudinal creepage", default=0.0, signed=True)
     xi_y: float = quantity("", "lateral creepage", default=0.0, signed=True)
@@ -107,7 +109,7 @@ class Creepage(Strict):
 
 
 class Sweep(Strict):
-    """[sweep]: one creepage through a range, the others as [creepage] has them."""
+    """[sweep]: range through which one creepage is varied; the other creepages are those of [creepage]."""
 
     of: Literal["xi_x", "xi_y", "spin"] = Field(description="the creepage that is swept")
     start: float = quantity("1 or 1/m", "first value", signed=True)
@@ -116,13 +118,13 @@ class Sweep(Strict):
     spacing: Literal["linear", "logarithmic"] = Field(default="linear", description="of the values")
 
     def values(self) -> np.ndarray:
-        """All values, from start to stop."""
+        """Values (count,) of the swept creepage, from start to stop."""
         spaced = np.linspace if self.spacing == "linear" else np.geomspace
         return spaced(self.start, self.stop, self.count)
 
 
 class Method(Strict):
-    """[method]: the theory, and how finely it is evaluated. Cells are counted along each axis of the contact."""
+    """[method]: theory of the creep forces, and number of cells along each axis of the contact."""
 
     name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
     cells: int = Field(default=21, ge=5, le=400, description="cells along each axis")
@@ -132,22 +134,22 @@ class Method(Strict):
 
     @property
     def order(self) -> float:
-        """Order of convergence: the power of the cell's size with which the error of the forces falls."""
+        """Order of convergence: the power of the cell size to which the error of the forces is proportional."""
         return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
 
     @property
     def band(self) -> str:
-        """Name of the theory's band of error in ``models.contact.accuracy``."""
+        """Name of the theory's error band in ``models.contact.accuracy``."""
         return f"{self.flexibilities} {self.bound}" if self.name == "fastsim" else self.name
 
     def unread(self) -> frozenset[str]:
-        """Keys that have no meaning for this theory."""
+        """Keys of [method] that have no meaning for the scene's theory."""
         fastsim = {"march", "bound", "flexibilities"}
         return frozenset({"fastsim": set(), "linear": {"cells", *fastsim}}.get(self.name, fastsim))
 
 
 class ContactScene(SceneFile):
-    """One scene of rolling contact. Exactly one of the tables ``GEOMETRY_TABLES`` is there."""
+    """A scene of rolling contact: all tables of its scene file, exactly one of GEOMETRY_TABLES among them."""
 
     system: Literal["contact"] = "contact"
     study: str = Field(default="contact", description="the study that runs the scene")
@@ -166,23 +168,23 @@ class ContactScene(SceneFile):
 
     @property
     def geometry(self) -> str:
-        """Name of the one table that says where the bodies touch."""
+        """Name of the scene's geometry table, one of GEOMETRY_TABLES."""
         return next(name for name in GEOMETRY_TABLES if getattr(self, name) is not None)
 
     def cases_file(self) -> Path:
-        """Path of the file with the table of cases."""
+        """Path of the CSV file with the table of cases."""
         assert self.cases is not None
         return self.path(self.cases.file, "cases.file")
 
     @property
     def pair(self) -> MaterialPair:
-        """The materials of both bodies."""
+        """Elastic constants of wheel and rail."""
         return MaterialPair(self.bodies.wheel, self.bodies.rail)
 
 
 @contextmanager
 def scene_errors(scene: ContactScene) -> Iterator[None]:
-    """Context that turns an error without a file, of functions that know no scene, into one of the scene's key."""
+    """Context that adds the scene's file and key to an InputError of functions that know no scene."""
     try:
         yield
     except InputError as error:
@@ -194,27 +196,31 @@ def scene_errors(scene: ContactScene) -> Iterator[None]:
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked contact scene from the nested tables of a scene file. Raises InputError for unknown keys and for
+    values outside their ranges.
+    """
     scene = checked(ContactScene, table, file, folder)
-    _refuse_places(scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method)
+    _raise_first_refusal(
+        scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method_refusals
+    )
     complete = with_effect_tables(scene)
     check(complete)
-    _refuse_places(scene, _friction)
+    _raise_first_refusal(scene, _friction_refusals)
     return complete
 
 
-WrongPlaces = Iterator[tuple[str, Any, str]]
-"""Places of a scene, their values and what is allowed there; the first is told."""
+Refusals = Iterator[tuple[str, Any, str]]
+"""Wrong keys of a scene, their values and what is allowed there; the first of them is reported."""
 
 
-def _refuse_places(scene: ContactScene, *checks: Callable[[ContactScene], WrongPlaces]) -> None:
+def _raise_first_refusal(scene: ContactScene, *checks: Callable[[ContactScene], Refusals]) -> None:
     for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
         raise InputError(scene.file, key_path, value, allowed)
 
 
-def _geometry_refusals(scene: ContactScene) -> WrongPlaces:
-    """Refusals of several geometries or none, and of a turned or mirrored rail and a wheel in mm, which are
-    recognised.
+def _geometry_refusals(scene: ContactScene) -> Refusals:
+    """Yields refusals of a scene with several geometry tables or none, of impossible radii, and of profile values out
+    of range, as of a wheel in mm.
     """
     tables = [name for name in GEOMETRY_TABLES if getattr(scene, name) is not None]
     if len(tables) != 1:
@@ -239,9 +245,9 @@ PROFILE_RANGES = {
     "back_to_back": (0.1, 3.0, "m"),
     "gauge_depth": (0.0, 0.1, "m"),
 }
-"""Of numbers of profiles, in their unit."""
-OF_CASES = {"contact", "creepage", "sweep"}
-"""Tables whose content every row of a table of cases has itself."""
+"""Smallest and largest values of the keys of [profiles], with their unit."""
+TABLES_IN_CASES_FILE = {"contact", "creepage", "sweep"}
+"""Scene tables that a scene with [cases] must not have: each row of the file has their content."""
 LARGEST_INPUTS = {
     "contact.load": LARGEST_LOAD,
     "contact.approach": LARGEST_APPROACH,
@@ -250,13 +256,13 @@ LARGEST_INPUTS = {
     "creepage.xi_y": LARGEST_CREEPAGE,
     "creepage.spin": LARGEST_SPIN,
 }
-"""What the theories take, of either sign."""
+"""Largest magnitudes of inputs that the theories take, by scene key."""
 
 
-def _contact_refusals(scene: ContactScene) -> WrongPlaces:
+def _contact_refusals(scene: ContactScene) -> Refusals:
     contact = scene.contact
     if scene.cases is not None:
-        for table in sorted(scene.model_fields_set & OF_CASES):
+        for table in sorted(scene.model_fields_set & TABLES_IN_CASES_FILE):
             yield table, None, "is in the file of cases: drop this table"
     elif contact is None:
         yield "contact", None, "is missing: a table with load or approach, and friction"
@@ -264,9 +270,9 @@ def _contact_refusals(scene: ContactScene) -> WrongPlaces:
         yield "contact.load", contact.load, "give either the load in N or contact.approach in m"
 
 
-def _size_refusals(scene: ContactScene) -> WrongPlaces:
-    """Refusals of values beyond LARGEST_INPUTS: the theories refuse these, too, but do not know the file and the
-    key.
+def _size_refusals(scene: ContactScene) -> Refusals:
+    """Yields refusals of values beyond LARGEST_INPUTS. The theories would refuse them, too, without the name of file
+    and key.
     """
     for key_path, largest in LARGEST_INPUTS.items():
         table, key = key_path.split(".")
@@ -279,7 +285,7 @@ def _size_refusals(scene: ContactScene) -> WrongPlaces:
                 yield value_path, value, f"must be at most {largest:g}{unit}, of either sign"
 
 
-def _sweep_refusals(scene: ContactScene) -> WrongPlaces:
+def _sweep_refusals(scene: ContactScene) -> Refusals:
     if (sweep := scene.sweep) is None:
         return
     if sweep.start == sweep.stop:
@@ -291,23 +297,25 @@ def _sweep_refusals(scene: ContactScene) -> WrongPlaces:
         yield f"creepage.{sweep.of}", getattr(scene.creepage, sweep.of), f"is swept: drop this key; {remedy}"
 
 
-ON_PROFILES = ("simplified", "exact")
-"""Theories that need no ellipse."""
+THEORIES_OF_PROFILES = ("simplified", "exact")
+"""Theories that compute contact areas of any shape, as profiles need."""
 
 
-def _method(scene: ContactScene) -> WrongPlaces:
-    """Refusals of keys that the theory does not read, and of a theory that does not suit the geometry."""
+def _method_refusals(scene: ContactScene) -> Refusals:
+    """Yields refusals of [method] keys that the theory does not read, and of a theory that does not suit the
+    geometry.
+    """
     method = scene.method
     for key in sorted(method.model_fields_set & method.unread()):
         yield f"method.{key}", getattr(method, key), f"has no meaning for {method.name}"
     if scene.cases is not None and method.name != "fastsim":
         yield "method.name", method.name, "a table of cases is computed by fastsim"
-    if scene.profiles is not None and method.name not in ON_PROFILES:
-        yield "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(ON_PROFILES)
+    if scene.profiles is not None and method.name not in THEORIES_OF_PROFILES:
+        yield "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(THEORIES_OF_PROFILES)
 
 
-def _friction(scene: ContactScene) -> WrongPlaces:
-    """Refusals of falling friction in a table of cases, and in a march that is not of second order."""
+def _friction_refusals(scene: ContactScene) -> Refusals:
+    """Yields refusals of falling friction in a table of cases, and with a FASTSIM march that is not of second order."""
     march = scene.method.march
     if scene.falling_friction is None:
         return

@@ -1,4 +1,4 @@
-"""Stated errors of a contact's results: errors of the cells and of the theory."""
+"""Stated errors of the creep forces of a contact: errors of the finite cells and of the theory."""
 
 from collections.abc import Sequence
 
@@ -22,30 +22,30 @@ HALVED_CELLS = "half the cells along each axis"
 BAND_TEXT = "which 95 % of such contacts keep to"
 
 
-def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: Sequence[Error]) -> Result:
-    """The result with the errors of force and moment, each as the root mean square over the result's motions.
+def with_error(run: Result, scene: ContactScene, contact: RollingContact, errors: Sequence[Error]) -> Result:
+    """Returns the result with the stated errors of force and moment, each as the root mean square over all creepages.
 
-    Relative errors refer to the root mean square of the force; for the moment, which may vanish, to that times the
-    contact's lever. Raises RunFailed where the cells are too few.
+    Relative errors of the force refer to its root mean square. Those of the moment, which may vanish, refer to that
+    force times the contact's lever. Raises RunFailed where the cells are too few.
     """
     force = finite_rms(np.hypot(run["fx"], run["fy"]))
-    sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
+    sizes = {"force": (force, "N"), "mz": (force * contact.lever, "N m")}
     likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
-    cells, order = scene.method.cells, min(body.order, 1.5)
+    cells, order = scene.method.cells, min(contact.order, 1.5)
     estimates = {
         name: grid_error(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
     }
-    if isinstance(body, LinearTheory):
+    if isinstance(contact, LinearTheory):
         not_estimated(run, "the linear theory has no cells")
     else:
         with_stated_errors(run, estimates, HALVED_CELLS)
     theory = finite_rms(run["error_of_theory"])
-    return with_theory_error(run, {"force": _of_theory(theory, force)}, BAND_TEXT) if theory > 0.0 else run
+    return with_theory_error(run, {"force": _theory_estimate(theory, force)}, BAND_TEXT) if theory > 0.0 else run
 
 
 def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
-    """The result of a table of cases with the errors of the rows that it keeps: root mean squares of the error of the
-    cells and of that of the theory, which at least 95 % of cases keep to.
+    """Returns the result of a table of cases with its stated errors, as root mean squares over the rows in the result:
+    the error of the cells, and the error of the theory, which 95 % of cases do not exceed.
     """
     force = finite_rms(np.hypot(table["fx"], table["fy"]))
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
@@ -54,8 +54,8 @@ def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
         {"force": grid_error(finite_rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)},
         HALVED_CELLS,
     )
-    return with_theory_error(table, {"force": _of_theory(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
+    return with_theory_error(table, {"force": _theory_estimate(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
 
 
-def _of_theory(error: float, force: float) -> Estimate:
+def _theory_estimate(error: float, force: float) -> Estimate:
     return Estimate(error, "N", error / force if force > 0.0 else 0.0, 0.0, 0.0)

@@ -1,7 +1,7 @@
-"""What accuracy costs in rolling contact: every theory on many contacts, its error beside its time and its cells.
+"""Work and precision of the theories of rolling contact: error, computing time and cells of each theory on many cases.
 
-The contacts are an ellipse each, rolled in nine ways and by sizes of creepage from a twentieth to ten times what the
-linear theory takes to reach mu N.
+Each case is an ellipse with one of nine combinations of creepages. Sizes of creepage go from a twentieth to ten times
+the creepage at which the linear theory reaches mu N.
 """
 
 import time
@@ -24,13 +24,13 @@ from models.core.discretisation import finite_rms, grid_error, with_stated_error
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
-from models.systems.contact.assumptions import of_pressing
+from models.systems.contact.assumptions import pressing_assumptions
 from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.stated_error import MOST_CELLS
 
-Parts = tuple[float, float, float]
-CREEPAGE_KINDS: dict[str, Parts] = {
+CreepageParts = tuple[float, float, float]
+CREEPAGE_KINDS: dict[str, CreepageParts] = {
     "x": (1, 0, 0),
     "y": (0, 1, 0),
     "spin": (0, 0, 1),
@@ -41,20 +41,20 @@ CREEPAGE_KINDS: dict[str, Parts] = {
     "x+y+spin": (1, 1, 1),
     "x-y+spin": (1, -1, 1),
 }
-"""Parts of the three creepages, each in units of its linear scale."""
+"""Combinations of xi_x, xi_y and spin, each in units of the value at which the linear theory reaches mu N."""
 EXACT_GRID_CELLS, GRID_ERROR_LIMIT = (40, 80), 0.005
-"""Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
-taken where that error, divided by mu N, is larger."""
+"""Cells along each axis of the exact theory, halved once for the forces and twice for their error. The finer grid is
+used where the error on the coarser grid, divided by mu N, is above GRID_ERROR_LIMIT."""
 ForcesOfMotion = Callable[[Motion], Any]
 
 
 @dataclass(frozen=True)
 class ContactCase:
-    """One contact with semi-axes a and b (m), and its exact forces: fx, fy divided by mu N; mz divided by mu N
+    """A rolling contact with semi-axes a and b (m), and its exact forces: fx, fy divided by mu N; mz divided by mu N
     sqrt(ab); error of the exact theory's grid, divided by mu N.
 
-    parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : size of the
-    creepage.
+    parts : shares of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : size of
+    the creepage; at 1 a single creepage reaches mu N by the linear theory.
     """
 
     a: float
@@ -63,7 +63,7 @@ class ContactCase:
     friction: float
     pair: MaterialPair
     kind: str
-    parts: Parts
+    parts: CreepageParts
     level: float
     fx: float = np.nan
     fy: float = np.nan
@@ -72,12 +72,12 @@ class ContactCase:
 
     @property
     def limit(self) -> float:
-        """Largest tangential force mu N in N."""
+        """Largest tangential force (N): coefficient of friction times load."""
         return self.friction * self.load
 
     @property
     def motion(self) -> Motion:
-        """Creepages xi_x and xi_y, and spin (1/m). At ``level`` 1 a single creepage reaches mu N by the linear
+        """Creepages xi_x, xi_y and spin (1/m) of the case. At ``level`` 1 a single creepage reaches mu N by the linear
         theory.
         """
         c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
@@ -87,16 +87,16 @@ class ContactCase:
 
     @property
     def force(self) -> Array:
-        """Exact force (2,) divided by mu N: fx and fy."""
+        """Exact tangential force (2,), fx and fy, divided by mu N."""
         return np.array([self.fx, self.fy])
 
     def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
-        """The contact as an object of ``theory``, one of the theories of an ellipse."""
+        """Returns the case's contact as an object of ``theory``, a theory of elliptic contacts."""
         return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
 
 def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = EXACT_GRID_CELLS) -> ContactCase:
-    """The case with its exact forces. They are extrapolated to vanishing cells, and the error that remains is stated.
+    """Returns the case with its exact forces, extrapolated to vanishing cells, and with the error that remains.
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
     """
@@ -110,15 +110,17 @@ def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = EXACT_GRID_CE
             if fine == finest[0]:
                 raise
             break
-        best, error = without_grid([np.array([rolling.fx, rolling.fy, rolling.mz]) / scale for rolling in rolled])
+        best, error = extrapolated_to_vanishing_cells(
+            [np.array([rolling.fx, rolling.fy, rolling.mz]) / scale for rolling in rolled]
+        )
         if error < GRID_ERROR_LIMIT:
             break
     return replace(case, fx=float(best[0]), fy=float(best[1]), mz=float(best[2]), error=error)
 
 
-def without_grid(grids: list[Array]) -> tuple[Array, float]:
-    """Answers (fx, fy, mz) extrapolated to vanishing cells, and the error of fx and fy. ``grids`` are the answers on
-    three grids, each with cells half as long as the one before.
+def extrapolated_to_vanishing_cells(grids: list[Array]) -> tuple[Array, float]:
+    """Returns fx, fy and mz (3,) extrapolated to vanishing cells, and the error of fx and fy. ``grids`` : fx, fy and mz
+    on three grids, each with cells half as long as the grid before.
 
     The error of the cells is of first order where much sticks and of second where all slips. The order is chosen with
     which the extrapolations from the two coarser and the two finer grids agree best; their difference is the error.
@@ -135,8 +137,8 @@ def without_grid(grids: list[Array]) -> tuple[Array, float]:
 
 @dataclass(frozen=True)
 class TheorySettings:
-    """A theory with its choices. ``rolled(case, cells)`` computes all that needs no motion, and returns a function of
-    the motion.
+    """A contact theory with its options. cells : numbers of cells to compare; ``rolled(case, cells)`` computes all that
+    does not depend on the creepage, and returns a function from creepages to forces.
     """
 
     name: str
@@ -172,7 +174,9 @@ SECOND_ORDER_CELLS, PLAIN_MARCH_CELLS, SIMPLIFIED_CELLS, EXACT_CELLS = (
     (11, 21, 45),
     (10, 20, 40),
 )
-"""Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
+"""Cells along each axis: of FASTSIM's second-order march, of its plain march, of the theory of 1983, of the exact
+theory.
+"""
 THEORIES_COMPARED = (
     TheorySettings("linear theory", (1,), _rolled_by_theory(LinearTheory)),
     TheorySettings("FASTSIM 1982", PLAIN_MARCH_CELLS, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
@@ -187,8 +191,8 @@ THEORIES_COMPARED = (
 
 @dataclass(frozen=True)
 class TheoryPoint:
-    """Accuracy and time of a theory with a number of cells. errors (cases,) : divided by mu N; seconds : of one
-    evaluation, median over the cases; range : least and largest of the cases' seconds.
+    """Accuracy and time of a theory on a number of cells. errors (cases,) : force errors divided by mu N; seconds :
+    time of an evaluation, median over the cases; range : least and largest time of a case (s).
     """
 
     name: str
@@ -199,37 +203,39 @@ class TheoryPoint:
 
     @property
     def mean(self) -> float:
-        """Mean error divided by mu N."""
+        """Mean force error over the cases, divided by mu N."""
         return float(np.mean(self.errors))
 
     @property
-    def most(self) -> float:
-        """Error divided by mu N that 95 of 100 cases do not exceed."""
+    def quantile_95(self) -> float:
+        """Force error divided by mu N that 95 of 100 cases do not exceed."""
         return float(np.quantile(self.errors, 0.95))
 
 
-def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
-    """Errors of a theory in all cases, and its seconds: the median of ``repeats`` in each case, then the median over
-    the cases.
+def measure_theory(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
+    """Measure force errors and evaluation time of a theory over all cases. The time is the median of ``repeats`` in
+    each case, then the median over the cases.
     """
     errors, seconds = [], []
     for case in cases:
-        answer, seconds_taken = _value_and_seconds(theory.rolled(case, cells), case.motion, repeats)
+        answer, seconds_taken = _forces_and_seconds(theory.rolled(case, cells), case.motion, repeats)
         errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
         seconds.append(seconds_taken)
     return TheoryPoint(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
 
 
-def force_of(computed_answer: Any) -> Array:
-    """Force (2,) in N of an answer, which is either a tuple of forces and moment or an object with ``force``."""
-    return np.array(computed_answer[:2]) if isinstance(computed_answer, tuple) else computed_answer.force
+def force_of(computed_forces: Any) -> Array:
+    """Tangential force (2,) in N from what a theory returns: a tuple of forces and moment, or an object with
+    ``force``.
+    """
+    return np.array(computed_forces[:2]) if isinstance(computed_forces, tuple) else computed_forces.force
 
 
 LEAST_TIMED_SECONDS = 2e-5
-"""Seconds that a timing lasts at least."""
+"""Least time (s) over which an evaluation is repeated to measure its time."""
 
 
-def _value_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tuple[Any, float]:
+def _forces_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tuple[Any, float]:
     start = time.perf_counter()
     answer = roll(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))
@@ -245,7 +251,9 @@ def _value_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tu
 def fastest_point(
     points: list[TheoryPoint], target_error: float, error: Callable[[TheoryPoint], float]
 ) -> TheoryPoint | None:
-    """The fastest of the points whose error is at most ``target_error``; None if there is none."""
+    """Returns the fastest theory, with its number of cells, whose error is at most ``target_error``; None if no error
+    is so small.
+    """
     meets = [point for point in points if error(point) <= target_error]
     return min(meets, key=lambda point: point.seconds, default=None)
 
@@ -257,9 +265,11 @@ def ellipse_cases(
     friction: float,
     material_pair: MaterialPair,
     creepage_levels: tuple[float, ...],
-    creepage_kinds: dict[str, Parts] = CREEPAGE_KINDS,
+    creepage_kinds: dict[str, CreepageParts] = CREEPAGE_KINDS,
 ) -> list[ContactCase]:
-    """Cases of every kind and level on one ellipse, their exact forces not yet computed."""
+    """Returns a case for every kind and size of creepage on an ellipse with semi-axes a and b (m), without exact forces
+    yet.
+    """
     return [
         ContactCase(a, b, load, friction, material_pair, kind, parts, level)
         for (kind, parts), level in product(creepage_kinds.items(), creepage_levels)
@@ -267,7 +277,8 @@ def ellipse_cases(
 
 
 def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], progress: Progress) -> Result:
-    """Errors and seconds of every theory on every number of cells, on the scene's ellipse; the points are the detail.
+    """Measure errors and times of every theory on every number of cells, on the scene's ellipse; the result's detail is
+    the list of ``TheoryPoint``.
 
     creepage_levels : sizes of the creepage; at 1 the linear theory reaches mu N.
     """
@@ -281,7 +292,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], pro
         known.append(with_exact_forces(case))
     for i, theory in enumerate(THEORIES_COMPARED):
         progress(theory.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
-        points += [measure(theory, cells, known) for cells in theory.cells]
+        points += [measure_theory(theory, cells, known) for cells in theory.cells]
     channels = {
         "theory": Channel("point", [point.name for point in points], "", "theory, with its choices"),
         "cells": Channel("point", [point.cells for point in points], "", "cells along each axis"),
@@ -290,20 +301,20 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], pro
         "uncertainty": Channel("contact", [case.error for case in known], "mu N", "of the exact force"),
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
-    with_assumptions(price, of_pressing(scene, cases[0].contact(ExactOnEllipse)))
+    with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactOnEllipse)))
     left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
     return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 
 
 ERROR_TARGETS = (0.05, 0.02, 0.01, 0.005)
-"""Errors divided by mu N that are asked for."""
+"""Target errors of the force, divided by mu N, for which the cheapest theory is listed."""
 
 
 def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
-    """For every target error: the cheapest theory whose mean error meets it, and the cheapest whose error does in 95 of
-    100 cases.
+    """Table rows for every target error: the fastest theory whose mean error meets the target, and the fastest whose
+    error meets it in 95 of 100 cases.
     """
-    errors = attrgetter("mean"), attrgetter("most")
+    errors = attrgetter("mean"), attrgetter("quantile_95")
     return [
         (f"{100 * target:g} %", *(_point_text(fastest_point(points, target, error), error) for error in errors))
         for target in ERROR_TARGETS

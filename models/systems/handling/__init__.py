@@ -1,4 +1,4 @@
-"""A road vehicle that is steered, driven and braked on four rolling contacts.
+"""Handling of a road vehicle that is steered, driven and braked on the rolling contacts of its tyres.
 
 Axes of ISO 8855: x forward, y left, z up; the vehicle is that of the ride on a carrier that yaws (see
 ``models.vehicles.free_vehicle``). Angles are right-handed: steer and yaw to the left are positive, a wheel's
@@ -8,4 +8,6 @@ runs through the contact; forces act on the tyre, so that they oppose it.
 
 ENGINES = ("exudyn", "mujoco")
 ON_REQUEST = ("reference",)
-"""The independent reference: plain equations, half a minute of time for every second of a manoeuvre."""
+"""Engines that run only where the user names them: the independent reference, plain equations that take half a minute
+for every second of a manoeuvre.
+"""

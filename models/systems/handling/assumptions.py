@@ -1,4 +1,4 @@
-"""Assumptions of the equations of a steered car."""
+"""Assumptions of the equations of a steered car, with the limits that decide whether a run breaks them."""
 
 from functools import partial
 
@@ -12,23 +12,27 @@ from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial import hitch_of
 
 LARGEST_LOAD_RATIO = 2.5
-"""Of the load at rest: up to about so much a tyre's cornering stiffness grows with its load (Pacejka, Tyre and Vehicle
-Dynamics, 4.3); that of the brush grows without end."""
+"""Wheel load divided by the load at rest up to which a tyre's cornering stiffness grows with its load (Pacejka, Tyre
+and Vehicle Dynamics, 4.3). The stiffness of the brush model grows without end.
+"""
 LARGEST_LEAN = 0.2
-"""rad: springs act along the upright of the road's plane, and its cosine is 2 % below 1 here."""
+"""Largest roll and pitch (rad): springs act along the normal of the road's plane, and the cosine is 2 % below 1 here.
+"""
 SLIDING_SPEED, SLIDING_SPEED_SHARE, SLIDING_WEIGHT_SHARE = 4.0, 0.2, 0.1
-"""m/s, and share of the speed, beyond which measured friction falls, and the share of the weight that may slide faster:
-friction that is a fifth too large makes 2 % of all forces then."""
+"""Sliding speed (m/s), and sliding speed divided by the wheel's speed, above which measured friction falls; and the
+largest share of the weight that may slide faster. Friction that is a fifth too large then changes all forces by 2 %."""
 RELAXATION_LENGTH, LARGEST_SLIP_LEAD = 0.3, 0.02
-"""m that a carcass takes to follow a slip angle, and rad by which the angle may be ahead of it."""
+"""Distance (m) over which a tyre's carcass follows a slip angle, and largest slip angle (rad) by which it may lag."""
 LARGEST_TRAVEL = 0.12
-"""m: a car's wheels meet their stops about there."""
+"""Largest travel (m) of a wheel: a car's wheels reach their stops about there."""
 LARGEST_STEER = 0.7
-"""rad: beyond, joints of a steering end, and the inner wheel must turn more than the outer one."""
+"""Largest steer angle (rad): beyond, steering joints reach their ends, and the inner wheel must turn more than the
+outer wheel.
+"""
 
 
 def assumptions(handling: Handling) -> list[Assumption]:
-    """Assumptions of the equations of a manoeuvre."""
+    """Assumptions of the equations of a manoeuvre, about wheel loads, lean, friction, tyres, steer angle and travel."""
     return [
         Assumption(
             "wheel loads",
@@ -82,12 +86,12 @@ def assumptions(handling: Handling) -> list[Assumption]:
             LARGEST_STEER,
         ),
         *_travel_assumptions(handling),
-        *_unbuilt_stops(handling),
+        *_stop_assumptions(handling),
     ]
 
 
-def _unbuilt_stops(handling: Handling) -> list[Assumption]:
-    """Assumptions that coordinates stay within their stops, for stops that the model does not have."""
+def _stop_assumptions(handling: Handling) -> list[Assumption]:
+    """Assumptions that bodies stay between the stops of the vehicle file that are not part of the model."""
     coordinates = handling.vehicle.coordinates()
     return [
         Assumption(
@@ -104,8 +108,8 @@ def _unbuilt_stops(handling: Handling) -> list[Assumption]:
 
 
 def _travel_assumptions(handling: Handling) -> list[Assumption]:
-    """Assumptions on springs that alone carry a wheel: travel stays within the spring's curve or, without one, within
-    the usual stops of a car.
+    """Assumptions that the travel of upright wheel springs stays within the spring's force curve, or without a curve
+    within the usual stops of a car.
     """
     carrying = {chassis_of(handling.given).name, *handling.given.towed}
     bodies = {tyre.body for tyre in handling.given.tyres}
@@ -158,8 +162,8 @@ def _lean_angles(run: Result, handling: Handling) -> Watched:
 
 
 def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
-    """Share of the vehicle's weight that is carried by tyres which slide faster than SLIDING_SPEED and than
-    SLIDING_SPEED_SHARE of their speed.
+    """Share (m,) of the vehicle's weight on tyres that slide faster than SLIDING_SPEED and faster than
+    SLIDING_SPEED_SHARE of the wheel's speed.
     """
     fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING_SPEED, SLIDING_SPEED_SHARE * _contact_speed(run))
     weight = GRAVITY * sum(body.mass for body in handling.vehicle.bodies)
@@ -167,12 +171,12 @@ def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
 
 
 def _contact_speed(run: Result) -> np.ndarray:
-    """Speed (m/s) of every wheel's contact over the road, from rolling and sliding together."""
+    """Speed (m/s) of every wheel over the road, from rolling and sliding together, shape (m, w)."""
     return np.hypot(run["tread"] + run["slip_x"], run["slip_y"])
 
 
 def _carcass_lag(run: Result) -> np.ndarray:
-    """Change of the steer angle (rad) while a wheel covers the distance over which its carcass follows."""
+    """Change of the steer angle (rad) while a wheel rolls over the relaxation length of its tyre, shape (m, w)."""
     return (
         np.gradient(run["steer"], run.times, axis=0) * RELAXATION_LENGTH / np.maximum(_contact_speed(run), FADING_SPEED)
     )

@@ -1,4 +1,4 @@
-"""Energy of a drive, by the rigid bodies' own velocities, and whether its ledger closes."""
+"""Energy of a simulated drive from the velocities of its bodies, and the energy that its work does not explain."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from models.systems.handling.run import Drive, joint_travel
 
 
 def drive_energy(drive: Drive) -> np.ndarray:
-    """Energy (m,) of a drive in J: kinetic energy from the rigid bodies' own velocities, and potential energy of
+    """Energy (m,) of a drive in J: kinetic energy from the velocities of all rigid bodies, and potential energy of
     weights, springs and tyres.
     """
     run = drive.run
@@ -17,11 +17,11 @@ def drive_energy(drive: Drive) -> np.ndarray:
     return motion + drive.ledger[:, at.POTENTIAL]
 
 
-def unaccounted(drive: Drive) -> np.ndarray:
-    """Energy (m,) in J that does not balance: energy less its initial value and less the work done since, by Simpson's
-    rule.
+def unaccounted_energy(drive: Drive) -> np.ndarray:
+    """Energy of a drive in J that its work does not explain: energy less its initial value, less the work done since by
+    Simpson's rule.
 
-    Rows lie at every second step: the middle one of three belongs to the rule.
+    Values lie at every second step, as the rule takes two steps at a time.
     """
     power, run_times, total_energy = drive.power(), drive.run.times, drive_energy(drive)[::2]
     work = np.cumsum((run_times[1] - run_times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
@@ -29,8 +29,8 @@ def unaccounted(drive: Drive) -> np.ndarray:
 
 
 def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """Kinetic energy and energy of the weights (J), summed over the bodies. Velocities come from the reference's
-    written-out motion, from no engine.
+    """Kinetic energy and gravitational energy of all bodies (J) at positions q and rates v. Velocities come from the
+    reference's equations, not from an engine.
     """
     total, motions = 0.0, SpatialReference(handling.vehicle).motions_of(q, v)
     for body in handling.vehicle.bodies:

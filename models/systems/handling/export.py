@@ -1,4 +1,4 @@
-"""The vehicle of a scene of handling as a file of its engine: bodies and joints."""
+"""Export of the vehicle of a handling scene as a model file of an engine: bodies and joints."""
 
 from models.engines.export import Exported, ExportSubject, elements_left_out, export_free_vehicle
 from models.multibody.numbers import Handling
@@ -9,18 +9,20 @@ AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll 
 
 
 def exported(scene: HandlingScene, engine: str) -> Exported:
-    """Export the vehicle of the first manoeuvre to "mujoco" or "exudyn", without springs, tyres and driver."""
+    """Export the vehicle of the first manoeuvre, without springs, tyres and driver, as a model file of "mujoco" or
+    "exudyn".
+    """
     handling = scene.car(next(iter(scene.manoeuvres)))
-    return of_handling(
+    return export_handling(
         engine, handling, ExportSubject(scene.title, scene.file, AXES), ["the driver's steer and torques"]
     )
 
 
-def of_handling(
+def export_handling(
     engine: str, handling: Handling, export_subject: ExportSubject, further_omissions: list[str]
 ) -> Exported:
-    """Export a vehicle of the handling system; ``further_omissions`` lists what the model leaves out besides the
-    vehicle's own parts.
+    """Export a vehicle as a model file of an engine. ``further_omissions`` lists what the file leaves out besides
+    springs, tyres and other forces of the vehicle.
     """
     left_out = [*elements_left_out(handling.vehicle), *further_omissions]
     return export_free_vehicle(engine, driven_by(handling), export_subject, left_out)

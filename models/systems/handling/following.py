@@ -1,8 +1,8 @@
-"""The driver's torques along a measured drive: those with which the car keeps to the speed that was measured.
+"""Wheel torques with which the car follows the speed of a measured drive.
 
-The first torques move the car's mass alone. A march then shows what speed they give, and what is missing changes them:
-by m e' + c e, with e the missing speed and c the resistance (N s/m) that the first march shows. The march is the run's,
-in MuJoCo, so what is found holds to rounding in Exudyn too.
+The first torques accelerate the car's mass alone. A run in MuJoCo then gives the speed that they lead to. The force is
+corrected by m e' + c e, with e the missing speed and c the resistance (N s/m) that the first run shows. As both engines
+agree to rounding, the torques suit Exudyn, too.
 """
 
 from dataclasses import replace
@@ -17,17 +17,19 @@ from models.systems.handling.run import drive_run
 
 ENGINE = "mujoco"
 SPEED_TOLERANCE = 0.002
-"""Rms error of the speed by its mean, with which torques will do."""
+"""Largest rms error of the speed, divided by the mean speed, at which the torques are accepted."""
 MOST_MARCHES = 8
+"""Most runs in which the torques are corrected."""
 LOW_PASS = 2.0
-"""Hz: torques follow no faster change of the speed, which would be the sensor's noise."""
+"""Cut-off frequency (Hz) of the measured speed, so that torques do not follow the sensor's noise."""
 
 
 def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: str) -> Controls:
-    """Steering, brakes and drive that move the car along a measured steer angle and speed.
+    """Compute steer angle, brake torque and drive torque over time with which the car follows a measured steer angle
+    and speed.
 
-    handling : the car, with the shares of its axles in braking and driving; step : s, of the march; file : of the
-    scene. Raises RunFailed where no torques of this kind give the measured speed, as on a road without friction.
+    handling : the car, with the shares of its axles in braking and driving; step : time step (s); file : name of the
+    scene's file. Raises RunFailed where no torques give the measured speed, as on a road without friction.
     """
     period = float(drive.times[1] - drive.times[0])
     stride = round(period / step)
@@ -52,7 +54,9 @@ def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: 
 
 
 def _with_torque(controls: Controls, drive: MeasuredDrive, torque: np.ndarray) -> Controls:
-    """Controls with the measured steer angle and a torque (n,) in N m of all wheels together."""
+    """Returns the controls with the measured steer angle and a torque (n,) in N m of all wheels together, driving above
+    0, braking below.
+    """
     knot_times = drive.times - drive.times[0]
 
     def knots(values: np.ndarray) -> Control:

@@ -1,4 +1,6 @@
-"""Limits of a manoeuvre: car and trailers stay upright, a train does not fold, steps follow what damps the wheels."""
+"""Limits beyond which a handling run fails: turnover of car or trailer, jackknife, and time steps that are too long for
+the tyres.
+"""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -16,14 +18,18 @@ if TYPE_CHECKING:
     from models.systems.handling.run import Drive
 
 STABILITY_LIMIT = 2.78
-"""Step times rate up to which the classical Runge-Kutta method damps what is damped."""
+"""Stability limit of the classical Runge-Kutta method on the negative real axis: step times decay rate."""
 TURNOVER_ANGLE, JACKKNIFE_ANGLE = 0.5, 1.57
-"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane; and
-yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
+"""Roll or pitch (rad) beyond which a car or trailer counts as turned over, and yaw (rad) of a towed body relative to
+its towing vehicle beyond which a train jackknifes.
+"""
 
 
 def check_upright(handling: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
-    """Refuse a run in which the car turns over or the train jackknifes, as the model is invalid from then on."""
+    """Raise RunFailed where the car turns over or the train jackknifes, as the model is invalid from then on.
+
+    positions (m, n) : coordinates of the vehicle at the times (m,) in s.
+    """
     for body, freedoms, largest_angle, failure in _rotation_bounds(handling):
         columns = [
             i
@@ -36,8 +42,8 @@ def check_upright(handling: Handling, times: np.ndarray, positions: np.ndarray, 
 
 
 def _rotation_bounds(handling: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
-    """Limits of the bodies' rotations: the body, its rotational freedoms, the largest angle (rad), and what exceeding
-    it means.
+    """Yields the limits of rotation of the car and of each towed body: name of the body, its rotational freedoms, the
+    largest angle (rad), and text on what exceeding it means.
     """
     yield SWAY, ("rx", "ry"), TURNOVER_ANGLE, f"the car turns over: it leans by more than {TURNOVER_ANGLE} rad"
     for name in handling.vehicle.towed:
@@ -57,8 +63,8 @@ def _rotation_bounds(handling: Handling) -> Iterator[tuple[str, tuple[Freedom, .
 
 
 def check_step(drive: "Drive", engine: str) -> None:
-    """Refuse a step that is too long for the tyres: sticking bristles damp a wheel with C / u, u the speed of the
-    tread, and a longer step lets it swing up.
+    """Raise RunFailed for a time step that is too long for the tyres. Sticking bristles damp a wheel with C / u (C the
+    slip stiffness, u the speed of the tread), and steps above the stability limit let the wheel oscillate.
     """
     h, run_times = drive.handling, drive.run.times
     step, force = float(run_times[1] - run_times[0]), np.hypot(drive["fx"], drive["fy"])

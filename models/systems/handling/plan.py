@@ -14,52 +14,52 @@ from models.vehicles.towing import hitch_line
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
-    """Everything that can be refused before a run is refused here, before any file is written."""
+    """Raise InputError, before any file is written, for vehicles, tyres or roads that cannot be built."""
     for name in scene.manoeuvres:
         scene.car(name)
 
 
 def findings(scene: HandlingScene) -> tuple[Finding, ...]:
-    """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
+    """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
     return plausible(scene.car(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
 
 
 def describe(scene: HandlingScene) -> str:
-    """The scene's plan as text."""
+    """Returns the plan of a handling scene as text: vehicle, tyres, road, manoeuvres, engines, effects, assumptions."""
     first = scene.car(next(iter(scene.manoeuvres)))
     tyres, free = scene.tyres, first.vehicle
     loads = ", ".join(f"{name} {load:.0f} N" for name, load in first.held.tyres.items())
     mass = sum(body.mass for body in free.bodies)
     lines = [
         scene.title,
-        _line("scene", f"{scene.file}, study {scene.study}"),
-        _line(
+        _plan_line("scene", f"{scene.file}, study {scene.study}"),
+        _plan_line(
             "vehicle",
             f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
         ),
-        *(_line("trailer", hitch_line(free, first.held, name)) for name in free.towed),
-        _line("tyres", f"brushes of {tyres.cells} cells per strip, mu = {tyres.friction:g}; static loads {loads}"),
-        _line(
+        *(_plan_line("trailer", hitch_line(free, first.held, name)) for name in free.towed),
+        _plan_line("tyres", f"brushes of {tyres.cells} cells per strip, mu = {tyres.friction:g}; static loads {loads}"),
+        _plan_line(
             "road",
             f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
             "rough, else flat",
         ),
-        *(_line("read", note) for note in first.given.notes),
-        *(_line(name, _manoeuvre_text(scene, name)) for name in scene.manoeuvres),
-        _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
-        *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
-        *(_line(*line) for line in _native_shares(first)),
-        _line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
-        _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
+        *(_plan_line("read", note) for note in first.given.notes),
+        *(_plan_line(name, _manoeuvre_text(scene, name)) for name in scene.manoeuvres),
+        _plan_line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
+        *(_plan_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
+        *(_plan_line(*line) for line in _native_shares(first)),
+        _plan_line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
+        _plan_line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
     ]
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     assumed = assumption_lines(assumptions(first), 18)
-    return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
+    return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _plan_line("never", never)])
 
 
 def _native_shares(handling: Handling) -> list[tuple[str, str]]:
-    """Lines, head and text, on the springs that each engine computes by native elements, and on why it does not compute
-    the others.
+    """Lines (heading, text) on the springs that each engine computes by native elements, and on why other springs are
+    computed by compiled forces.
     """
     divisions = {engine: towed_division(handling, engine) for engine in ENGINES}
     native = {engine: division.native for engine, division in divisions.items()}
@@ -79,5 +79,5 @@ def _manoeuvre_text(scene: HandlingScene, name: str) -> str:
     return f"{manoeuvre.speed:g} m/s, {manoeuvre.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
 
 
-def _line(label: str, text: str) -> str:
+def _plan_line(label: str, text: str) -> str:
     return f"  {label:<18} {text}"

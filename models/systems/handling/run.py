@@ -1,4 +1,4 @@
-"""A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
+"""Runs of a manoeuvre in an engine: forces and slips of the tyres, energies, and motion in axes of the vehicle."""
 
 import time
 from collections.abc import Iterator
@@ -42,19 +42,23 @@ if TYPE_CHECKING:
     from models.multibody.plain.rolling import PlainRolling
 
 REFERENCE = "reference"
-"""The independent reference: plain equations that share no force with the engines; half a minute for every second."""
-TOLD_ORDERS, NET_ORDER = 3.0, 2.0
-"""Orders that errors are told by: of the steps, of a method of order 4 across wheels that lock and land; of the net."""
+"""Name of the independent reference: plain equations that share no force with the engines. It takes half a minute for
+every simulated second.
+"""
+STEP_ERROR_ORDER, CELL_ERROR_ORDER = 3.0, 2.0
+"""Orders of convergence with which errors are estimated: in the time step (Runge-Kutta 4, lowered by wheels that lock
+and land), and in the cells of the tyre patch.
+"""
 UNIT_OF_CHANNEL = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
-"""Channels whose error is told."""
-ROWS_BETWEEN_NETS = 50
-"""Rows from one to the next at which creep forces of several nets are compared."""
+"""Channels whose error is stated, with their units."""
+ROW_STRIDE_OF_CELL_ERROR = 50
+"""Every n-th row of a drive is used to compare creep forces on grids of different numbers of cells; this is n."""
 MOST_CELLS, CELLS_KEY = 200, "tyres.cells"
-"""Most cells per strip, and the key that they are set by."""
+"""Most cells per strip of a tyre patch, and the scene key of their number."""
 REPEATED_PART_START = 0.4
-"""Share of a manoeuvre after which a part of it is repeated, where no longer step can be."""
+"""Share of a manoeuvre after which part of it is repeated in half the time step, where a longer step is impossible."""
 STANDSTILL_SHARE = 1e-6
-"""Share of the load at rest, and of the speed at the start, below which a force or a speed is rounding."""
+"""Force divided by the load at rest, or speed divided by the initial speed, below which a channel is only rounding."""
 TYRE_CHANNELS = {
     "load": (at.PRESS, "N", "of the tyre on the road"),
     "fx": (at.FX, "N", "creep force along the wheel"),
@@ -66,22 +70,22 @@ TYRE_CHANNELS = {
     "steer": (at.ANGLE, "rad", "steer angle"),
     "power": (at.POWER, "W", "of the creep forces"),
 }
-"""Channels of every tyre: column of its report, unit, meaning."""
+"""Channels of every tyre: column in the tyre's report, unit, meaning."""
 
-PLACE_BELOW_TEXT = "of the place below the chassis' centre, left positive"
+POINT_BELOW_CENTRE_TEXT = "of the place below the chassis' centre, left positive"
 MOTION_CHANNELS = {
     "forward speed": ("m/s", "of the place below the chassis' centre"),
     "yaw rate": ("rad/s", "left positive"),
-    "lateral acceleration": ("m/s^2", PLACE_BELOW_TEXT),
-    "side slip": ("rad", PLACE_BELOW_TEXT),
+    "lateral acceleration": ("m/s^2", POINT_BELOW_CENTRE_TEXT),
+    "side slip": ("rad", POINT_BELOW_CENTRE_TEXT),
 }
-"""Channels of the car, by the names of what is measured of one: unit, meaning."""
+"""Channels of the car's motion, with the names of measured channels: unit, meaning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A simulated drive. run : times, positions and rates; tyres (m, w, REPORTED) and ledger (m, LEDGER) : reports of
-    ``forces``; seconds : CPU time of the march.
+    """A simulated drive. run : times, positions and rates; tyres (m, w, REPORTED) : forces and slips of each tyre;
+    ledger (m, LEDGER) : energies and powers; seconds : CPU time of the run.
     """
 
     handling: Handling
@@ -91,7 +95,7 @@ class Drive:
     seconds: float = 0.0
 
     def __getitem__(self, channel: str) -> np.ndarray:
-        """A channel (m, w) of TYRE_CHANNELS by its name, with a column for each tyre."""
+        """Returns a tyre channel (m, w) by its name in TYRE_CHANNELS, with a column for each tyre."""
         return self.tyres[:, :, TYRE_CHANNELS[channel][0]]
 
     @property
@@ -100,7 +104,7 @@ class Drive:
         return self.run.positions[:, :3]
 
     def velocity(self) -> np.ndarray:
-        """Motion (m, 3) of the point below the chassis' centre: velocities forward and to the left (m/s), and yaw rate
+        """Velocities (m, 3) of the point below the chassis' centre: forward and to the left (m/s), and yaw rate
         (rad/s).
         """
         yaw, rates = self.run.positions[:, 2], self.run.rates
@@ -110,12 +114,12 @@ class Drive:
         return np.column_stack([speed_along, speed_across, rates[:, 2]])
 
     def lateral_acceleration(self) -> np.ndarray:
-        """Acceleration (m,) in m/s^2 of the point below the chassis' centre, positive to the vehicle's left."""
+        """Lateral acceleration (m,) in m/s^2 of the point below the chassis' centre, positive to the left."""
         speed_along, speed_across, turning = self.velocity().T
         return np.gradient(speed_across, self.run.times) + speed_along * turning
 
     def motion(self) -> dict[str, np.ndarray]:
-        """The channels (m,) of MOTION_CHANNELS by name."""
+        """Returns the channels of MOTION_CHANNELS, each (m,), by name."""
         speed_along, speed_across, turning = self.velocity().T
         return dict(
             zip(
@@ -132,15 +136,17 @@ class Drive:
         return np.arctan2(-self["slip_y"], np.abs(self["tread"] + self["slip_x"]))
 
     def grip(self) -> np.ndarray:
-        """Largest horizontal force (m, w) of each tyre in N, mu N."""
+        """Largest horizontal force (m, w) of each tyre in N: friction times load."""
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
-        """Utilised friction (m, w): horizontal force of each tyre divided by mu N, 0 in the air."""
+        """Utilised friction (m, w): horizontal force of each tyre divided by friction times load, 0 in the air."""
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
-        """Power (m,) in W of everything that the ledgers report and of the tyres' creep forces."""
+        """Power (m,) in W of all work on the vehicle: dampers, driver's torques, steering, and creep forces of the
+        tyres.
+        """
         ledger = self.ledger
         power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
         return power + self["power"].sum(axis=1)
@@ -149,20 +155,21 @@ class Drive:
 def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
     """Run a manoeuvre, by default the first, in "exudyn", "mujoco" or "reference"; the result's detail is the Drive.
 
-    error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
+    error : whether the error of time steps and cells is estimated, by further runs. Raises RunFailed where the vehicle
+    turns over, the step is too long or the motion is not finite.
     """
     name = manoeuvre or next(iter(scene.manoeuvres))
     driven_manoeuvre, handling, adaptive = scene.manoeuvres[name], scene.handling(name), scene.adaptive(engine, name)
     if adaptive is not None:
-        run = judged_drive(scene, engine, name, driven_adaptively(engine, handling, driven_manoeuvre.speed, adaptive))
+        run = drive_result(scene, engine, name, drive_run_adaptive(engine, handling, driven_manoeuvre.speed, adaptive))
         return not_estimated(run, NO_ESTIMATE) if error else run
     drive = drive_run(engine, handling, driven_manoeuvre.speed, driven_manoeuvre.duration, scene.run.step)
-    labelled = judged_drive(scene, engine, name, drive)
+    labelled = drive_result(scene, engine, name, drive)
     return _with_error(labelled, drive, driven_manoeuvre.speed) if error else labelled
 
 
-def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
-    """The result of a scene's manoeuvre from its drive, with the assumptions that the drive breaks."""
+def drive_result(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
+    """Returns the result of a simulated manoeuvre, with the assumptions that the drive breaks."""
     vehicle = drive.handling.vehicle
     channels = {
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
@@ -174,7 +181,7 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
     }
     channels |= {name: Channel("time", values, *MOTION_CHANNELS[name]) for name, values in drive.motion().items()}
     axes = {
-        "time": Channel("time", scene.begins(manoeuvre) + drive.run.times, "s"),
+        "time": Channel("time", scene.start_time(manoeuvre) + drive.run.times, "s"),
         "coordinate": Channel("coordinate", [".".join(coordinate) for coordinate in vehicle.coordinates()]),
         "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
@@ -186,8 +193,8 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
-    """The result with errors of its motion and of its tyres' forces, estimated by longer steps and by other grids of
-    the patch.
+    """Returns the result with stated errors of its motion and tyre forces, estimated by runs in longer time steps and
+    with other numbers of cells.
     """
     rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal_series(drive)
     still = {"N": STANDSTILL_SHARE * max(drive.handling.held.tyres.values())}
@@ -196,7 +203,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
     }
-    by_step, method_text = step_errors(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
+    by_step, method_text = step_errors(Series(fine.times, moving), rerun, STEP_ERROR_ORDER, rerun.step)
     by_net = rerun.by_cells(list(moving))
     estimates = {
         name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
@@ -206,8 +213,8 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvreRerun:
-    """Function that repeats a drive in an engine, from a speed (m/s), with other steps or another grid of the tyres'
-    patches.
+    """Repeats a drive in an engine, from the same initial speed (m/s), with another time step or another number of
+    cells per tyre patch.
     """
 
     engine: str
@@ -216,15 +223,15 @@ class ManoeuvreRerun:
 
     @property
     def step(self) -> float:
-        """Step of the run (s)."""
+        """Time step (s) of the drive that is repeated."""
         return float(self.drive.run.times[1])
 
     @cached_property
     def in_double_step(self) -> Series:
-        """Series of the manoeuvre in twice the step; raises RunFailed."""
-        return self._with_net(self.drive.handling.tyres.cells, 2.0)
+        """Time series of the manoeuvre in twice the time step; raises RunFailed."""
+        return self._series_on_cells(self.drive.handling.tyres.cells, 2.0)
 
-    def _with_net(self, cells: int, factor: float) -> Series:
+    def _series_on_cells(self, cells: int, factor: float) -> Series:
         handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
         changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
         step = factor * self.step
@@ -233,7 +240,7 @@ class ManoeuvreRerun:
         return principal_series(drive_run(self.engine, changed, self.speed, steps * step, step))
 
     def __call__(self, factor: float, share: float) -> Series:
-        """Run the manoeuvre again in twice the step, or a share of it in half the step (see
+        """Repeat the manoeuvre in twice the time step, or a share of it in half the step; returns its time series (see
         ``models.core.discretisation.Rerun``)."""
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
@@ -245,39 +252,40 @@ class ManoeuvreRerun:
         later = _manoeuvre_from(handling, run.times[first])
         model = build(self.engine, later, Settings("RK4", step, count * step))
         path = model.run(run.positions[first], run.rates[first])
-        return principal_series(read_run(later, path, self.engine), run.times[first])
+        return principal_series(drive_of_fixed_steps(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
-        """Errors of the patch's grid, estimated by a run in the same steps with a third of its cells.
+        """Estimate the errors that the cells of the tyre patches cause in channels, by a run with a third of the cells.
 
-        The error does not fall evenly with the number of cells. The ratio of the difference of both runs to the error
-        is estimated from creep forces at the same states, compared with those of a grid with twice as many cells.
+        The error does not fall evenly with the number of cells. The ratio of the error to the difference of both runs
+        is estimated from creep forces at the same states, compared with creep forces on twice as many cells.
         """
         cells = self.drive.handling.tyres.cells
         other_cells, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
         try:
-            base, coarse = self.in_double_step, self._with_net(other_cells, 2.0)
+            base, coarse = self.in_double_step, self._series_on_cells(other_cells, 2.0)
         except RunFailed:
-            base, coarse = principal_series(self.drive), self._with_net(other_cells, 1.0)
+            base, coarse = principal_series(self.drive), self._series_on_cells(other_cells, 1.0)
         creepages, fewer, forces_on_more = (self._creep_forces(count) for count in (cells, other_cells, finer))
         force_difference, error = (
             np.linalg.norm(creepages - fewer),
-            np.linalg.norm(creepages - forces_on_more) / (1.0 - 0.5**NET_ORDER),
+            np.linalg.norm(creepages - forces_on_more) / (1.0 - 0.5**CELL_ERROR_ORDER),
         )
         share, estimates = error / force_difference if force_difference > 0.0 else 0.0, dict[str, Estimate]()
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
-            net = grid_error(gap, reference_size(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
+            net = grid_error(gap, reference_size(values), UNIT_OF_CHANNEL[name], cells, CELL_ERROR_ORDER, MOST_CELLS)
             estimates[name] = replace(net, of=CELLS_KEY)
         return estimates
 
     def _creep_forces(self, cells: int) -> np.ndarray:
-        """Creep forces (m, w, 2) in N at some states of the drive, computed on a grid of ``cells``."""
+        """Creep forces (m, w, 2) in N at every n-th state of the drive, computed with another number of cells."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
         sampled_times, positions, rates = (
-            np.ascontiguousarray(run_array[::ROWS_BETWEEN_NETS]) for run_array in (run.times, run.positions, run.rates)
+            np.ascontiguousarray(run_array[::ROW_STRIDE_OF_CELL_ERROR])
+            for run_array in (run.times, run.positions, run.rates)
         )
         report = np.empty((len(sampled_times), len(handling.vehicle.tyres), at.REPORTED))
         at.reports(numbers, sampled_times, positions, rates, report, np.empty((len(sampled_times), at.LEDGER)))
@@ -285,7 +293,7 @@ class ManoeuvreRerun:
 
 
 def principal_series(drive: Drive, start_time: float = 0.0) -> Series:
-    """Channels whose error is estimated, over the time of a drive that begins at ``start_time`` (s)."""
+    """Time series of the channels whose error is estimated, for a drive that begins at ``start_time`` (s)."""
     motion = dict(zip(UNIT_OF_CHANNEL, drive.velocity().T, strict=False))
     return Series(
         start_time + drive.run.times, motion | {name: drive[name] for name in UNIT_OF_CHANNEL if name in TYRE_CHANNELS}
@@ -293,7 +301,7 @@ def principal_series(drive: Drive, start_time: float = 0.0) -> Series:
 
 
 def _manoeuvre_from(handling: Handling, start_time: float) -> Handling:
-    """The same manoeuvre with time counted from ``start_time`` (s)."""
+    """Returns the manoeuvre with its controls and external forces shifted, so that time 0 is ``start_time`` (s)."""
 
     def shifted_control(control: Control) -> Control:
         return tuple((time - start_time, value) for time, value in control)
@@ -311,7 +319,9 @@ def _manoeuvre_from(handling: Handling, start_time: float) -> Handling:
 
 
 def build(engine: str, handling: Handling, settings: Settings | None = None) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
+    """Build the vehicle in "exudyn" or "mujoco", or as the plain equations of "reference". settings : integrator, step
+    and duration, needed for runs only.
+    """
     if engine == REFERENCE:
         return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
     division, full_forces = towed_division(handling, engine), driven_by(handling)
@@ -326,36 +336,40 @@ def _plain_equations(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """The car as engines build it: its bodies, the elements along its coordinates, and the compiled forces with their
-    whole table.
+    """Returns what an engine builds of the car: bodies, elements along joint coordinates, and all compiled forces with
+    their parameters.
     """
     parts = joint_parts(handling.vehicle)
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
 
 def drive_run(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
-    """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
+    """Simulate a manoeuvre from straight rolling at a speed (m/s) for a duration (s). Raises RunFailed where the
+    vehicle turns over, the step (s) is too long or the motion is not finite.
+    """
     model = build(engine, handling, Settings("RK4", step, duration))
     start_time = time.process_time()
-    with _turning_over(handling, engine):
+    with _failing_as_turnover(handling, engine):
         path = model.run(*handling.straight(speed))
-    return read_run(handling, path, engine, time.process_time() - start_time)
+    return drive_of_fixed_steps(handling, path, engine, time.process_time() - start_time)
 
 
-def driven_adaptively(engine: str, handling: Handling, speed: float, settings: Settings) -> Drive:
-    """``drive_run`` by an integrator of "exudyn" or "reference" that picks its own steps."""
+def drive_run_adaptive(engine: str, handling: Handling, speed: float, settings: Settings) -> Drive:
+    """Simulate a manoeuvre as ``drive_run`` does, by an integrator of "exudyn" or "reference" that chooses its own time
+    steps.
+    """
     from models.engines.free_vehicle_adaptive import march_adaptively
 
     model, start_time = build(engine, handling), time.process_time()
-    with _turning_over(handling, engine):
+    with _failing_as_turnover(handling, engine):
         path = march_adaptively(model, *handling.straight(speed), settings)
     return drive_with_reports(handling, path, engine, time.process_time() - start_time)
 
 
 @contextmanager
-def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
-    """Context in which a march fails with the message that the car turned over, where that is the reason: engines
-    cannot integrate the motion that follows.
+def _failing_as_turnover(handling: Handling, engine: str) -> Iterator[None]:
+    """Context in which a failed run says that the car turned over, where that is the reason: engines cannot integrate
+    the motion that follows.
     """
     try:
         yield
@@ -365,9 +379,9 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
         raise
 
 
-def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """The drive from a run in fixed steps, as from ``drive_with_reports``; RunFailed where the steps are too long for
-    the motion.
+def drive_of_fixed_steps(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
+    """Returns the drive of a run in fixed steps, with the tyres' forces and slips. Raises RunFailed where the steps are
+    too long for the tyres or the motion.
     """
     drive = drive_with_reports(handling, run, engine, seconds)
     check_step(drive, engine)
@@ -376,8 +390,8 @@ def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: flo
 
 
 def drive_with_reports(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """The drive from a run, with the reports of its tyres; RunFailed where a tyre's force is not finite, or the car
-    turns over.
+    """Returns the drive of a run, with the tyres' forces and slips. Raises RunFailed where a tyre's force is not
+    finite, or the car turns over.
     """
     report, ledger = _reports_of_run(handling, run, engine)
     if not np.isfinite(report).all():
@@ -387,8 +401,8 @@ def drive_with_reports(handling: Handling, run: Trajectory, engine: str = "", se
 
 
 def _reports_of_run(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
-    """Reports of the tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; for the reference they come from its own
-    equations.
+    """Forces and slips of the tyres (m, w, REPORTED), and energies and powers (m, LEDGER) of a run; in the reference
+    from its own equations.
     """
     if engine == REFERENCE:
         return _plain_equations(handling).report(run.times, run.positions, run.rates)

@@ -1,4 +1,4 @@
-"""Scenes of handling: a vehicle, its tyres, the road, and manoeuvres that are driven one by one."""
+"""Scenes of handling: a vehicle, its tyres, the road, and manoeuvres that are simulated separately."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,15 +24,17 @@ from models.vehicles.spatial import SpatialVehicle
 if TYPE_CHECKING:
     from models.measured.drive import MeasuredDrive
 
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-Knots = Annotated[list[Pair], Field(min_length=1)]
-AT_REST = [[0.0, 0.0]]
+TimeValuePair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Knots = Annotated[list[TimeValuePair], Field(min_length=1)]
+NO_CONTROL = [[0.0, 0.0]]
 CONTROL_LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0, 1e5, "N m")}
-"""What values of each control may be."""
+"""Smallest and largest value of each of the driver's controls, with its unit."""
 
 
 class HandlingVehicle(Strict):
-    """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre; it may tow."""
+    """[vehicle]: file of a vehicle whose chassis has six degrees of freedom, with a cornering stiffness for every tyre;
+    it may tow trailers.
+    """
 
     file: str = Field(
         default="r19_free", description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
@@ -41,7 +43,7 @@ class HandlingVehicle(Strict):
 
 
 class TyreTable(Strict):
-    """[tyres]: what the vehicle file does not say of wheels and tyres."""
+    """[tyres]: parameters of wheels and tyres that are not in the vehicle file."""
 
     friction: float = quantity("", "coefficient between tyre and road", default=0.9)
     half_width: float = Field(default=0.09, gt=0.0, le=0.5, description="m, of the patch, across")
@@ -60,7 +62,7 @@ class TyreTable(Strict):
 
 
 class RoadTable(Strict):
-    """[road]: rough, where a manoeuvre says so; one surface for all manoeuvres."""
+    """[road]: the rough road surface, the same for all manoeuvres that run on a rough road."""
 
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="A", description="class, its mean level")
     waves: int = Field(default=48, ge=1, le=10_000, description="plane waves that make up the surface")
@@ -68,7 +70,7 @@ class RoadTable(Strict):
 
 
 class RunTable(Strict):
-    """[run]: the step, and which forces are compiled."""
+    """[run]: time step, and which spring forces the engines compute by native elements."""
 
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
@@ -80,7 +82,8 @@ class RunTable(Strict):
 
 
 class Manoeuvre(Strict):
-    """[manoeuvres.NAME]: begins with rolling straight ahead; controls go smoothly from knot to knot [time, value].
+    """[manoeuvres.NAME]: a manoeuvre from straight rolling; the driver's controls go smoothly between knots
+    [time, value].
 
     A measured drive has no controls of its own: the car steers as measured, and its torques give the measured speed.
     """
@@ -91,15 +94,15 @@ class Manoeuvre(Strict):
     )
     speed: float = quantity("m/s", "at the start; a measured drive has its own", default=0.0, zero=True)
     duration: float = quantity("s", "of the manoeuvre; of a measured drive all, or at most that", default=4.0)
-    steer: Knots = Field(default=AT_REST, description="angle of the front wheels, left positive: [[s, rad], ...]")
-    brake: Knots = Field(default=AT_REST, description="torque of all brakes together: [[s, N m], ...]")
-    drive: Knots = Field(default=AT_REST, description="torque of all driven wheels together: [[s, N m], ...]")
+    steer: Knots = Field(default=NO_CONTROL, description="angle of the front wheels, left positive: [[s, rad], ...]")
+    brake: Knots = Field(default=NO_CONTROL, description="torque of all brakes together: [[s, N m], ...]")
+    drive: Knots = Field(default=NO_CONTROL, description="torque of all driven wheels together: [[s, N m], ...]")
     front_brake: float = Field(default=0.65, ge=0, le=1, description="share of the front axle in braking")
     front_drive: float = Field(default=0.0, ge=0, le=1, description="share of the front axle in driving")
     rough: bool = Field(default=False, description="on the rough road of [road], else on a flat one")
 
     def controls(self) -> Controls:
-        """Steering, brakes and drive of the driver over time."""
+        """Returns the driver's steer angle, brake torque and drive torque over time, with the shares of the axles."""
         steer, brake, drive = (
             tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in CONTROL_LIMITS
         )
@@ -107,7 +110,7 @@ class Manoeuvre(Strict):
 
 
 class HandlingScene(SceneFile):
-    """One scene of handling."""
+    """A scene of handling: all tables of its scene file."""
 
     system: str = Field(default="handling", pattern="^handling$")
     study: str = Field(default="handling", description="the study that runs the scene")
@@ -118,39 +121,41 @@ class HandlingScene(SceneFile):
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
-    _along: dict[str, Controls] = PrivateAttr(default_factory=dict)
-    """Controls of the measured drives that were driven."""
+    _measured_controls: dict[str, Controls] = PrivateAttr(default_factory=dict)
+    """Controls that were computed for measured drives, by manoeuvre."""
 
     def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
-        """Settings with which an engine marches a manoeuvre in steps that it picks itself; None for Runge-Kutta 4."""
+        """Returns the settings of an engine that chooses its own time steps in a manoeuvre; None for Runge-Kutta 4."""
         adaptive = self.engines.get(engine)
         duration = self.manoeuvres[manoeuvre].duration
         return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
     def handling(self, name: str) -> Handling:
-        """Vehicle, tyres, road and controls of one manoeuvre. A measured drive is marched once, to find its torques."""
+        """Returns vehicle, tyres, road and controls of a manoeuvre. Torques of a measured drive are computed once."""
         car = self.car(name)
         if not self.manoeuvres[name].measured:
             return car
-        if name not in self._along:
+        if name not in self._measured_controls:
             from models.systems.handling.following import controls_along
 
-            self._along[name] = controls_along(car, self.drive(name), self.run.step, self.file)
-        return car.changed(controls=self._along[name])
+            self._measured_controls[name] = controls_along(car, self.drive(name), self.run.step, self.file)
+        return car.changed(controls=self._measured_controls[name])
 
     def car(self, name: str) -> Handling:
-        """Vehicle, tyres and road of one manoeuvre, and those of its controls that the scene gives."""
+        """Returns vehicle, tyres, road and scene controls of a manoeuvre, without the controls of a measured drive."""
         manoeuvre, road = self.manoeuvres[name], self.road
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
         tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
         return extended_by_effects(
-            Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self
+            Handling(self.file_vehicle(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self
         )
 
     def drive(self, name: str) -> "MeasuredDrive":
-        """The measured drive of a manoeuvre, cut to the manoeuvre's duration; InputError for a file that holds none."""
+        """Reads the measured drive of a manoeuvre, cut to the manoeuvre's duration. Raises InputError for a file
+        without a drive.
+        """
         from models.measured.drive import read_drive
 
         manoeuvre = self.manoeuvres[name]
@@ -161,12 +166,14 @@ class HandlingScene(SceneFile):
         count = round(manoeuvre.duration / float(read.times[1] - read.times[0])) + 1
         return replace(read, **{key: getattr(read, key)[:count] for key in ("times", "steer", "speed")})
 
-    def begins(self, name: str) -> float:
-        """Time (s) at which the results of a manoeuvre begin: the start of its measured file, or else 0."""
+    def start_time(self, name: str) -> float:
+        """Start time (s) of a manoeuvre's results: that of its measured drive, or else 0."""
         return float(self.drive(name).times[0]) if self.manoeuvres[name].measured else 0.0
 
-    def given(self) -> SpatialVehicle:
-        """The vehicle of the file and the bodies that it tows, with its cornering stiffness scaled as in [tyres]."""
+    def file_vehicle(self) -> SpatialVehicle:
+        """Returns the vehicle of the vehicle file with its trailers, and with cornering stiffnesses scaled as in
+        [tyres].
+        """
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", allows_towing=True)
         if not (ratios := self.tyres.cornering):
             return vehicle
@@ -182,9 +189,11 @@ class HandlingScene(SceneFile):
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked handling scene from the nested tables of a scene file. Raises InputError for unknown keys and for
+    values outside their ranges.
+    """
     scene = checked(HandlingScene, table, file, folder)
-    scene = _with_measured(scene)
+    scene = _with_measured_drives(scene)
     for name, manoeuvre in scene.manoeuvres.items():
         key_path = f"manoeuvres.{name}"
         _check_times(scene, key_path, manoeuvre)
@@ -194,8 +203,10 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
     return with_effect_tables(scene)
 
 
-def _with_measured(scene: HandlingScene) -> HandlingScene:
-    """The scene with the speed and duration of each measured drive filled in; refuses a manoeuvre that has no speed."""
+def _with_measured_drives(scene: HandlingScene) -> HandlingScene:
+    """Returns the scene with speed and duration of each measured drive filled in. Raises InputError for a manoeuvre
+    without a speed.
+    """
     filled = dict[str, Manoeuvre]()
     for name, manoeuvre in scene.manoeuvres.items():
         if manoeuvre.measured:
@@ -208,10 +219,12 @@ def _with_measured(scene: HandlingScene) -> HandlingScene:
 
 
 def _measured_manoeuvre(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
-    """A manoeuvre with the speed and duration of its measured drive; refuses keys that contradict the measured file."""
+    """Returns a manoeuvre with the speed and duration of its measured drive. Raises InputError for keys that contradict
+    the measured file.
+    """
     file, key_path, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
     for control in CONTROL_LIMITS:
-        if getattr(manoeuvre, control) != AT_REST:
+        if getattr(manoeuvre, control) != NO_CONTROL:
             raise InputError(file, f"{key_path}.{control}", None, "cannot go with a measured drive, which has its own")
     period = float(drive.times[1] - drive.times[0])
     if not divides(scene.run.step, period):
@@ -236,8 +249,12 @@ def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> N
         raise InputError(scene.file, "run.step", step, allowed)
 
 
-def _check_knots(scene: HandlingScene, key_path: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
-    """Refuse times that do not rise, values beyond the limits, and changes that are too fast for the run's step."""
+def _check_knots(
+    scene: HandlingScene, key_path: str, knots: list[TimeValuePair], low: float, high: float, unit: str
+) -> None:
+    """Raise InputError for knots of a control whose times do not rise, whose values exceed the limits, or that lie
+    closer together than the time step.
+    """
     (knot_times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(knot_times).all() or (np.diff(knot_times) <= 0.0).any():
         raise InputError(file, key_path, knot_times.tolist(), "times must be finite and rise from knot to knot, in s")

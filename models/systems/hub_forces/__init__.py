@@ -1,7 +1,9 @@
-"""A vehicle cut at its wheels and driven by the forces that were measured there: six components per hub."""
+"""A vehicle without wheels, driven by measured forces and moments at its wheel hubs: six components per hub."""
 
 ENGINES = ("reference", "exudyn", "mujoco")
 ON_REQUEST = ("plain",)
-"""The independent reference: it shares no force with the three others, and takes seconds for every second of a run."""
+"""Engines that run only where the user names them: the independent reference "plain". It shares no force with the three
+others, and takes seconds for every second of a run.
+"""
 NO_PRICE = 'takes whole parts of its samples for steps, the longest of which a choice, study = "choice", finds'
-"""Why `twinrig price` has nothing to choose, and what there is instead."""
+"""Reason why `twinrig price` does not apply to scenes of hub forces, and what to use instead."""

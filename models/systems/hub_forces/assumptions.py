@@ -1,4 +1,4 @@
-"""Assumptions of a vehicle on hub forces, and of the virtual measurement of these."""
+"""Assumptions of a vehicle driven by hub forces, and of the virtual measurement of hub forces."""
 
 from collections.abc import Callable
 
@@ -16,31 +16,40 @@ _SMOOTHER_ROAD_ADVICE = (
     "take a smoother road.iso8608, a lower road.speed, stiffer springs, or give them a stop as travel_force"
 )
 ON_TYRES = "on tyres"
-"""In place of a method: the run on the road that gives a virtual measurement."""
+"""Name that stands for the run on the road (virtual measurement) where otherwise a stabiliser is named."""
 PULL_LIMIT = 1.0
-"""N: a tyre that pulls by less is at its edge."""
+"""Largest pull (N) of a tyre at the road that does not count as leaving the road."""
 LARGEST_SIDE_FORCE_SHARE = 0.45
-"""Of a tyre's load at rest: up to half of a friction of 0.9 side forces grow with the slip angle."""
+"""Largest side force of a tyre divided by its load at rest: up to half of a friction of 0.9, side forces grow with the
+slip angle.
+"""
 SMALL_ANGLE = 0.2
-"""rad: turns about the body's axes are angles to 2 %, and a heading leaves the road's tracks to 2 %."""
+"""Largest roll, pitch and heading (rad): rotations about the body's axes differ from angles by 2 %, and so does the
+vehicle's direction from the road's tracks.
+"""
 TURNED_FORCE_ANGLE = 0.05
-"""rad that turn 5 % of a force into another axis."""
+"""Rotation (rad) that turns 5 % of a force into another axis."""
 LARGEST_TRAVEL, LARGEST_JOINT_TURN = 0.12, 0.3
-"""m and rad: a car's springs meet their stops about there; no stop is in a linear spring or bar."""
-WAVE_SHARE_OF_RULE = {"held": 0.064, "linear": 0.25, "smooth": 0.4}
-"""Waves of the road by samples: held samples are half a period late, 20 % of such a wave; between samples on straight
-lines 19 % of it are lost, on cubics 20 %."""
+"""Largest travel of a linear spring (m) and of a bar (rad), which have no stops: a car's springs meet their stops about
+there.
+"""
+LARGEST_WAVES_PER_SAMPLE = {"held": 0.064, "linear": 0.25, "smooth": 0.4}
+"""Largest number of road waves per sample, by interpolation. At this limit held samples are half a period late (an
+error of 20 % of the wave), straight lines lose 19 %, cubics 20 %.
+"""
 LARGEST_IMBALANCE, ROUGH_ROAD_SPEED_CHANGE = 0.05, 0.5
-"""Of the weight: forces that are out of balance by so much lift or drop a vehicle by 55 m in 15 s; and the change of
-vertical speed (m/s) that a rough road may leave between the ends of a run."""
+"""Largest imbalance of the vertical forces, divided by the weight, which lifts or drops a vehicle by 55 m in 15 s; and
+the change of vertical speed (m/s) that a rough road may cause between the ends of a run."""
 
 
 def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
-    """Assumptions of a run whose roll and pitch ``method`` holds, or of one on its tyres over the road (ON_TYRES).
+    """Assumptions of a run with a stabiliser (``method``), or of the run on tyres over the road (ON_TYRES).
 
-    angles : measured angles that the run is compared with; None to list the assumptions only.
+    angles : measured angles with which the run is compared; None if the assumptions are only listed.
     """
-    listed = _on_tyres(vehicle) if method == ON_TYRES else _on_forces(scene, vehicle, method, angles)
+    listed = (
+        _assumptions_on_tyres(vehicle) if method == ON_TYRES else _assumptions_on_forces(scene, vehicle, method, angles)
+    )
     return [
         *listed,
         *usual_travel_assumptions(vehicle, lambda run: element_travels(vehicle, run.detail), _SMOOTHER_ROAD_ADVICE),
@@ -48,8 +57,8 @@ def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angle
 
 
 def usual_travel_assumptions(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
-    """Assumptions that springs, mounts and bars without stops keep within usual travels. ``travel`` gives the travels
-    (m, rad) by name; a travel_force counts as a stop.
+    """Assumptions that springs, mounts and bars without stops stay within usual travels. ``travel`` returns the travels
+    (m, rad) of a result by name; a travel_force counts as a stop.
     """
     kinds = (("springs", "N", "m", LARGEST_TRAVEL), ("bars", "N m", "rad", LARGEST_JOINT_TURN))
     listed = []
@@ -70,8 +79,10 @@ def usual_travel_assumptions(vehicle: CutVehicle, travel: Callable[[Result], Wat
     return listed
 
 
-def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
-    """Assumptions of a vehicle on linear tyres that run along two tracks."""
+def _assumptions_on_tyres(vehicle: CutVehicle) -> list[Assumption]:
+    """Assumptions of the run on tyres: tyres press on the road, side forces are linear, the vehicle
+    goes straight on.
+    """
     return [
         *_pressing_assumptions(vehicle, PULL_LIMIT),
         Assumption(
@@ -98,9 +109,7 @@ def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
 
 
 def _pressing_assumptions(vehicle: CutVehicle, pull: float) -> list[Assumption]:
-    """Assumption that linear tyres never pull at the road by more than ``pull`` (N); none for tyres that can only
-    push.
-    """
+    """Assumption that linear tyres never pull at the road by more than ``pull`` (N); empty for tyres that only push."""
     lifting = Assumption(
         "tyres press",
         "the linear tyres of the measurement stay on the road",
@@ -112,8 +121,12 @@ def _pressing_assumptions(vehicle: CutVehicle, pull: float) -> list[Assumption]:
     return [] if vehicle.uncut.lifts else [lifting]
 
 
-def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None) -> list[Assumption]:
-    """Assumptions of a cut vehicle that measured hub forces drive."""
+def _assumptions_on_forces(
+    scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None
+) -> list[Assumption]:
+    """Assumptions of a vehicle driven by measured hub forces: it stays upright, forces are balanced and sampled fast
+    enough.
+    """
     listed = [
         Assumption(
             "upright",
@@ -156,7 +169,7 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
 
 
 def _balance_assumption(vehicle: CutVehicle) -> Assumption:
-    """Assumption that the measured vertical forces carry the vehicle's weight on average."""
+    """Assumption that the mean of the measured vertical forces is the vehicle's weight, within LARGEST_IMBALANCE."""
     return Assumption(
         "balance",
         "over the run the vertical forces carry the weight",
@@ -173,15 +186,15 @@ def _balance_assumption(vehicle: CutVehicle) -> Assumption:
 
 
 def carried_weight_share(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
-    """Ratio (1,) of the mean of vertical forces (n,), N, to the weight. A deviation from 1 is reduced by what a change
-    of the vertical speed could explain.
+    """Mean of the vertical forces (n,) in N divided by the weight, shape (1,). A deviation from 1 is reduced by the
+    part that a change of the vertical speed could explain.
     """
     excess = forces.mean() / vehicle.loads.sum() - 1.0
     return np.array([1.0 + np.sign(excess) * max(abs(excess) - ROUGH_ROAD_SPEED_CHANGE / (GRAVITY * duration), 0.0)])
 
 
 def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
-    """Assumption that a virtual measurement samples fast enough for the shortest wave of the road."""
+    """Assumption that a virtual measurement samples fast enough to resolve the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
     other_remedy = ' or use forces.interpolation = "smooth",' if rule != "smooth" else ""
@@ -191,12 +204,12 @@ def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
         f"raise forces.sampling_rate,{other_remedy} or lower road.speed",
         lambda run: {"shortest wave": np.array([road.speed / wave / rate])},
         "waves per sample",
-        upper_limit=WAVE_SHARE_OF_RULE[rule],
+        upper_limit=LARGEST_WAVES_PER_SAMPLE[rule],
     )
 
 
 def _angle_differences(run: Result, angles: Angles | None) -> Watched:
-    """Roll and pitch of the run less the measured angles, rad."""
+    """Roll and pitch (rad) of a run minus the measured angles, by name."""
     assert angles is not None
     angle_times = angles.period * np.arange(len(angles.samples))
     return {
@@ -206,5 +219,5 @@ def _angle_differences(run: Result, angles: Angles | None) -> Watched:
 
 
 def _forces_at_hubs(run: Result, vehicle: CutVehicle, axis: int) -> dict[str, np.ndarray]:
-    """Applied forces (n,), N, along one axis, by the name of the hub."""
+    """Applied hub forces (n,) in N along an axis (0 x, 1 y, 2 z), by hub name."""
     return {hub: run.detail.wrenches[:, i, axis] for i, hub in enumerate(vehicle.hubs)}

@@ -1,4 +1,4 @@
-"""Runs of a scene of hub forces with every stabiliser and without, and what is computed of them: errors, damage."""
+"""Comparison of runs of a hub forces scene with every stabiliser and without: errors of the motion, fatigue damage."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,14 +17,16 @@ from models.systems.hub_forces.scene import HubScene, Method
 Progress = Callable[[str, float], None]
 FREE_RUN, FILTERED_RUN, PRESCRIBED_RUN = "free", "filter", "prescribed"
 METHOD_OF_RUN: dict[str, Method] = {FREE_RUN: "none", FILTERED_RUN: "kalman", PRESCRIBED_RUN: "prescribed"}
-"""Runs that are compared, whatever the scene's own method, and how roll and pitch are held in them."""
+"""Compared runs by name, with the stabiliser of each."""
 DRIFT_OFF_ANGLE = 0.05
-"""rad: a roll or pitch that is off by more is drift-off, as in the study of the pitch plane."""
+"""Error of roll or pitch (rad) beyond which a run has drifted off, as in the study of the pitch plane."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measurement, its runs by name, reasons why other runs failed, and the true run, None where it is not known."""
+    """Compared runs of a measurement. runs : results by name; failed : reasons of failed runs by name; truth : the true
+    run, None where it is not known.
+    """
 
     measurement: Measurement
     runs: dict[str, Result]
@@ -32,13 +34,13 @@ class Comparison:
     truth: Result | None
 
     @property
-    def beside(self) -> str:
-        """Text that names the run to which errors and damages refer."""
+    def reference_run_text(self) -> str:
+        """Text on the run to which errors and damages refer: the true run, or the run with the Kalman filter."""
         return "the true run" if self.truth is not None else "the run with the filter; the true one is not known"
 
     @property
     def results(self) -> dict[str, Result]:
-        """All results by name: the true run, if it is known, and all other runs."""
+        """All results by name: the true run, if it is known, and the compared runs."""
         return {**({"true": self.truth} if self.truth else {}), **self.runs}
 
     def errors(self, run: Result) -> np.ndarray:
@@ -55,23 +57,23 @@ class Comparison:
         return errors_of_motion
 
     def damages(self, forces: np.ndarray) -> dict[str, float]:
-        """Damage of every element from section forces (m, e), divided by that in the true run or, without one, in the
-        filter's run.
+        """Fatigue damage of every element under section forces (m, e), divided by its damage in the true run, or in the
+        run with the Kalman filter where no true run is known.
         """
         true = (self.truth or self.runs[FILTERED_RUN])["section_force"]
         names = (element.name for element in self.measurement.vehicle.elements)
         return {name: damage_ratio(forces[:, i], true[:, i]) for i, name in enumerate(names)}
 
     def drift_off(self, run: Result) -> float:
-        """First time (s) at which the error of roll or pitch exceeds DRIFT_OFF_ANGLE; infinite if it never does."""
+        """First time (s) at which a run's error of roll or pitch exceeds DRIFT_OFF_ANGLE; infinite if it never does."""
         has_drifted = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
         return float(run.times[np.argmax(has_drifted)]) if has_drifted.any() else float("inf")
 
-    def answer(self) -> dict[str, Any]:
-        """For each run: largest errors, rms of the stabiliser's moments, damage of every element, all relative to the
-        run that ``beside`` names.
+    def figures(self) -> dict[str, Any]:
+        """Numbers of each run for a JSON file: largest errors, rms of the stabiliser's moments (N m), relative damage
+        of every element.
         """
-        figures: dict[str, Any] = {"beside": self.beside}
+        figures: dict[str, Any] = {"beside": self.reference_run_text}
         figures |= {name: {"failed": text} for name, text in self.failed.items()}
         for name, run in self.runs.items():
             figures[name] = {
@@ -81,9 +83,9 @@ class Comparison:
             }
         return figures
 
-    def engines_apart(self) -> float:
-        """Largest difference between engines in any coordinate or rate before drift-off, for the method with the most
-        runs.
+    def largest_engine_difference(self) -> float:
+        """Largest difference between engines in any coordinate (m, rad) or rate before drift-off, for the stabiliser
+        with the most runs.
         """
         kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHOD_OF_RUN]
         comparable = max(kinds, key=len)
@@ -93,9 +95,9 @@ class Comparison:
 
 
 def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Comparison:
-    """Run the scene's own method in every engine, and the other methods in the last engine, which is the fastest.
+    """Run the scene's stabiliser in every engine, and the other stabilisers in the last engine, which is the fastest.
 
-    Raises RunFailed where even the filter cannot hold the vehicle, or where the step is too long for its springs.
+    Raises RunFailed where even the run with the Kalman filter fails, or where the step is too long for the springs.
     """
     last_engine, planned = engines[-1], planned_runs(scene, engines)
     progress("virtual measurement", 0.05)
@@ -115,7 +117,7 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
 
 
 def _true_run(measurement: Measurement, engine: str) -> Result | None:
-    """The true run of a virtual measurement as a labelled result, with the errors that were estimated for it."""
+    """Returns the true run of a virtual measurement as a result with its stated errors; None for measured files."""
     if measurement.truth is None:
         return None
     run = labelled_result(measurement, measurement.truth, engine)
@@ -123,8 +125,8 @@ def _true_run(measurement: Measurement, engine: str) -> Result | None:
 
 
 def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
-    """Method and engine of every run by its name. A stabiliser's run in the last engine has a name without the
-    engine.
+    """Returns stabiliser and engine of every run by the run's name. Runs with a stabiliser in the last engine have a
+    name without the engine.
     """
     return {
         name if name != FREE_RUN and engine == engines[-1] else f"{name}, {engine}": (method, engine)

@@ -1,4 +1,4 @@
-"""The vehicle of a scene of hub forces as a file of its engine: bodies, joints, and the springs that the engine has."""
+"""Export of the vehicle of a hub forces scene as a model file of an engine: bodies, joints, and native springs."""
 
 import numpy as np
 
@@ -12,15 +12,17 @@ AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose 
 
 
 def exported(scene: HubScene, engine: str) -> Exported:
-    """Export the cut vehicle to "mujoco" or "exudyn", without hub forces and stabiliser."""
+    """Export the vehicle without wheels, hub forces and stabiliser as a model file of "mujoco" or "exudyn"."""
     vehicle = scene.cut_vehicle()
     omissions = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
-    return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), omissions)
+    return export_cut_vehicle(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), omissions)
 
 
-def of_cut(engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]) -> Exported:
-    """Export a cut vehicle; ``further_omissions`` lists what the model leaves out besides hub forces and some
-    elements.
+def export_cut_vehicle(
+    engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]
+) -> Exported:
+    """Export a vehicle without wheels as a model file of an engine. ``further_omissions`` lists what the file leaves
+    out besides hub forces and springs that the engine does not have.
     """
     division = divide(vehicle.tree, vehicle.elements, engine)
     weight = np.array([0.0, 0.0, -vehicle.tree.gravity])

@@ -1,4 +1,4 @@
-"""The virtual measurement: a vehicle on its tyres over a rough road, and what transducers at its hubs would record."""
+"""Virtual measurement: a vehicle on its tyres over a rough road, and the hub forces and angles that sensors record."""
 
 from dataclasses import dataclass, replace
 
@@ -15,10 +15,10 @@ from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
 @dataclass(frozen=True)
 class HubForces:
-    """Measured hub forces. samples (m, 6 h) : N and N m hub by hub, the first at t = 0; period : time (s) between
-    samples.
+    """Measured hub forces. samples (m, 6 h) : three forces (N) and three moments (N m) hub by hub, the first at t = 0;
+    period : time (s) between samples.
 
-    frame : "hub", axes of what carries the wheel; "body", of the chassis; "inertial", of the space. x forward, y
+    frame : "hub", axes of the wheel carrier; "body", axes of the chassis; "inertial", axes fixed in space. x forward, y
     left, z up; the force acts on the hub from outside, the moment about the hub.
     """
 
@@ -27,12 +27,12 @@ class HubForces:
     frame: str
 
     def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
-        """Hub forces as a run's inputs, sampled at half steps."""
+        """Returns the hub forces as inputs of a run, interpolated at every half of ``steps`` steps of ``step`` (s)."""
         signal = signal_from_samples(self.samples, self.period, interpolation)
         return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, constant_in_step=signal.held)
 
-    def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
-        """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
+    def with_noise(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
+        """Returns the hub forces with white noise on every sample, of standard deviations (6 h,) in N and N m."""
         noise = normal_samples(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
         return replace(self, samples=self.samples + noise * deviation)
 
@@ -46,8 +46,8 @@ class Angles:
     samples: np.ndarray
     period: float
 
-    def noisy(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
-        """The angles with white noise of these standard deviations of angle (rad) and rate (rad/s)."""
+    def with_noise(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
+        """Returns the angles with white noise on every sample; deviations : of angles (rad) and of rates (rad/s)."""
         noise = normal_samples(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
 
@@ -55,8 +55,8 @@ class Angles:
 def two_tracks(
     vehicle: CutVehicle, left_profile: RoadProfile, right_profile: RoadProfile, speed: float, step: float, steps: int
 ) -> HubInputs:
-    """Heights and rates of the road under the wheels at half steps. The front axle is at s = v t, and axles behind it
-    reach the same place later.
+    """Road heights (m) and their rates (m/s) under the wheels at half steps, positive downwards. The front axle is at
+    the path v t, and axles behind it reach the same point later.
     """
     half_step_times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
     heights, rates = [], []
@@ -69,12 +69,12 @@ def two_tracks(
 
 
 def true_run(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
-    """Run the vehicle on its tyres; its hub forces are expressed in ``frame``."""
+    """Run the vehicle on its tyres over a road; its hub forces are recorded in ``frame``."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 
 
 def element_travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
-    """Travel (m,) of every spring, mount and bar over a run, by name: from the design position in m, rad of a bar,
+    """Travel (m,) of every spring and mount (m) and every bar (rad) over a run, by name: from the design position,
     positive in compression.
     """
     gauges = tuple(element.travel_gauge() for element in vehicle.elements)
@@ -85,7 +85,7 @@ def element_travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
 
 
 def recorded_measurement(run: HubRun, frame: str, stride: int) -> tuple[HubForces, Angles]:
-    """Hub forces and angles of a run, sampled without noise at every ``stride``-th step."""
+    """Hub forces and angles of a run as a measurement without noise, sampled at every ``stride``-th step."""
     n, period = run.states.shape[1] // 2, float(run.times[1]) * stride
     angles = run.states[::stride, [ROLL, PITCH, n + ROLL, n + PITCH]]
     wrenches = run.wrenches[::stride]
@@ -100,5 +100,5 @@ def hub_model(
     duration: float,
     interpolation: Interpolation = "linear",
 ) -> HubModel:
-    """Model of the cut vehicle under measured hub forces, without a stabiliser."""
+    """Build the model of a vehicle without wheels under measured hub forces, without a stabiliser."""
     return build(engine, vehicle, forces.hub_inputs(step, round(duration / step), interpolation), step, duration)

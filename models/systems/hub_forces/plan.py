@@ -23,17 +23,19 @@ if TYPE_CHECKING:
     from models.measured.recording import Recording
 
 COMPARING_STUDY = "hub_forces"
-"""The study that runs a scene with every stabiliser and without, whichever it names."""
+"""Name of the study that runs a scene with every stabiliser and without."""
 
 Signals = tuple[tuple[Quantity, str], ...]
 ANGLE_SIGNALS: Signals = tuple((what, axis) for what in ("angle", "angular rate") for axis in ("roll", "pitch"))
 WRENCH_SIGNALS: Signals = tuple((what, axis) for what in ("force", "moment") for axis in "xyz")
 COLUMN_REMEDY = "Correct the columns of the file, or map them in a scene of the system measured"
-"""Files of hub forces have no channel map, of which the checks of recordings speak."""
+"""Advice in place of a channel map, which files of hub forces do not have."""
 
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
-    """Everything that can be refused before a run is refused here, before any file is written."""
+    """Raise InputError, before any file is written, for a wrong vehicle, a time step that is too long, a bandwidth that
+    is too low, and impossible measured values.
+    """
     vehicle = scene.cut_vehicle()
     if fixed := [engine for engine in engines if engine not in scene.engines]:
         check_step(fixed[-1], vehicle, scene.run.step, scene.run.duration)
@@ -51,51 +53,53 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: HubScene) -> tuple[Finding, ...]:
-    """Doubts about implausible parameters of the vehicle, and about measured forces."""
+    """Returns doubts about implausible parameters of the vehicle, and about measured files."""
     vehicle = scene.cut_vehicle()
     doubts = doubts_about_files(scene, vehicle) if scene.forces.file is not None else ()
     return (*plausible(vehicle.uncut, scene.vehicle.accept), *doubts)
 
 
 def describe(scene: HubScene) -> str:
-    """The scene's plan as text."""
+    """Returns the plan of a hub forces scene as text: vehicle, forces, noise, run, doubts, effects, assumptions."""
     vehicle, forces = scene.cut_vehicle(), scene.forces
     body = rigid_vehicle(vehicle)
     source = f"file {forces.file}" if forces.file else f"virtual measurement at {forces.sampling_rate:g} Hz"
     lines = [
         scene.title,
-        _line("scene", f"{scene.file}, study {scene.study}"),
-        _line(
+        _plan_line("scene", f"{scene.file}, study {scene.study}"),
+        _plan_line(
             "vehicle",
             f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
-        *(_line("read", note) for note in vehicle.uncut.notes),
-        _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames_text(vehicle)}"),
-        _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
-        _line("noise", _noise(scene)),
+        *(_plan_line("read", note) for note in vehicle.uncut.notes),
+        _plan_line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames_text(vehicle)}"),
+        _plan_line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
+        _plan_line("noise", _noise_text(scene)),
     ]
     if scene.road is not None:
         lines.append(
-            _line(
+            _plan_line(
                 "road",
                 f"ISO 8608 class {scene.road.iso8608}, two independent tracks, seeds "
                 f"{scene.road.seed} and {scene.road.seed + 1}, {scene.road.speed:g} m/s",
             )
         )
-    lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
-    lines += [_line(*line) for line in plan_lines(scene.engines, scene.run.step)]
+    lines.append(_plan_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
+    lines += [_plan_line(*line) for line in plan_lines(scene.engines, scene.run.step)]
     if scene.study == COMPARING_STUDY:
-        lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
-    lines += [_line("doubt", text) for text in filter_objections(scene)]
-    lines += _whose_forces(scene, vehicle)
+        lines.append(_plan_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
+    lines += [_plan_line("doubt", text) for text in filter_objections(scene)]
+    lines += _engine_share_lines(scene, vehicle)
     never = "drag, tyres that roll"
     runs = [*([ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
     assumed = {assumption.says: assumption for run in runs for assumption in assumptions(scene, vehicle, run)}
-    return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _line("never", never)])
+    return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _plan_line("never", never)])
 
 
 def filter_objections(scene: HubScene) -> tuple[str, ...]:
-    """The Kalman filter's objections to the measured files. A virtual measurement has none yet: it is not made here."""
+    """Returns the Kalman filter's objections to the measured files; empty for a virtual measurement, which is not made
+    here.
+    """
     if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING_STUDY):
         return ()
     from models.systems.hub_forces.run import Measurement
@@ -105,7 +109,7 @@ def filter_objections(scene: HubScene) -> tuple[str, ...]:
 
 
 def _frames_text(vehicle: CutVehicle) -> str:
-    """Text that names the bodies to which the axes of the elements are fixed."""
+    """Text on the bodies in whose axes springs, mounts and bars act."""
     elements_in_other_axes = [
         f"{element.name} in those of {element.frame}"
         for element in vehicle.elements
@@ -114,23 +118,23 @@ def _frames_text(vehicle: CutVehicle) -> str:
     return "; ".join(["in the chassis' axes", *elements_in_other_axes])
 
 
-def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
-    """Lines on the forces that each engine computes by native elements and those that all engines share, counted in
-    built models."""
+def _engine_share_lines(scene: HubScene, vehicle: CutVehicle) -> list[str]:
+    """Lines of text on the forces that each engine computes by native elements, and on the forces that all engines
+    share, counted in built models."""
     shared = "hub forces" if scene.road is None else "hub forces, tyres on the road"
-    if scene.forces_with(scene.stabilise.method) == "compiled":
-        return [_line("native", "bodies and joints"), _line("shared", f"springs, mounts and bars, {shared}")]
+    if scene.spring_force_route(scene.stabilise.method) == "compiled":
+        return [_plan_line("native", "bodies and joints"), _plan_line("shared", f"springs, mounts and bars, {shared}")]
     lines = []
     for engine in FREE_ENGINES:
         share = native_share(engine, vehicle)
         count = f"{len(share.elements)} of {len(vehicle.elements)} springs, mounts and bars, {share.joints} joints"
-        lines.append(_line("native", f"{engine}: {count}"))
-        lines += [_line("shared", f"{engine}: {name}, {why}") for name, why in share.reasons.items()]
-    return [*lines, _line("shared", f"{shared}: no engine has sampled ones")]
+        lines.append(_plan_line("native", f"{engine}: {count}"))
+        lines += [_plan_line("shared", f"{engine}: {name}, {why}") for name, why in share.reasons.items()]
+    return [*lines, _plan_line("shared", f"{shared}: no engine has sampled ones")]
 
 
-def _noise(scene: HubScene) -> str:
-    """Text on the noise of every sample: stated for files, or added to a virtual measurement."""
+def _noise_text(scene: HubScene) -> str:
+    """Text on the noise of forces and angles: stated for files, or added to a virtual measurement."""
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
@@ -138,12 +142,14 @@ def _noise(scene: HubScene) -> str:
     return ", ".join(noise_texts) or "none"
 
 
-def _line(label: str, text: str) -> str:
+def _plan_line(label: str, text: str) -> str:
     return f"  {label:<10} {text}"
 
 
 def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
-    """Doubts about the measured files of a scene; InputError for impossible values that the scene does not accept."""
+    """Returns doubts about the measured files of a scene. Raises InputError for impossible values that the scene does
+    not accept.
+    """
     from models.measured.checks import check
 
     findings = [
@@ -171,7 +177,7 @@ def _finding_text(text: str) -> str:
 
 
 def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
-    """Both measured files as a recording; the noise of the angles is the one that the scene states."""
+    """Returns the measured files of forces and angles as a ``Recording``, which the checks of recordings take."""
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 

@@ -1,7 +1,7 @@
-"""A scene of hub forces in an engine: what its transducers say, what holds roll and pitch, and the run that follows.
+"""Runs of a hub forces scene in an engine: the measurement, the stabiliser of roll and pitch, the run and its errors.
 
-A run reads its road or its forces at half steps. What changes faster between them is not resolved but mistaken for
-something slower, which no state of the run shows: a run in other steps does.
+A run reads its road or its forces at half steps. Faster changes between these are aliased. No state of a single run
+shows this; a run in other steps does.
 """
 
 import time
@@ -32,29 +32,30 @@ from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import Tilt
 
-TOLD_ORDERS, LIFTING_ORDER = 4.0, 3.0
-"""Orders that errors are told by: of the classical Runge-Kutta method, and where wheels leave the road and land. Still
-longer steps would tell less than these: waves of the road have few of them."""
+STEP_ERROR_ORDER, LIFTING_ORDER = 4.0, 3.0
+"""Orders of convergence by which step errors are estimated: that of the classical Runge-Kutta method, and the lower one
+where wheels leave the road and land. Steps longer than twice are not used: they resolve too few points of the road's
+waves."""
 REPEATED_PART_START = 0.4
-"""Share of a run after which a part of it is repeated, where no longer step can be."""
+"""Share of a run after which part of it is repeated in half the step, where a longer step is impossible."""
 LEAST_CHANGE_SHARE = 1e-3
-"""Share of the largest change of any force, moment or angle below which another one carries nothing."""
+"""Variation of a channel, divided by the largest variation of the same unit, below which it has no stated error."""
 STANDSTILL_CHANGE = 1e-6
-"""rad, and share of the largest force, below which a change is rounding."""
+"""Variation below which a channel is only rounding: rad, and share of the largest force."""
 MOTION_CHANNELS = {name: (column, "rad") for name, column in ANGLES.items()} | {
     "x": (X, "m"),
     "y": (Y, "m"),
     "z": (Z, "m"),
 }
-"""Channels of the chassis: its coordinate, and the unit of that."""
+"""Channels of the chassis' motion: index of the coordinate, and unit."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measurement that drives the runs of a scene: hub forces and angles, and the true run, None where they come from
-    files.
+    """Hub forces and angles that drive the runs of a scene. truth : the true run on tyres; None where files are
+    measured.
 
-    errors : of the steps of the true run, where they were requested.
+    errors : errors of the time steps in the true run, where they were requested.
     """
 
     scene: HubScene
@@ -66,7 +67,9 @@ class Measurement:
 
     @cached_property
     def tilt(self) -> "Tilt":
-        """The Kalman filter's estimate of roll and pitch; InputError where the measurement contradicts itself."""
+        """The Kalman filter's estimate of roll and pitch. Raises InputError where angles and forces contradict each
+        other.
+        """
         from models.systems.hub_forces.tilt_filter import Deviations, estimate
 
         scene = self.scene
@@ -74,7 +77,8 @@ class Measurement:
         return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
     def hub_inputs(self, method: Method, step: float, steps: int) -> HubInputs:
-        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` holds roll and pitch.
+        """Returns the inputs of a run of ``steps`` steps of ``step`` (s): hub forces, and the stabiliser that
+        ``method`` names.
 
         Raises InputError.
         """
@@ -84,12 +88,12 @@ class Measurement:
 
             return inputs_with_moments(free, self.vehicle, self.tilt, step, scene.stabilise.bandwidth)
         if method == "prescribed":
-            return enforced_inputs(free, self.angles, step, scene.stabilise.smoothing, scene.file)
+            return inputs_with_smoothed_angles(free, self.angles, step, scene.stabilise.smoothing, scene.file)
         return free
 
     def start(self, hub_inputs: HubInputs) -> np.ndarray:
-        """Initial state (2 n,): at rest in the design position; enforced roll and pitch begin with the values of their
-        file.
+        """Initial state (2 n,) of a run: at rest in the design position, except that enforced roll and pitch begin with
+        their measured values and rates.
         """
         n = self.vehicle.size
         start = np.zeros(2 * n)
@@ -98,22 +102,26 @@ class Measurement:
         return start
 
 
-def enforced_inputs(hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = "") -> HubInputs:
-    """Hub inputs with measured roll and pitch enforced, after a low-pass of ``smoothing`` (Hz); raises InputError."""
+def inputs_with_smoothed_angles(
+    hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = ""
+) -> HubInputs:
+    """Returns hub inputs that enforce measured roll and pitch, after a low-pass of ``smoothing`` (Hz); raises
+    InputError.
+    """
     quiet = low_passed(angles.samples[:, :2], angles.period, smoothing, file, "stabilise.smoothing")
-    return with_angles(hub_inputs, quiet, angles.period, step)
+    return inputs_with_angles(hub_inputs, quiet, angles.period, step)
 
 
-def with_angles(hub_inputs: HubInputs, angles: np.ndarray, sample_period: float, step: float) -> HubInputs:
-    """Hub inputs with enforced roll and pitch (m, 2), rad, interpolated by a quintic spline through the samples."""
+def inputs_with_angles(hub_inputs: HubInputs, angles: np.ndarray, sample_period: float, step: float) -> HubInputs:
+    """Returns hub inputs that enforce roll and pitch, samples (m, 2) in rad interpolated by a quintic spline."""
     motion = Smooth(angles, sample_period, derivatives=2, degree=5)
     return replace(hub_inputs, guide=motion.sample(0.0, step / 2, len(hub_inputs.hubs)))
 
 
 def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
-    """The transducers' measurement: from files, or from a run on the road with noise added.
+    """Returns the measured hub forces and angles of a scene: from files, or from a run on the road with noise added.
 
-    error : whether the error of the steps of that run is estimated, by further runs.
+    error : whether the errors of the time steps in that run are estimated, by further runs.
     """
     vehicle, road, step = scene.cut_vehicle(), scene.road, scene.run.step
     if road is None:
@@ -122,20 +130,19 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
     true, errors = on_road(vehicle, road, scene.forces.frame, march, error and engine not in scene.engines)
     forces, angles = recorded_measurement(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
-        forces = forces.noisy(scene.deviations(vehicle), scene.seed)
+        forces = forces.with_noise(scene.deviations(vehicle), scene.seed)
     if scene.angles.noise == "white":
-        angles = angles.noisy(scene.angles.deviations, scene.seed)
+        angles = angles.with_noise(scene.angles.deviations, scene.seed)
     return Measurement(scene, vehicle, true, forces, angles, errors)
 
 
 def on_road(
     vehicle: CutVehicle, road: Road, frame: Frame, march_choice: tuple[str, Settings, ForceRoute], error: bool = False
 ) -> tuple[HubRun, dict[str, Estimate]]:
-    """Run the vehicle on its tyres over a road. Returns the run, with hub forces in a frame, and its errors if they are
-    requested.
+    """Run the vehicle on its tyres over a road. Returns the run, with hub forces in ``frame``, and the errors of its
+    time steps if they are requested.
 
-    march_choice : engine, its integrator with step and duration, and the route by which the springs' forces are
-    computed.
+    march_choice : engine, its integrator with step and duration, and whether spring forces are native or compiled.
     """
     engine, settings, kind = march_choice
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
@@ -155,11 +162,12 @@ def errors_of_steps(
     sample_period: float = 0.0,
     forces: ForceRoute = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
-    """Estimated errors of the channels that ``principal_series`` lists, by name, and the method of the estimate.
+    """Estimate the errors of a run's time steps. Returns the errors of element forces, roll and pitch by name, and text
+    on the method.
 
     hub_inputs : function of a step (s) and a number of steps; sample_period : of its samples (s), 0 for none: longer
-    steps must divide it, or they would take the samples' noise for motion; forces : route by which the springs' are
-    computed.
+    steps must divide it, or they would take the samples' noise for motion; forces : whether spring forces are native
+    or compiled.
     """
     step, steps = float(run.times[1]), len(run.times) - 1
 
@@ -181,7 +189,7 @@ def errors_of_steps(
 
     fine, units = principal_series(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
-    order = LIFTING_ORDER if vehicle.uncut.lifts else TOLD_ORDERS
+    order = LIFTING_ORDER if vehicle.uncut.lifts else STEP_ERROR_ORDER
     estimates, method_text = step_errors(
         fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step
     )
@@ -191,7 +199,7 @@ def errors_of_steps(
 
 
 def principal_series(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:
-    """Channels whose error is estimated, over the time of a run that begins at ``start_time`` (s): forces of all
+    """Time series of the channels whose error is estimated, for a run that begins at ``start_time`` (s): forces of all
     elements, roll and pitch.
     """
     channels = {element.name: run.elements[:, i] for i, element in enumerate(vehicle.elements)}
@@ -199,7 +207,9 @@ def principal_series(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) 
 
 
 def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Channels that vary by more than a small share of the variation of the largest channel with the same unit."""
+    """Returns the channels that vary by more than a small share of the largest variation among channels of their
+    unit.
+    """
     change = {name: float(np.std(values)) for name, values in channels.items()}
     largest_by_unit = {
         unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())
@@ -220,16 +230,16 @@ def run(
     measurement: Measurement | None = None,
     error: bool = False,
 ) -> Result:
-    """Run the cut vehicle under its hub forces; the result's detail is the HubRun. Raises InputError, Refused,
-    RunFailed.
+    """Run the vehicle without wheels under its hub forces; the result's detail is the HubRun. Raises InputError,
+    Refused or RunFailed.
 
-    method : what holds roll and pitch, the scene's own where none is named; measurement : of the scene, where it was
-    made before, as for runs in several engines; else this engine makes it. error : whether the error of the steps is
-    estimated, by further runs, on top of that of the measurement.
+    method : stabiliser of roll and pitch, by default the scene's; measurement : of the scene, if it exists already, as
+    for runs in several engines; else this engine makes it. error : whether the errors of the time steps are estimated,
+    by further runs, and added to those of the measurement.
     """
     measurement, method = measurement or measure(scene, engine, error), method or scene.stabilise.method
-    hub_inputs = measurement.hub_inputs(method, scene.run.step, scene.steps)
-    kind = scene.forces_with(method)
+    hub_inputs = measurement.hub_inputs(method, scene.run.step, scene.step_count)
+    kind = scene.spring_force_route(method)
     model = HubModel(engine, measurement.vehicle, hub_inputs, scene.settings(engine), kind)
     start_time = time.process_time()
     path = model.run(*np.split(measurement.start(hub_inputs), 2))
@@ -257,8 +267,8 @@ def run(
 def labelled_result(
     measurement: Measurement, path: HubRun, engine: str, method: str = ON_TYRES, seconds: float = 0.0
 ) -> Result:
-    """The result of a run of the measurement's vehicle: chassis motion, section forces, and the moments that hold roll
-    and pitch.
+    """Returns the result of a run: motion of the chassis, section forces of all elements, moments of the stabiliser on
+    roll and pitch, and broken assumptions.
     """
     channels = {name: Channel("time", path.states[:, column], unit) for name, (column, unit) in MOTION_CHANNELS.items()}
     channels |= {

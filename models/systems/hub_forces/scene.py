@@ -1,4 +1,6 @@
-"""Scenes of hub forces: a vehicle cut at its wheels, what was measured there or the road that gives it, stabilisers."""
+"""Scenes of hub forces: a vehicle without wheels, measured hub forces or a road for a virtual measurement, and a
+stabiliser of roll and pitch.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,6 +28,7 @@ Frame = Literal["hub", "body", "inertial"]
 Noise = Literal["white", "none"]
 Method = Literal["none", "kalman", "prescribed"]
 FACTOR_TO_NEWTON_METRES = {"N m": 1.0, "kN m": 1e3}
+"""Units of moments that files may have, with their factors to N m."""
 COLUMNS_OF_HUB = {
     "fx": NEWTONS,
     "fy": NEWTONS,
@@ -34,18 +37,20 @@ COLUMNS_OF_HUB = {
     "my": FACTOR_TO_NEWTON_METRES,
     "mz": FACTOR_TO_NEWTON_METRES,
 }
-"""Columns of a hub, each after the hub's name and an underscore, with the factors of their units."""
+"""Columns of a hub's forces and moments in a file, headed HUB_fx and so on, with the units that they may have."""
 COLUMNS_OF_ANGLES = {
     "roll": RADIANS,
     "pitch": RADIANS,
     "roll_rate": RADIANS_PER_SECOND,
     "pitch_rate": RADIANS_PER_SECOND,
 }
-"""Columns of the measured angles; roll to the right and nose down are positive, as turns about x and y are."""
+"""Columns of the measured angles and rates in a file, with the units that they may have. Roll to the right and pitch
+nose down are positive, as rotations about x and y are.
+"""
 
 
 class Vehicle(Strict):
-    """[vehicle]: a vehicle file, and the body that the others ride on."""
+    """[vehicle]: a vehicle file, and the name of its chassis."""
 
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
     chassis: str = Field(default="body", description="the body with all six freedoms")
@@ -53,7 +58,7 @@ class Vehicle(Strict):
 
 
 class Run(Strict):
-    """[run]."""
+    """[run]: duration, time step, and which spring forces the engines compute by native elements."""
 
     duration: float = quantity("s", "of the measurement and of every run", default=15.0)
     step: float = quantity(
@@ -65,7 +70,7 @@ class Run(Strict):
 
 
 class Road(Strict):
-    """[road]: two tracks of a random road for the virtual measurement."""
+    """[road]: random road of two tracks, over which the virtual measurement is made."""
 
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="C", description="class, its mean")
     seed: int = Field(default=1, ge=0, le=2**62, description="of the left track; the right one takes the next")
@@ -73,7 +78,9 @@ class Road(Strict):
 
 
 class Forces(Strict):
-    """[forces]: the frame, and either a file or the road's; the noise that is added, or that the file has."""
+    """[forces]: hub forces from a file or from a virtual measurement, their frame, and the
+    deviations of their noise.
+    """
 
     file: str | None = Field(default=None, description="CSV: time [s], then HUB_fx [N] ... HUB_mz [N m] of every hub")
     frame: Frame = Field(default="hub", description="axes of what carries the wheel, of the chassis, or of the space")
@@ -85,8 +92,8 @@ class Forces(Strict):
     moment_deviation: float = quantity("N m", "white noise of every moment sample", default=1.0)
 
 
-class Measured(Strict):
-    """[angles]: roll and pitch with their rates."""
+class MeasuredAngles(Strict):
+    """[angles]: measured roll and pitch with their rates, and the deviations of their noise."""
 
     file: str | None = Field(default=None, description="CSV: time [s], roll, pitch [rad]; roll_rate, pitch_rate")
     noise: Noise = Field(default="white", description="of the virtual measurement; what the filter is told stays")
@@ -95,12 +102,12 @@ class Measured(Strict):
 
     @property
     def deviations(self) -> tuple[float, float]:
-        """Standard deviations of every angle (rad) and of every rate (rad/s)."""
+        """Standard deviations of the noise of every angle (rad) and of every rate (rad/s)."""
         return self.angle_deviation, self.rate_deviation
 
 
-class Stabilise(Strict):
-    """[stabilise]: how roll and pitch are held."""
+class Stabiliser(Strict):
+    """[stabilise]: method by which roll and pitch are kept from drifting off, and its settings."""
 
     method: Method = Field(default="none", description="what holds roll and pitch")
     bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
@@ -113,7 +120,7 @@ class Stabilise(Strict):
 
 
 class HubScene(SceneFile):
-    """One scene of hub forces."""
+    """A scene of hub forces: all tables of its scene file."""
 
     system: Literal["hub-forces"] = "hub-forces"
     study: str = Field(default="hub_forces", description="the study that runs the scene")
@@ -121,41 +128,41 @@ class HubScene(SceneFile):
     run: Run = Run()
     road: Road | None = Field(default=None, description="of the virtual measurement")
     forces: Forces = Forces()
-    angles: Measured = Measured()
-    stabilise: Stabilise = Stabilise()
+    angles: MeasuredAngles = MeasuredAngles()
+    stabilise: Stabiliser = Stabiliser()
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
 
     @property
-    def steps(self) -> int:
-        """Number of steps in every run."""
+    def step_count(self) -> int:
+        """Number of time steps in every run."""
         return round(self.run.duration / self.run.step)
 
     def settings(self, engine: str) -> Settings:
-        """Settings of an engine's march: Runge-Kutta 4, or an integrator that picks its own steps."""
+        """Time integration settings of an engine: Runge-Kutta 4, or an integrator that chooses its own steps."""
         step, duration, adaptive = self.run.step, self.run.duration, self.engines.get(engine)
         if adaptive is None:
             return Settings(FIXED_STEP_METHOD, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
-    def forces_with(self, method: Method) -> ForceRoute:
-        """Route by which a run computes spring forces. Enforced roll and pitch need compiled forces, whatever the scene
+    def spring_force_route(self, method: Method) -> ForceRoute:
+        """native compiled with a run computes spring forces. Enforced roll and pitch need compiled forces, whatever the scene
         says.
         """
         return "compiled" if method == "prescribed" else self.run.forces
 
     def cut_vehicle(self) -> CutVehicle:
-        """The vehicle without its tyres; raises InputError."""
+        """Returns the vehicle without its wheels, cut at the hubs, with the scene's effects; raises InputError."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
         return cut(extended_by_effects(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
-        """Standard deviations (6 h,) of the noise on each sample of hub forces, N and N m."""
+        """Standard deviations (6 h,) of the noise of each hub force (N) and moment (N m), hub by hub."""
         return np.tile(np.repeat([self.forces.force_deviation, self.forces.moment_deviation], 3), len(vehicle.hubs))
 
     def measured(self, vehicle: CutVehicle) -> tuple[HubForces, Angles]:
-        """Hub forces and angles of the scene's files; raises InputError."""
+        """Reads hub forces and angles from the scene's files; raises InputError."""
         assert self.forces.file is not None and self.angles.file is not None
         columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COLUMNS_OF_HUB.items()}
         path = self.path(self.forces.file, "forces.file")
@@ -187,7 +194,9 @@ class HubScene(SceneFile):
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HubScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked scene of hub forces from the nested tables of a scene file. Raises InputError for unknown keys
+    and for values outside their ranges.
+    """
     scene = checked(HubScene, table, file, folder)
     if (scene.forces.file is None) == (scene.road is None):
         raise InputError(file, "road", None, "give either the table road, for a virtual measurement, or forces.file")
@@ -198,7 +207,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
         _check_file_only(file, scene)
     elif scene.forces.accept:
         raise InputError(file, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
-    if "forces" in scene.run.model_fields_set and scene.run.forces != scene.forces_with(scene.stabilise.method):
+    if "forces" in scene.run.model_fields_set and scene.run.forces != scene.spring_force_route(scene.stabilise.method):
         allowed = "an enforced tilt needs all forces in one place: drop it, or choose another stabilise.method"
         raise InputError(file, "run.forces", scene.run.forces, allowed)
     _check_steps(file, scene)
@@ -207,7 +216,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
 
 
 def _check_file_only(file: str, scene: HubScene) -> None:
-    """Refuse a file together with keys that only a virtual measurement can choose."""
+    """Raise InputError for keys that only a virtual measurement can have, in a scene with measured files."""
     for table, name in (("forces", "sampling_rate"), ("forces", "noise"), ("angles", "noise")):
         entries = getattr(scene, table)
         if name in entries.model_fields_set:

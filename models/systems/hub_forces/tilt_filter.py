@@ -1,8 +1,9 @@
-"""A Kalman filter of roll and pitch beside the cut vehicle: measured angles and rates, and the measured hub forces.
+"""Kalman filter that estimates roll and pitch of the vehicle from measured angles, rates and hub forces.
 
-State: roll, pitch and their rates. The hub forces turn the rigid vehicle; that its springs give is noise of the
-acceleration, ``model`` (rad/s^2). Products of rates are neglected, and so is the difference of angles and turns about
-the body's axes, as is right for tilts of a few degrees. What was not measured, NaN, is left to the prediction.
+State: roll, pitch and their rates. The hub forces turn the rigid vehicle. The motion of its springs is treated as noise
+of the acceleration, ``model`` (rad/s^2). Products of rates are neglected, and so is the difference between angles and
+rotations about the body's axes, as is right for tilts of a few degrees. Values that were not measured are NaN; the
+filter predicts them.
 """
 
 import math
@@ -21,27 +22,33 @@ from models.systems.hub_forces.tilt_march import Noise, march
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 
 INNOVATION_LIMIT = 4.0
-"""Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
+"""Largest mean of the normalised innovation squared, per measured value, which means errors twice as large as stated.
+"""
 
 BIAS_IN_DEVIATIONS, BIAS_IN_STANDARD_ERRORS = 0.1, 4.0
-"""Mean of a value's innovations, in deviations, and in its own standard errors, from which on it is called biased. One
-right run in 4000 passes the second; a gyro wrong by 0.1 degree/s has -0.35 and 27 in 15 s."""
+"""Mean of a measured value's innovations above which it counts as biased: in standard deviations, and in standard
+errors of the mean. One faultless run in 4000 exceeds the second; a gyro wrong by 0.1 degree/s has -0.35 and 27 in 15 s.
+"""
 MEASURED_VALUES = "roll", "pitch", "roll_rate", "pitch_rate"
+"""Names of the measured values of the filter, in the order of its state."""
 LARGEST_UNEXPLAINED = 0.65
-"""Largest part of the measured rates that the hub forces do not explain. The rigid vehicle leaves 0.3 to 0.45 of them
-on rough roads, for its springs give; forces in another frame than stated leave 0.8, exchanged hubs 2 and more."""
+"""Largest share of the measured rates that hub forces may leave unexplained. The rigid vehicle leaves 0.3 to 0.45 of
+them on rough roads, because its springs move; forces in another frame than stated leave 0.8, exchanged hubs 2 and
+more."""
 BALANCE_WINDOW = 15.0
-"""s: the longest stretch over which moments are integrated to be compared with rates; beyond, small biases add up."""
+"""Longest time (s) over which moments are integrated to be compared with rates; over longer times small biases add
+up.
+"""
 UNKNOWN_VARIANCE = 0.1**2
-"""rad^2, rad^2/s^2: variance at the start of what is not measured there."""
+"""Initial variance (rad^2, rad^2/s^2) of angles and rates that are not measured at the first sample."""
 SIGNAL_REMEDY = "check signs, units, order of the hubs and frame, or state larger deviations"
 
 
 @dataclass(frozen=True)
 class Tilt:
-    """Output of the tilt filter. states (m, 4) : estimated roll, pitch and their rates; deviations : their standard
-    deviations; normalised_innovation : mean of the normalised innovation squared per measured value, 1 where the stated
-    deviations are right; objections : objections to the measurement.
+    """Output of the tilt filter. states (m, 4) : estimated roll, pitch (rad) and their rates (rad/s); deviations :
+    their standard deviations; period : between samples (s); normalised_innovation : mean of the normalised innovation
+    squared per measured value, 1 where the stated deviations are right; objections : to the measurement, as text.
     """
 
     states: np.ndarray
@@ -53,22 +60,22 @@ class Tilt:
 
 @dataclass
 class FilterState:
-    """State of the tilt filter after a sample. x (4,) : estimate; p (4, 4) : its covariance; surprise : sum and count
-    of the normalised innovations squared; rates (2, 2) : sums of the variances of the unexplained and of the measured
-    rates of roll and pitch; sums (5, 4) : of innovations, as ``tilt_march.march`` keeps them.
+    """State of the tilt filter after a sample. x (4,) : estimate; p (4, 4) : its covariance; squared_innovations : sum
+    and number of the normalised innovations squared; rate_variances (2, 2) : sums of the variances of the unexplained
+    and of the measured rates of roll and pitch; sums (5, 4) : of innovations, as in ``tilt_march.march``.
     """
 
     x: np.ndarray = field(default_factory=lambda: np.full(4, np.nan))
     p: np.ndarray = field(default_factory=lambda: np.full((4, 4), np.nan))
-    surprise: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    rates: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    squared_innovations: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    rate_variances: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
     sums: np.ndarray = field(default_factory=lambda: np.zeros((5, 4)))
 
 
 @dataclass(frozen=True)
 class Deviations:
-    """Stated standard deviations. forces (6 h,) : of each sample, N and N m; angles : of the angles (rad) and of their
-    rates (rad/s); model : of the acceleration that a rigid vehicle does not have (rad/s^2).
+    """Stated standard deviations of a measurement. forces (6 h,) : of each force (N) and moment (N m); angles : of the
+    angles (rad) and of their rates (rad/s); model : of the acceleration that a rigid vehicle does not have (rad/s^2).
     """
 
     forces: np.ndarray
@@ -77,8 +84,8 @@ class Deviations:
 
 
 class TiltFilter:
-    """Kalman filter of roll and pitch, whose angles are sampled with the forces, every ``period`` (s). Works block by
-    block.
+    """Kalman filter of roll and pitch for angles and forces sampled together, every ``sample_period`` (s). It takes a
+    measurement block by block.
     """
 
     def __init__(
@@ -94,10 +101,10 @@ class TiltFilter:
         self.state = FilterState()
 
     def advance(self, wrenches: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Estimates (n, 4) and their standard deviations at samples of hub forces (n, 6 h) and angles (n, 4), which are
-        NaN where not measured.
+        """Filter a block of hub forces (n, 6 h) and angles (n, 4), NaN where not measured. Returns estimates (n, 4) and
+        their standard deviations.
 
-        The first sample is the last one of the block before. Raises InputError where angles and forces contradict
+        The first sample is the last sample of the previous block. Raises InputError where angles and forces contradict
         one another, or are infinite.
         """
         _check_numbers(wrenches, angles, self.file)
@@ -110,7 +117,7 @@ class TiltFilter:
         level = _wrenches_in_level_axes(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
         turning, filtered = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
-        state.surprise += march(state.x, state.p, turning, angles, self.noise, state.sums, filtered)
+        state.squared_innovations += march(state.x, state.p, turning, angles, self.noise, state.sums, filtered)
         if not self.normalised_innovation <= INNOVATION_LIMIT:
             raise InputError(
                 self.file,
@@ -124,8 +131,8 @@ class TiltFilter:
 
     @property
     def normalised_innovation(self) -> float:
-        """Mean of the normalised innovations squared per measured value."""
-        return float(self.state.surprise[0] / max(self.state.surprise[1], 1.0))
+        """Mean of the normalised innovations squared per measured value; 1 where the stated deviations are right."""
+        return float(self.state.squared_innovations[0] / max(self.state.squared_innovations[1], 1.0))
 
     def innovation_biases(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4,) of the normalised innovations of roll, pitch and their rates, and its standard error (4,).
@@ -140,8 +147,8 @@ class TiltFilter:
         return total / number, np.sqrt(variance * (1 + autocorrelation) / (1 - autocorrelation) / number)
 
     def objections(self) -> tuple[str, ...]:
-        """Objections to the measurement because innovations are too large or have a mean. A constant error of an angle
-        leaves no trace in them.
+        """Objections to the measurement, as text, where innovations are too large or have a mean. They do not show a
+        constant error of an angle.
         """
         large = (
             f"the filter's innovations squared are {self.normalised_innovation:.3g} times what the "
@@ -159,10 +166,11 @@ class TiltFilter:
         return (*([large] if self.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
 
     def _check_balance(self, turning_acceleration: np.ndarray, rates: np.ndarray) -> None:
-        """Refuse hub forces whose moments, integrated over time, do not give the measured rates of roll and pitch.
+        """Raise InputError for hub forces whose moments, integrated over time, do not give the measured rates of roll
+        and pitch.
 
-        A constant offset of a transducer, which the filter takes for noise, makes a straight line of what is left of a
-        stretch: it is not counted, or 30 N at one wheel would be as much as a smooth road.
+        A constant offset of a transducer, which the filter treats as noise, gives a linear trend in the difference. The
+        trend is not counted, or 30 N at one wheel would be as much as a smooth road.
 
         turning_acceleration : (n, 2), rad/s^2; rates : (n, 2), rad/s.
         """
@@ -174,8 +182,8 @@ class TiltFilter:
             integral = np.vstack((np.zeros(2), np.cumsum(turning_part[1:] + turning_part[:-1], axis=0) * dt / 2))
             allowed = self.noise.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
             left = np.var(_without_slope(measured - integral), axis=0)
-            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
-        unexplained, measured_change = self.state.rates
+            self.state.rate_variances += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
+        unexplained, measured_change = self.state.rate_variances
         share = np.sqrt(unexplained / np.where(measured_change > 0, measured_change, 1.0))
         for name, turning_part in zip(("roll", "pitch"), share, strict=True):
             if not turning_part <= LARGEST_UNEXPLAINED:
@@ -187,8 +195,8 @@ class TiltFilter:
 
 
 def _check_measurement(frame: str, sample_period: float, deviations: Deviations) -> None:
-    """Refuse an unknown frame, and periods and deviations that are not above 0 and finite: no value is without
-    error.
+    """Raise InputError for an unknown frame, and for a sampling period or deviations that are not
+    above 0 and finite.
     """
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
@@ -199,7 +207,7 @@ def _check_measurement(frame: str, sample_period: float, deviations: Deviations)
 
 
 def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
-    """Refuse forces that are not finite, and infinite angles. NaN is allowed: it marks an angle that was not
+    """Raise InputError for forces that are not finite, and for infinite angles. NaN marks an angle that was not
     measured.
     """
     for name, wrong in (("forces", ~np.isfinite(wrenches)), ("angles", np.isinf(angles))):
@@ -209,13 +217,15 @@ def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
 
 
 def _without_slope(values: np.ndarray) -> np.ndarray:
-    """Values (n, k) without the linear trend of each column; the means stay."""
+    """Remove the linear trend from each column of values (n, k); the means stay."""
     line = np.linspace(-1.0, 1.0, len(values))
     return values - np.outer(line, line @ values / (line @ line))
 
 
 def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations: Deviations, file: str = "") -> Tilt:
-    """Filter angles sampled with the forces, see ``TiltFilter``; raises InputError also where nothing was measured."""
+    """Estimate roll and pitch from measured angles and hub forces by ``TiltFilter``. Raises InputError also where no
+    angle was measured.
+    """
     if len(forces.samples) != len(angles.samples):
         raise InputError(
             file, "angles", len(angles.samples), f"must be as many samples as the forces', {len(forces.samples)}"
@@ -228,7 +238,9 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations:
 
 
 def _wrenches_in_level_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Wrenches (m, 6 h) turned from the axes of space into axes that roll and pitch by angles (m, 2 or more), rad."""
+    """Transform wrenches (m, 6 h) from axes fixed in space into axes turned by roll and pitch; angles (m, 2 or more) in
+    rad.
+    """
     (sr, sp), (cr, cp), zero = np.sin(angles[:, :2]).T, np.cos(angles[:, :2]).T, np.zeros(len(angles))
     rotation = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
     return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), rotation).reshape(wrenches.shape)
@@ -237,8 +249,9 @@ def _wrenches_in_level_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndar
 def inputs_with_moments(
     hub_inputs: HubInputs, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7
 ) -> HubInputs:
-    """Hub inputs with moments that pull roll and pitch towards the filter's estimate. They act as a spring and damper:
-    natural angular frequency 2 pi times ``bandwidth`` (Hz), damping ratio ``ratio``, inertia of the rigid vehicle.
+    """Returns hub inputs with moments that pull roll and pitch towards the filter's estimate. They act as spring and
+    damper: natural angular frequency 2 pi times ``bandwidth`` (Hz), damping ratio ``ratio``, inertia of the rigid
+    vehicle.
     """
     rows, corner = len(hub_inputs.hubs), 2 * math.pi * bandwidth
     wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)

@@ -1,4 +1,4 @@
-"""Compiled recursion of the Kalman filter of roll and pitch, one measured value after another."""
+"""Compiled recursion of the Kalman filter of roll and pitch, updated with each measured value in turn."""
 
 from typing import NamedTuple
 
@@ -8,8 +8,8 @@ from models.machine.compiled import njit
 
 
 class Noise(NamedTuple):
-    """Noise settings of the tilt filter: step dt (s); process noise (4, 4), which the covariance gains in a step;
-    variances (4,) of the measured values.
+    """Noise settings of the tilt filter. dt : step (s); process (4, 4) : covariance that is added in every step;
+    variances (4,) : of measured roll, pitch and their rates.
     """
 
     dt: float
@@ -19,13 +19,14 @@ class Noise(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def march(x, p, turning_acceleration, measured, noise, innovation_sums, filtered):
-    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0; both are overwritten by
-    those at the last sample.
+    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0. Both arrays are
+    overwritten by the values at the last sample.
 
-    turning_acceleration (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was. Adds to
-    sums (5, 4), of every value's normalised innovations: how many, their sum, that of their squares, that of their
-    products with the one before, and the last one. Writes the states (n, 4) and their deviations into ``filtered`` (2,
-    n, 4). Returns the sum of the normalised innovations squared and how many there were.
+    turning_acceleration (n, 2) : of roll and pitch (rad/s^2), constant from each sample to the next; measured (n, 4) :
+    NaN where not measured. Adds to ``innovation_sums`` (5, 4), which hold for every measured value: number of
+    normalised innovations, their sum, the sum of their squares, the sum of products of successive innovations, and the
+    last innovation. Writes states (n, 4) and their standard deviations into ``filtered`` (2, n, 4). Returns the sum of
+    the normalised innovations squared and their number.
     """
     gain, surprise, used, variances = np.empty(4), 0.0, 0, noise.variances
     for i in range(len(measured)):
@@ -54,23 +55,23 @@ def march(x, p, turning_acceleration, measured, noise, innovation_sums, filtered
 
 
 @njit(cache=True, error_model="numpy")
-def _update_with_value(p, gain, j, variance, kept_share):
-    """Update the covariance with value j in Joseph's form, which no rounding makes negative.
+def _update_with_value(p, gain, j, variance, remaining_share):
+    """Update the covariance ``p`` with measured value j in Joseph's form, which no rounding makes negative.
 
-    kept_share : ratio of the value's variance to the innovation's, which is 1 - gain[j] computed without cancellation.
-    The variance gain^2 variance that the value's own error causes in another state is the least that remains there,
-    even where rounding is larger.
+    remaining_share : ratio of the value's variance to the innovation's variance, which is 1 - gain[j] computed without
+    cancellation. The variance gain^2 variance that the value's error causes in another state is the least that remains
+    there, even where rounding is larger.
     """
     for m in range(4):
         element = p[j, m]
         for k in range(4):
             p[k, m] -= gain[k] * element
-        p[j, m] = kept_share * element
+        p[j, m] = remaining_share * element
     for k in range(4):
         element = p[k, j]
         for m in range(4):
             p[k, m] -= gain[m] * element
-        p[k, j] = kept_share * element
+        p[k, j] = remaining_share * element
         for m in range(4):
             p[k, m] += gain[k] * variance * gain[m]
     for k in range(4):
@@ -81,8 +82,8 @@ def _update_with_value(p, gain, j, variance, kept_share):
 
 @njit(cache=True, error_model="numpy")
 def _predict_step(x, p, turning_acceleration, noise):
-    """Predict one step: the angles change by their rates, the rates by an acceleration, and the covariance
-    accordingly.
+    """Predict state ``x`` and covariance ``p`` one step ahead: angles change by their rates, rates by an
+    acceleration.
     """
     dt = noise.dt
     for k in range(2):

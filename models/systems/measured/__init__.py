@@ -1,5 +1,7 @@
-"""An engineer's own measurements: files on one clock, checked, run, judged and handed on."""
+"""Measured recordings: files brought onto one clock, checked, simulated, judged, and section forces
+written to files.
+"""
 
 ENGINES = ("reference", "exudyn", "mujoco")
 NO_PRICE = "takes the samples of its files for steps"
-"""Why `twinrig price` has nothing to choose, and what there is instead."""
+"""Reason why `twinrig price` does not apply to scenes of recordings."""

@@ -1,4 +1,4 @@
-"""Assumptions of a recording, and of a vehicle in space on its forces."""
+"""Assumptions of a recording, and of the run of a spatial vehicle that its hub forces drive."""
 
 from typing import TYPE_CHECKING
 
@@ -21,28 +21,33 @@ if TYPE_CHECKING:
     from models.systems.measured.run import Examination
 
 LARGEST_PULL_SHARE = 0.2
-"""Of the load at rest: the weight and inertia of a rim and tyre in the air; whatever pulls more is no road."""
+"""Largest downward force at a hub divided by the load at rest: weight and inertia of rim and tyre in the air. A larger
+pull is not caused by the road.
+"""
 
 
 def assumptions(
     scene: MeasuredScene, vehicle: CutVehicle | None, examination: "Examination | None" = None
 ) -> list[Assumption]:
-    """Assumptions of the run whose section forces are handed on; examination : of this run, None to list the
+    """Assumptions of the run whose section forces are written to files; examination : of this run, None to list the
     assumptions only.
 
-    The pitch plane (vehicle None) has further assumptions, which its own system lists.
+    The pitch plane (vehicle None) has further assumptions, which the system pitch_plane lists.
     """
-    return [_in_range(examination), *([] if vehicle is None else _in_space(scene, vehicle, examination))]
+    return [
+        _transducer_range_assumption(examination),
+        *([] if vehicle is None else _cut_vehicle_assumptions(scene, vehicle, examination)),
+    ]
 
 
-def _in_range(examination: "Examination | None") -> Assumption:
-    """Assumption that transducers stay within their ranges."""
+def _transducer_range_assumption(examination: "Examination | None") -> Assumption:
+    """Assumption that transducers stay within their ranges, so that no samples pile up at an extreme value."""
 
     def clipped() -> Watched:
-        """Share of the samples that pile up at an extreme value, for every channel that drives the run."""
+        """Share of the samples that pile up at an extreme value, for every signal that drives the run."""
         assert examination is not None
         values = {
-            s.name: examination.recording.samples(s) for s in examination.recording.signals if examination.put_in(s)
+            s.name: examination.recording.samples(s) for s in examination.recording.signals if examination.is_input(s)
         }
         return {name: np.array([np.isin(each, clipping_extremes(each)).mean()]) for name, each in values.items()}
 
@@ -56,8 +61,10 @@ def _in_range(examination: "Examination | None") -> Assumption:
     )
 
 
-def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
-    """Assumptions of a cut vehicle, judged by the channels that its run computes."""
+def _cut_vehicle_assumptions(
+    scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None"
+) -> list[Assumption]:
+    """Assumptions of a spatial vehicle driven by hub forces, checked on the channels of its run."""
 
     def read(name: str) -> np.ndarray:
         assert examination is not None and examination.outcome is not None
@@ -112,16 +119,18 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
             "leave these times out by [clock]: no stop is in the cut vehicle's linear springs",
         ),
     ]
-    return [*listed, *_same_attitude(scene, vehicle, examination)]
+    return [*listed, *_same_attitude_assumption(scene, vehicle, examination)]
 
 
-def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
-    """Assumption that a free run has the measured roll and pitch, where forces keep their directions in space and roll
-    or pitch were measured.
+def _same_attitude_assumption(
+    scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None"
+) -> list[Assumption]:
+    """Assumption that a free run has the measured roll and pitch, for forces that keep their directions in space; empty
+    where neither angle was measured.
     """
     if scene.stabilise.method != "none" or examination is None:
         return []
-    frames = {s.frame for s in examination.recording.signals if s.at in vehicle.hubs and examination.put_in(s)}
+    frames = {s.frame for s in examination.recording.signals if s.at in vehicle.hubs and examination.is_input(s)}
     angles = [s for s in examination.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")]
     if frames != {"inertial"} or not angles:
         return []

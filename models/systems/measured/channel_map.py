@@ -1,4 +1,4 @@
-"""The channel map of a scene: each channel named in it, found in its file, with its factor to SI and its place."""
+"""Channel map of a scene: the mapped channels of its files as signals, with factors to SI and places on the vehicle."""
 
 import re
 from collections.abc import Sequence
@@ -15,13 +15,13 @@ COMPONENTS_OF_QUANTITY: dict[Quantity, tuple[str, ...]] = {
     **dict.fromkeys(("angular rate", "angle"), ("roll", "pitch", "yaw")),
     **dict.fromkeys(("travel", "strain"), ()),
 }
-"""Components that a quantity can have; none along a connector, which has its own direction."""
+"""Components that each quantity can have; none for quantities along a connector, which has a direction itself."""
 
 
 def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
-    """Signals in the order of the scene; ``sources`` are the scene's opened files, in the scene's order.
+    """Returns the signals of all mapped channels, in the order of the scene; ``sources`` : the scene's opened files.
 
-    What is measured at a connector, and any strain, is only compared with. Raises InputError at the first channel that
+    Measurements at connectors, and strains, are only compared with the run. Raises InputError at the first channel that
     is not in its file, is there or in the map twice, or whose unit, place, component or frame makes no sense.
     """
     rows = [
@@ -83,7 +83,9 @@ def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, 
 
 
 def find(source: Source, name: str, file: str, place: str) -> Channel:
-    """The channel of a file with this name; InputError, with the most similar names, if there is not exactly one."""
+    """Returns the channel of a file by its name. Raises InputError, with the most similar names, if there is not
+    exactly one.
+    """
     alike = [channel for channel in source.channels if channel.name == name]
     if len(alike) == 1:
         return alike[0]
@@ -96,7 +98,7 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
 
 
 def _similar_channels(name: str, source: Source) -> str:
-    """Text with the channels of a file whose names are most similar to ``name``, or else with its first channels."""
+    """Text with the channels of a file whose names are most similar to ``name``, or else with the first channels."""
     plain = {channel.name.casefold(): channel.name for channel in source.channels}
     close = [plain[each] for each in get_close_matches(name.casefold(), plain, n=3, cutoff=0.6)]
     if close:
@@ -106,7 +108,9 @@ def _similar_channels(name: str, source: Source) -> str:
 
 
 def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> None:
-    """Refuse a place where the quantity cannot be measured, and a component that the quantity does not have there."""
+    """Raise InputError for a place where the mapped quantity cannot be measured, and for a component that it does not
+    have there.
+    """
     names_by_kind = places.of(row.quantity)
     all_names = tuple(name for names in names_by_kind.values() for name in names)
     if names_by_kind and row.at not in all_names:

@@ -1,10 +1,10 @@
-"""All channels of all files on one clock, in columns on disk.
+"""Resampling of all mapped channels of all files to common sample times, stored in columns on disk.
 
-The rule. The clock is that of the wheel forces, the fastest of them, unless the scene names a rate; it begins with the
-first moment at which all wheel forces are there and ends with the last. Files are placed by their absolute start times
-where all say one, else each one's zero is the same moment; ``offset`` is added. What is slower, or as fast, is
-interpolated linearly; what is faster is freed of what the clock cannot show by a filter without phase. What lies in a
-gap of more than 1.5 of its own periods, or outside its file, is NaN.
+The sampling rate is that of the fastest wheel force, unless the scene names a rate. The recording covers the time in
+which all wheel forces exist. Files are aligned by their absolute start times if all have one, else their zeros are the
+same moment; ``offset`` is added. Channels of a lower or equal rate are interpolated linearly. Channels of a higher rate
+are low-passed without phase first. Samples in a gap of more than 1.5 sampling periods of the channel, or outside its
+file, are NaN.
 """
 
 import json
@@ -35,18 +35,18 @@ COLUMNS_FILE, RAW_COLUMNS_FILE, SOURCES_FILE, ABSURD_VALUES_FILE = (
     "no_value.json",
 )
 FEWEST_SAMPLES = 100
-"""Samples of the shortest recording."""
+"""Fewest samples of a recording."""
 SLOWEST_SPACING = {"force": 0.02, "moment": 0.02, "acceleration": 1.0, "angular rate": 1.0}
-"""s between samples beyond which a channel shows nothing of its quantity; wheel forces move with up to 25 Hz."""
+"""Longest time (s) between samples at which a channel still shows its quantity; wheel forces vary with up to 25 Hz."""
 FASTEST_RATE = 60e3
-"""Hz: no amplifier of wheel forces or gyros is faster."""
+"""Highest sampling rate (Hz) that is plausible: no amplifier of wheel forces or gyros is faster."""
 
 
 @dataclass(frozen=True)
 class ClockGroup:
-    """Mapped signals of one group of channels in a file, with their sample times on the recording's common time.
+    """Mapped signals of a channel group in a file, with their sample times in the common time of the recording.
 
-    The file's clock was slowed down by its drift, and its shift added.
+    The times are corrected for the drift of the file's clock, and shifted.
     """
 
     source: Source
@@ -55,18 +55,18 @@ class ClockGroup:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the channels as the file has them."""
+        """Names of the channels in the file."""
         return tuple(signal.channel for signal in self.signals)
 
     def si(self, values: np.ndarray) -> np.ndarray:
-        """Values (n, signals) of the file, converted to SI units."""
+        """Converts values (n, signals) of the file to SI units: zero subtracted, times sign and factor."""
         zeros, factors = np.array([(signal.zero, signal.sign * signal.factor) for signal in self.signals]).T
         return (values - zeros) * factors
 
 
 @dataclass(frozen=True)
 class ClockGrid:
-    """Equally spaced sample times start + i period, i < count, in s of the common time."""
+    """Equally spaced sample times of a recording: start + i period, i < count, in s of the common time."""
 
     start: float
     period: float
@@ -74,11 +74,11 @@ class ClockGrid:
 
     @property
     def times(self) -> np.ndarray:
-        """Times (s) of all samples (n,)."""
+        """Times (n,) of all samples in s."""
         return self.start + self.period * np.arange(self.count)
 
     def places(self, times: np.ndarray) -> np.ndarray:
-        """Index of the sample nearest to each time; it may lie outside the recording."""
+        """Index of the sample nearest to each time (s); it may lie outside the recording."""
         return np.rint((times - self.start) / self.period).astype(np.int64)
 
 
@@ -90,22 +90,22 @@ def record_on_clock(
     folder: Path,
     progress: Progress = no_progress,
 ) -> Recording:
-    """Bring mapped signals of opened files onto one clock, store them as columns in ``folder``, and apply the scene's
-    effects.
+    """Resample the mapped signals of opened files to common sample times, store them as columns in ``folder``, and
+    apply the scene's effects.
 
-    hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
-    Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
+    hubs : places of the wheel forces, which determine the sample times. Columns in the folder from the same files are
+    used again. Raises InputError for files that do not overlap in time, or without wheel forces.
     """
     shifts, start, noticed = file_shifts(scene, sources)
     progress("reading times", 0.0)
     placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
     groups = [each for source, shift, drift in placing for each in _mapped_groups(source, signals, shift, drift)]
-    leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
-    if not leading:
+    wheel_force_groups = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
+    if not wheel_force_groups:
         needed = "no channel is mapped to a hub: wheel forces are what drives the vehicle"
         raise InputError(scene.file, "files", None, needed)
-    grid = _clock_grid(scene, leading)
-    noticed += [finding for group in groups for finding in (*_of_group(group), *_check_cover(scene, group, grid))]
+    grid = _clock_grid(scene, wheel_force_groups)
+    noticed += [finding for group in groups for finding in (*_group_findings(group), *_check_cover(scene, group, grid))]
     columns = _recording_columns(folder, scene, signals, sources, grid)
     if columns.done < grid.count:
         absurd = list[Finding]()
@@ -127,8 +127,8 @@ def record_on_clock(
 
 
 def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
-    """Convert moments that were measured about points above or below hubs to moments about the hubs: (Mx - r Fy, My + r
-    Fx) for a point r above.
+    """Convert moments measured about points above or below hubs to moments about the hubs: (Mx - r Fy, My + r Fx) for a
+    point r (m) above the hub.
     """
     for hub, lever in scene.levers.items():
         of_component = {(s.quantity, s.component): s.name for s in signals if s.at == hub and not s.check}
@@ -140,7 +140,7 @@ def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], columns: C
 
 
 def _clock_finding(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Finding:
-    """A finding on how all channels were brought onto one clock."""
+    """Returns a finding on how all channels were resampled to the common sample times."""
     groups_by_method: dict[str, list[str]] = {}
     for group in groups:
         faster = group.timing.period < grid.period * (1 - EQUAL_RATES)
@@ -155,7 +155,9 @@ def _clock_finding(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGr
 
 
 def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
-    """Shift (s) of each file's times, the date at which the common time is 0, and findings on both."""
+    """Returns the shift (s) of each file's times, the date at which the common time is 0, and findings on missing start
+    times.
+    """
     offsets = [file.offset for file in scene.files]
     known = [source.start for source in sources if source.start is not None]
     if len(known) == len(sources):
@@ -169,7 +171,9 @@ def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[f
 
 
 def _mapped_groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
-    """Groups of a file that have mapped channels, with their times shifted to the common time."""
+    """Yields the channel groups of a file that have mapped channels, with their times in the common time. shift : s;
+    drift : relative error of the file's clock.
+    """
     group_of_channel = {channel.name: channel.group for channel in source.channels}
     mapped = dict[int, list[Signal]]()
     for signal in (signal for signal in signals if signal.file == source.path.name):
@@ -184,8 +188,8 @@ def _mapped_groups(source: Source, signals: Sequence[Signal], shift: float, drif
         yield ClockGroup(source, (first, *other_signals), slowed)
 
 
-def _of_group(group: ClockGroup) -> Iterator[Finding]:
-    """Findings on the times of a group, for example that these seem to be in another unit."""
+def _group_findings(group: ClockGroup) -> Iterator[Finding]:
+    """Yields findings on the sample times of a channel group, for example that they seem to be in another unit."""
     yield from group.timing.findings
     clock, label = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
     slowest = min(SLOWEST_SPACING.get(s.quantity, np.inf) for s in group.signals)
@@ -203,11 +207,11 @@ def _of_group(group: ClockGroup) -> Iterator[Finding]:
     yield Finding("times", weight, label, text, clock.period, "s", (group.signals[0].name,))
 
 
-def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
-    """Sample times of the recording. InputError where the wheel forces do not overlap in time, or do not allow the
-    settings of [clock].
+def _clock_grid(scene: MeasuredScene, wheel_force_groups: list[ClockGroup]) -> ClockGrid:
+    """Returns the sample times of the recording. Raises InputError where the wheel forces do not overlap in time, or do
+    not allow the settings of [clock].
     """
-    settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
+    settings, file, timings = scene.clock, scene.file, [group.timing for group in wheel_force_groups]
     fastest = min(timings, key=lambda timing: timing.period)
     period = 1.0 / settings.rate if settings.rate else fastest.period
     if period < fastest.period * (1 - EQUAL_RATES):
@@ -215,7 +219,9 @@ def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
         raise InputError(file, "clock.rate", settings.rate, slower)
     first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
     if first >= last:
-        spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
+        spans = "; ".join(
+            f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in wheel_force_groups
+        )
         raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
     times = fastest.times
     start = float(
@@ -232,7 +238,9 @@ def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
 
 
 def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> Iterator[Finding]:
-    """Report, or refuse, that a group has no data in part of the recording's time."""
+    """Yields a finding where a channel group has no data in part of the recording's time. Raises InputError where it
+    has none at all.
+    """
     begin, end, name = float(group.timing.times[0]), grid.start + grid.period * (grid.count - 1), group.source.path.name
     late, early = begin - grid.start, end - group.timing.end
     label = f"{name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
@@ -251,8 +259,8 @@ def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> It
 def _recording_columns(
     folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: ClockGrid
 ) -> Columns:
-    """Columns of this recording, new or begun earlier from the same files; InputError where the folder holds other
-    ones.
+    """Opens the columns of a recording, new or begun earlier from the same files. Raises InputError where the folder
+    has columns of other files.
     """
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     channels = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
@@ -265,7 +273,7 @@ def _recording_columns(
 
 
 def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
-    """Whether a group was sampled at the recording's own sample times."""
+    """Whether a channel group was sampled at the sample times of the recording."""
     clock = group.timing
     indices = grid.places(clock.times)
     inside = (indices >= 0) & (indices < grid.count)
@@ -278,13 +286,13 @@ def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
 
 
 def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
-    """Write samples that are on the clock already into the columns, block by block, NaN in gaps; returns findings on
-    absurd values.
+    """Write a group that was sampled at the recording's sample times into the columns, block by block, NaN in gaps.
+    Returns findings on absurd values.
     """
     names, done, absurd = tuple(signal.name for signal in group.signals), 0, list[Finding]()
 
     def put(last_index: int, indices: np.ndarray, si: np.ndarray) -> None:
-        """Write the samples up to ``last_index``: values ``si`` at ``indices``, NaN at the others."""
+        """Write the samples up to ``last_index``: SI values at ``indices``, NaN at other samples."""
         for first in range(done, last_index, SAMPLES_PER_BLOCK):
             in_block = (indices >= first) & (indices < min(first + SAMPLES_PER_BLOCK, last_index))
             values = np.full((min(SAMPLES_PER_BLOCK, last_index - first), len(names)), np.nan)
@@ -308,8 +316,8 @@ def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folde
 
 
 def _write_resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
-    """Bring samples of another clock onto this one: copy them to a file, then interpolate one signal after another.
-    Returns findings on absurd values.
+    """Resample a group with other sample times into the columns, by a temporary file, signal by signal. Returns
+    findings on absurd values.
     """
     clock, absurd = group.timing, list[Finding]()
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])

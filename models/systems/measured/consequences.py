@@ -1,10 +1,10 @@
-"""Changes of the section forces by the faults found in a recording: run once as recorded and once with each finding put
-right.
+"""Consequences of findings on a recording for the section forces: a run as recorded is compared with a run in which the
+finding is corrected.
 
-A finding that names its size says how to put it right: a late channel is shifted, a wrong factor taken out, a spike
-left out. Of a gap nobody knows what was lost: there the deviation that its bridge is known to is planted instead. The
-two runs differ by what the finding does to every section force, as rms and as damage. A long recording is run for
-``LONGEST_RERUN`` s, about the place where the finding is worst.
+A finding with a size can be corrected: a late channel is shifted, a wrong factor divided out, a spike removed. The lost
+samples of a gap are unknown; instead the gap's bridge is changed by its standard deviation. The difference of both runs
+is the effect of the finding on every section force, as rms and as damage. Of a long recording ``LONGEST_RERUN`` s are
+run, about the time where the finding is worst.
 """
 
 import shutil
@@ -27,15 +27,15 @@ from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
 LONGEST_RERUN = 30.0
-"""s of a recording that are run for a finding."""
+"""Longest part (s) of a recording that is run for a finding."""
 FORCE_LIMITS, DAMAGE_LIMITS = (0.05, 0.15), (0.05, 0.25)
-"""Change of a section force, rms by its own rms without its mean, and |damage ratio - 1|: up to the first the run is
-accepted, beyond the second it is rejected, between the two it is accepted with doubt. 5 % of an amplitude are 28 % of
-damage of slope 5."""
+"""Limits of the change of a section force: rms of the change divided by the rms of the force without its mean, and
+|damage ratio - 1|. Up to the first number the run is accepted, beyond the second it is rejected, between them accepted
+with doubt. 5 % of an amplitude are 28 % of damage of slope 5."""
 NEGLIGIBLE_FORCE_SHARE = 0.02
-"""Of the largest rms in the same unit: a section force that is smaller carries nothing that could be wrong."""
+"""Rms of a section force divided by the largest rms in the same unit, below which the force is not compared."""
 SETTLING_DURATION = 1.0
-"""s at the beginning that are not compared: there the run settles."""
+"""Time (s) at the beginning of a run that is not compared, in which the run settles."""
 Samples = dict[Signal, np.ndarray]
 Run = Callable[[Recording, Path], SectionOutcome]
 
@@ -43,8 +43,8 @@ Run = Callable[[Recording, Path], SectionOutcome]
 @dataclass(frozen=True)
 class Consequence:
     """Effect of a finding on the section force that it changes most. force : rms of the change divided by the rms of
-    the force; damage : damage as recorded divided by damage with the finding corrected; NaN, and no section, where
-    unknown.
+    the force; damage : damage as recorded divided by damage with the finding corrected. Where unknown, both are NaN and
+    section_force is empty.
     """
 
     finding: Finding
@@ -63,7 +63,7 @@ class Consequence:
         )
 
     def __str__(self) -> str:
-        """The consequence with its figures, as a sentence for an engineer."""
+        """Returns the consequence with its figures as a sentence."""
         where = f"'{self.finding.check}' at {self.finding.place or 'the recording'}"
         if not self.section_force:
             return f"{where}: what it does to the section forces is not known"
@@ -76,8 +76,8 @@ class Consequence:
 def consequences(
     findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[SectionChannel], folder: Path
 ) -> tuple[Consequence, ...]:
-    """A consequence for every doubt. run : function that simulates a recording in a folder; answers : section forces
-    that are compared.
+    """Compute the consequence of every doubt. run : function that simulates a recording in a folder; answers : channels
+    of the section forces that are compared.
     """
     shutil.rmtree(folder, ignore_errors=True)
     outcome_of_start = dict[int, SectionOutcome]()
@@ -87,7 +87,7 @@ def consequences(
         correction = CORRECTION_OF_CHECK.get(finding.check)
         if correction is None or not signals:
             return Consequence(finding)
-        first, count = _judged_window(finding, recording)
+        first, count = _window_of_finding(finding, recording)
         samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
         corrected = samples | correction(finding, signals, samples, recording.period)
         start_folder, corrected_folder = folder / f"from {first}", folder / str(number)
@@ -98,13 +98,13 @@ def consequences(
             corrected_outcome = run(corrected_recording, corrected_folder)
         except (InputError, RunFailed):
             return Consequence(finding)
-        return _most_changed_force(finding, outcome_of_start[first], corrected_outcome, answers)
+        return _consequence_of_most_changed_force(finding, outcome_of_start[first], corrected_outcome, answers)
 
     return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
 
 def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
-    """The verdict on an otherwise accepted run, lowered if its findings change the section forces too much."""
+    """Returns the verdict on a run, lowered from "accepted" if findings change the section forces too much."""
     worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
         return verdict
@@ -117,8 +117,8 @@ def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequen
 
 
 def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
-    """A text for each consequence. Of more than LISTED_FINDINGS by the same check only the worst is described, with
-    their number.
+    """Texts on the consequences. Of more than LISTED_FINDINGS by the same check only the worst is described, with their
+    number.
     """
     by_check: dict[str, list[Consequence]] = {}
     for consequence in consequences:
@@ -131,14 +131,14 @@ def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
 
 
 def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
-    """The doubts, each check about the same channels once."""
+    """Returns the doubts among findings, without repetitions of the same check on the same channels."""
     doubts = [finding for finding in findings if finding.weight == "doubt"]
     first = {(finding.check, finding.signals or finding.place): finding for finding in reversed(doubts)}
     return list(reversed(first.values()))
 
 
-def _judged_window(finding: Finding, recording: Recording) -> tuple[int, int]:
-    """First sample and number of samples that are run to judge a finding."""
+def _window_of_finding(finding: Finding, recording: Recording) -> tuple[int, int]:
+    """First sample and number of samples of the part of a recording that is run for a finding."""
     count = min(recording.count, round(LONGEST_RERUN / recording.period) + 1)
     middle = finding.times[0] if finding.times else 0.0
     first = min(max(round((middle - LONGEST_RERUN / 2) / recording.period), 0), recording.count - count)
@@ -146,7 +146,7 @@ def _judged_window(finding: Finding, recording: Recording) -> tuple[int, int]:
 
 
 def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -> Recording:
-    """Write samples into columns in ``folder``, and return these as a recording."""
+    """Write samples of signals into columns in ``folder``, and return them as a recording."""
     folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples.values())))
     columns = Columns(folder / "samples.columns", tuple(s.name for s in recording.signals), count)
@@ -154,12 +154,12 @@ def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -
     return Recording(recording.signals, columns, recording.period)
 
 
-def _most_changed_force(
-    finding: Finding, recorded: SectionOutcome, right: SectionOutcome, answers: Sequence[SectionChannel]
+def _consequence_of_most_changed_force(
+    finding: Finding, recorded: SectionOutcome, corrected: SectionOutcome, answers: Sequence[SectionChannel]
 ) -> Consequence:
-    """Consequence for the section force that changes most, among those that are not negligibly small."""
-    first = min(round(SETTLING_DURATION / right.period), right.done // 4)
-    pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
+    """Returns the consequence of a finding for the section force that changes most, without negligibly small forces."""
+    first = min(round(SETTLING_DURATION / corrected.period), corrected.done // 4)
+    pairs = {a: (recorded.samples(a)[first:], corrected.samples(a)[first:]) for a in answers}
     size = {a: root_mean_square(measured - measured.mean()) for a, (_, measured) in pairs.items()}
     most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
     every = [
@@ -176,14 +176,14 @@ def _most_changed_force(
 
 
 def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Samples of the channels read later: by a constant delay, or by a clock's drift, which grows from the start on."""
+    """Samples of signals corrected for a constant delay, or for a clock's drift, which grows from the start on."""
     size, count = finding.size or 0.0, len(next(iter(samples.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
     return {s: _read_at(samples[s], later) for s in signals}
 
 
 def _read_at(values: np.ndarray, samples_later: np.ndarray) -> np.ndarray:
-    """Values (n,) read later by ``samples_later`` (n,) samples, with a cubic spline; NaN next to an unknown value."""
+    """Values (n,) read ``samples_later`` (n,) samples later by a cubic spline; NaN next to an unknown value."""
     from scipy.interpolate import make_interp_spline
 
     known, places = np.isfinite(values), np.arange(len(values))
@@ -221,7 +221,7 @@ def _channels_exchanged(finding: Finding, signals: Sequence[Signal], samples: Sa
 
 
 def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Samples without spikes of one or two samples."""
+    """Samples of signals with spikes of one or two samples replaced by interpolation."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
         at, values = spike_positions(samples[s])[0], samples[s].copy()
@@ -231,7 +231,9 @@ def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Sample
 
 
 def _bridge_varied(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Samples with gaps bridged as for the run, plus or minus the bridge's standard deviation, gap by gap in turn."""
+    """Samples of signals with gaps bridged as for the run, plus or minus the bridge's standard deviation, with the sign
+    alternating from gap to gap.
+    """
     out = dict[Signal, np.ndarray]()
     for s in signals:
         if s.quantity in ("force", "moment"):
@@ -255,4 +257,4 @@ CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], Samples, flo
     "gaps": _bridge_varied,
     "no value": _bridge_varied,
 }
-"""By the name of the check."""
+"""Function that corrects the samples for a finding, by the name of the check."""

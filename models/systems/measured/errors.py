@@ -1,7 +1,7 @@
-"""Errors that the step length of a recording's run leaves in its section forces.
+"""Stated errors of the section forces of a recording's run by the length of its time steps.
 
-A step is as long as a sampling period as a rule: longer ones would take the samples' noise for motion. So a stretch of
-the recording is run in its steps and in half of them.
+A time step is usually as long as a sampling period: longer steps would take the samples' noise for motion. So part of
+the recording is run in the same steps and in half of them.
 """
 
 import shutil
@@ -11,23 +11,25 @@ from pathlib import Path
 import numpy as np
 
 from models.core.discretisation import Estimate, estimate, estimate_rescaled, reference_size, summed_error
-from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, TOLD_ORDERS
+from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, STEP_ERROR_ORDER
 from models.systems.measured.consequences import samples_as_recording
 from models.systems.measured.section_run import SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
 
 REPEATED_SHARE, LONGEST_REPEAT = 0.2, 30.0
-"""Share of a recording that is run again, in its steps and in half of them: 0.6 of its force calls; and s at most."""
+"""Share of a recording that is run again, in the same steps and in half of them (0.6 of its force calls), and its
+longest duration (s).
+"""
 
 
 def errors_of_steps(
     job: SectionRun, outcome: SectionOutcome, earlier_errors: dict[str, Estimate], folder: Path
 ) -> dict[str, Estimate]:
-    """Errors that the steps cause, by the name of the channel: of the forces of springs, mounts and bars, and of roll
-    and pitch.
+    """Estimate the errors that the time steps cause in forces of springs, mounts and bars, and in roll and pitch;
+    returned by channel name.
 
-    earlier_errors : errors of the virtual measurement by the element's name, which come on top. Raises RunFailed where
-    the stretch, which begins at rest in the middle of the recording, does not end.
+    earlier_errors : errors of the virtual measurement by element name, which are added. Raises RunFailed where the
+    repeated part, which begins at rest in the middle of the recording, fails.
     """
     grid, recording = job.grid, job.recording
     count = round(min(REPEATED_SHARE * recording.duration, LONGEST_REPEAT) / recording.period) + 1
@@ -39,7 +41,7 @@ def errors_of_steps(
     fine = march(replace(middle_job, step=0.5 * grid.step), folder / "half")
     stride, errors = round(coarse.period / fine.period), dict[str, Estimate]()
     for name, element in _principal_channels(job, outcome, bool(earlier_errors)).items():
-        error = estimate(fine.samples(name)[::stride][: coarse.done], coarse.samples(name), TOLD_ORDERS, grid.step)
+        error = estimate(fine.samples(name)[::stride][: coarse.done], coarse.samples(name), STEP_ERROR_ORDER, grid.step)
         scaled = replace(
             error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(job, element)
         )
@@ -51,7 +53,8 @@ def errors_of_steps(
 
 
 def _principal_channels(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
-    """Channels whose error is estimated, each with its element ("" for an angle), without channels that hardly move.
+    """Names of the channels whose error is estimated, each with its element ("" for an angle), without channels that
+    hardly move.
 
     After a virtual measurement roll and pitch are left out: errors of measured moments accumulate in them.
     """

@@ -1,15 +1,19 @@
-"""The vehicle of a recording as a file of its engine."""
+"""Export of the vehicle of a recording's scene as a model file of an engine."""
 
 from models.core.errors import InputError
 from models.engines.export import Exported, ExportSubject
-from models.systems.hub_forces.export import AXES, of_cut
+from models.systems.hub_forces.export import AXES, export_cut_vehicle
 from models.systems.measured.scene import MeasuredScene
 
 
 def exported(scene: MeasuredScene, engine: str) -> Exported:
-    """Export the cut vehicle; InputError for the pitch plane, which a scene of that system exports."""
+    """Export the vehicle without wheels as a model file of "mujoco" or "exudyn". Raises InputError for the pitch plane,
+    which a scene of that system exports.
+    """
     vehicle = scene.rig().vehicle
     if vehicle is None:
         allowed = "is driven in the pitch plane: export a scene of that system with the same parameters"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
-    return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), ["stabiliser of roll and pitch"])
+    return export_cut_vehicle(
+        engine, vehicle, ExportSubject(scene.title, scene.file, AXES), ["stabiliser of roll and pitch"]
+    )

@@ -1,5 +1,4 @@
-"""Results of a recording's run for later users: section forces in files for whoever goes on with them, and the labelled
-result."""
+"""Output of a recording's run: files of section forces for the durability engineer, and the result."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,8 +18,9 @@ from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
 FILE_STEM = "section_forces"
-"""Name of the files that are handed on, before their extensions."""
+"""Name of the files of section forces, before their extensions."""
 COUNTED_FIGURES = {"least": "smallest_load", "greatest": "largest_load", "mean": "mean"}
+"""Channels of the result over the section forces, with the attribute of ``CountedLoad`` for each."""
 
 
 def hand_on(
@@ -31,11 +31,11 @@ def hand_on(
     start: datetime | None = None,
     comment: str = "",
 ) -> list[Path]:
-    """Write forces and moments of a run, or only the channels ``answers``, to a file ``section_forces.EXT`` for every
-    format.
+    """Write section forces and moments of a run, or only the channels ``answers``, to a file ``section_forces.EXT`` for
+    every format.
 
-    Names, units and comments (axes and signs) go along, block by block. Returns the paths; raises InputError where a
-    file exists or a format has no room for a name.
+    The files also have names, units and comments (axes and signs). Returns the paths; raises InputError where a file
+    exists or a format has no room for a name.
     """
     answers = forces(outcome.answers) if answers is None else answers
     names, units, comments = (tuple(getattr(a, key) for a in answers) for key in ("name", "unit", "comment"))
@@ -56,17 +56,17 @@ def hand_on(
 
 
 def forces(answers: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
-    """The channels that are section forces and moments."""
+    """Returns those channels that are section forces and moments."""
     return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
 
 
 def labelled_result(
     scene: Any, outcome: SectionOutcome | None, counted: Mapping[SectionChannel, CountedLoad], folder: Path, **more: Any
 ) -> Result:
-    """The result of a run whose columns lie in ``folder``. Without an outcome it has attributes only.
+    """Returns the result of a run whose samples lie in ``folder``. Without an outcome it has attributes only.
 
-    It has the answers over time, where they are no more than a block, and figures of the section forces that were
-    counted; ``more`` as of ``models.core.result.result``.
+    It has all channels over time, where they are no longer than a block, and statistics and pseudo-damage of the
+    counted section forces; ``more`` : further arguments of ``models.core.result.result``.
     """
     channels, axes = dict[str, Channel](), dict[str, Channel]()
     if outcome is not None:

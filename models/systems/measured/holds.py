@@ -1,4 +1,4 @@
-"""How roll and pitch are held in the runs of a recording: free, and by the stabiliser of its scene, tuned to the stated
+"""Stabilisation of roll and pitch in the runs of a recording: a free run, and the scene's stabiliser tuned to the
 noise."""
 
 import numpy as np
@@ -20,9 +20,9 @@ QUANTITY_OF_NOISE_KEY: dict[str, Quantity] = {
 """Keys of the scene's table ``white_noise``, and the quantities that they are of."""
 
 
-def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:
-    """For each run by name, the way in which roll and pitch are held: free, and by the stabiliser that the scene
-    names.
+def stabilisers_of_runs(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:
+    """Returns the stabiliser settings of each run by name: of the free run, and of the run with the
+    scene's stabiliser.
     """
     settings, deviations = scene.stabilise, noise_of(scene.noise, recording)
     stabilised_hold = {
@@ -34,8 +34,8 @@ def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHo
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
-    """Standard deviations of the noise (SI, by key): as stated, else as estimated but at least those of usual
-    transducers, since filters hide noise.
+    """Standard deviations of the measured noise in SI, by key of [noise]: as stated, else estimated from the recording,
+    but at least those of usual transducers, since filters hide noise.
     """
     deviations = dict[str, float]()
     for key, quantity in QUANTITY_OF_NOISE_KEY.items():

@@ -1,10 +1,10 @@
-"""Inputs of a cut vehicle from a recording: hub forces and angles sample by sample, and as rows at half steps.
+"""Inputs of a vehicle from a recording: hub forces and angles at samples, and interpolated at half steps.
 
 Every number depends on the samples about it alone, never on where a block begins: a run in blocks reads the same bits
 as a run in one piece. Between samples hub forces follow the cubic through the four about it: a straight line takes 1 to
 2 % off the damage of bushes at 500 Hz. Gaps of at most ``LONGEST_BRIDGED_GAP`` s in a hub force are bridged (see
-``gaps``) and told; longer ones are refused. Gaps in angles and rates are the filter's business; before angles are
-enforced they are bridged, too.
+``gaps``) and reported; longer ones are refused. Gaps in angles and rates are left to the filter; before angles are
+enforced their gaps are bridged, too.
 """
 
 from dataclasses import dataclass
@@ -26,13 +26,14 @@ from models.vehicles.cut_vehicle import CutVehicle
 
 ANGLE_SIGNALS = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
 SPLINE_WINDOW, SPLINE_OVERLAP = 4096, 96
-"""Output samples in a window whose spline is made at once, and samples beside it, whose weights are below 1e-30 farther
-off."""
+"""Output samples per window of a spline, and samples on either side that are included; farther samples have weights
+below 1e-30."""
 
 
 @dataclass(frozen=True)
 class StepGrid:
-    """Steps of a run on a recording's clock.
+    """Time steps of a run in relation to the samples of a recording. step : time step (s); period : sampling period
+    (s).
 
     A half step is ``half_step_ratio`` of a sampling period; output samples are ``steps_per_output`` steps and
     ``samples_per_output`` samples of the recording apart.
@@ -48,28 +49,28 @@ class StepGrid:
 
     @property
     def steps_per_output(self) -> int:
-        """Number of steps from one output sample to the next."""
+        """Number of time steps between output samples."""
         return max(round(self.period / self.step), 1)
 
     @property
     def samples_per_output(self) -> int:
-        """Number of samples of the recording from one output sample to the next."""
+        """Number of samples of the recording between output samples."""
         return max(round(self.step / self.period), 1)
 
     def check(self, file: str = "") -> None:
-        """Raise InputError unless one of step and period is a multiple of the other."""
+        """Raise InputError unless the time step is a multiple of the sampling period, or the period of the step."""
         ratio = max(self.step / self.period, self.period / self.step)
         if abs(ratio - round(ratio)) > 1e-9 * ratio:
             fitting = f"must be a part or a multiple of the recording's period of {self.period:g} s"
             raise InputError(file, "run.step", self.step, fitting)
 
     def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
-        """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), by linear interpolation."""
+        """Interpolates ``samples`` (n, columns) linearly at half steps 0 .. count - 1 after the first sample."""
         return interpolate(samples, *self._samples_before(count))
 
     def cubic_rows(self, samples: np.ndarray, count: int) -> np.ndarray:
-        """Rows at half steps 0 .. count - 1 after the second of ``samples`` (n, columns), by the cubic through the two
-        samples before and the two after each."""
+        """Interpolates ``samples`` (n, columns) at half steps 0 .. count - 1 after the second sample, by the cubic
+        through the two samples before and the two after each half step."""
         at, u = self._samples_before(count)
         weights = (
             -u * (u - 1) * (u - 2) / 6,
@@ -80,18 +81,18 @@ class StepGrid:
         return np.asarray(sum(weight[:, None] * samples[at + i] for i, weight in enumerate(weights)))
 
     def _samples_before(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Index of the last sample before each half step, and the fraction of the sampling period since then."""
+        """Index of the last sample at or before each half step, and the fraction of the sampling period since then."""
         numerator, denominator = self.half_step_ratio.numerator, self.half_step_ratio.denominator
         place = np.arange(count) * numerator
         return place // denominator, (place % denominator) / denominator
 
 
 class Inputs:
-    """Hub forces and angles of a recording that drive a run. Signals marked as checks are left out."""
+    """Hub forces and angles of a recording that drive a run; check signals are left out."""
 
     def __init__(self, recording: Recording, vehicle: CutVehicle, enforced: bool = False) -> None:
-        """``enforced`` : whether gaps in the angles are bridged as well. InputError for missing forces, or forces with
-        long gaps.
+        """Read a recording; ``enforced`` : whether gaps in the angles are bridged as well. Raises InputError for
+        missing forces, or forces with long gaps.
         """
         self.recording, self.vehicle, self.findings = recording, vehicle, list[Finding]()
         used: dict[tuple[str, str, str], Signal] = {
@@ -112,29 +113,31 @@ class Inputs:
 
     @property
     def frame(self) -> str:
-        """Frame of the hub forces."""
+        """Frame of the hub forces: "hub", "body" or "inertial"."""
         return next(signal.frame for signal in self.hubs if signal is not None)
 
     @property
     def used_signals(self) -> tuple[Signal, ...]:
-        """Signals that drive or hold the run."""
+        """Signals of hub forces, angles and rates that the run uses."""
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
     def wrenches(self, first: int, count: int) -> np.ndarray:
-        """Hub forces (count, 6 h), N and N m, at samples from ``first`` on; components that were not measured are 0."""
+        """Hub forces and moments (count, 6 h) in N and N m at samples from ``first`` on; components that were not
+        measured are 0.
+        """
         return self._signal_block(self.hubs, first, count, 0.0)
 
     def wrenches_with_neighbours(self, first: int, count: int) -> np.ndarray:
-        """``wrenches`` with one more sample before and two after; beyond an end the recording is mirrored in its end
-        point.
+        """Hub forces as from ``wrenches``, with one more sample before and two after; beyond its ends the recording is
+        mirrored in its end point.
         """
         before, after = max(1 - first, 0), max(first + count + 2 - self.recording.count, 0)
         known = self.wrenches(first - 1 + before, count + 3 - before)
         return np.pad(known, ((before, after), (0, 0)), mode="reflect", reflect_type="odd")
 
     def tilt(self, first: int, count: int) -> np.ndarray:
-        """Roll, pitch and their rates (n, 4), NaN where not measured; rates that gyros measured are converted to rates
-        of the angles.
+        """Measured roll, pitch (rad) and their rates (rad/s), shape (n, 4), NaN where not measured. Gyro rates are
+        converted to rates of the angles.
         """
         tilt = self._signal_block(self.angles, first, count, np.nan)
         if any(signal is not None and signal.frame != "inertial" for signal in self.angles[2:]):
@@ -172,13 +175,15 @@ class Inputs:
             raise InputError("", "files.channels", None, f"{text} {', '.join(sorted(frames))}")
 
 
-class Prescribed:
-    """Roll and pitch to be enforced: smoothed, then interpolated by a quintic spline within fixed windows of
-    samples.
+class PrescribedAngles:
+    """Roll and pitch of a recording that are enforced in a run: smoothed, then interpolated by quintic splines in fixed
+    windows of samples.
     """
 
     def __init__(self, inputs: Inputs, grid: StepGrid, bandwidth: float, file: str = "") -> None:
-        """``bandwidth`` (Hz) : of a low-pass over the whole recording. InputError where an angle is missing."""
+        """Smooth the angles by a low-pass of ``bandwidth`` (Hz) over the recording. Raises InputError where an angle is
+        missing.
+        """
         angles = inputs.tilt(0, inputs.recording.count)[:, :2]
         if not np.isfinite(angles).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
@@ -187,7 +192,9 @@ class Prescribed:
         self._rows_per_window = int(self._window_length / grid.half_step_ratio)
 
     def rows(self, first: int, count: int) -> np.ndarray:
-        """Roll, pitch, their rates and accelerations (count, 6) at half steps after sample ``first``."""
+        """Roll, pitch, their rates and accelerations (count, 6) in rad, rad/s, rad/s^2 at half steps after sample
+        ``first``.
+        """
         first_row, out, done, period = int(first / self.grid.half_step_ratio), np.empty((count, 6)), 0, self.grid.period
         while done < count:
             window, offset = divmod(first_row + done, self._rows_per_window)

@@ -17,8 +17,8 @@ from models.measured.formats import open_source
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 from models.measured.units import quantities_of_unit
 
-LOOKED_AT = 20
-"""Blocks of a group whose values are read for the range: all of a file of twenty minutes at 1 kHz."""
+MOST_BLOCKS_READ = 20
+"""Most blocks of a channel group that are read for the range of values: all of a file of twenty minutes at 1 kHz."""
 SCENE_TEMPLATE = """\
 title = "{title}"
 system = "measured"
@@ -37,9 +37,9 @@ HUB_PATTERNS = {
     "rl": r"rl|lr|hl|lh|rear ?left|left ?rear|hinten ?links|links ?hinten",
     "rr": r"rr|hr|rh|rear ?right|right ?rear|hinten ?rechts|rechts ?hinten",
 }
-"""Hub of r19_free -> what it is called in names."""
+"""Patterns of channel names by hub of the vehicle r19_free."""
 SPRING_OF_HUB = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
-"""Hub -> spring of r19_free."""
+"""Springs of the vehicle r19_free by hub."""
 QUANTITY_PATTERNS: dict[Quantity, str] = {
     "force": r"f[xyz]|force|rad(last|kraft)|kraft|load",
     "moment": r"m[xyz]|moment|torque|drehmoment",
@@ -60,23 +60,22 @@ SUSPENSION_PART_PATTERN = (
     r"\blink\b|stange|(roll|sway|torsion) ?bar|stabi|bush|buchse|ball ?joint|gelenk|sub ?frame|hilfsrahmen|"
     r"lagerung|mount\b|\b(shk|spr|dmp|dmpr|damp|arb|coil|mcpherson|leaf)\b"
 )
-"""Parts of a suspension in names, whose forces are not those of a hub."""
+"""Pattern of suspension parts in channel names, whose forces are not hub forces."""
 WHEEL_PATTERN = r"(mess)?rad(last|kraft)?|wheel(force|load)?|wft|rmr|hub|spindle|naben?(kraft)?|tyre|tire|reifen"
-"""A wheel in names."""
+"""Pattern of wheels in channel names."""
 UNSPECIFIC_PATTERN = (
     r"f|fw|vert(ical)?|dyn(amic)?|stat(ic)?|total|sum|gesamt|measured|meas|gemessen|signal|ch|chan|channel|kanal"
 )
-"""Words that say nothing of where a force is."""
+"""Pattern of words in channel names that do not tell where a force acts."""
 ROTATION_PATTERNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"yaw.*|gier.*|heading|w?z"}
 
 
 @dataclass(frozen=True)
 class ChannelGuess:
-    """Guess at the meaning of a channel. ``unit`` is empty where the file's unit is usable; ``doubt`` names what is
-    uncertain.
+    """Guess at the meaning of a channel from its name and unit. unit : empty where the file's unit is usable; doubt :
+    text on what is uncertain.
 
-    ``at`` is empty where no place can be named. ``left_out`` gives the reason why the guess should not be used
-    unchanged.
+    at : place on the vehicle, empty where unknown; left_out : reason why the guess should not be used unchanged.
     """
 
     channel: str
@@ -89,7 +88,7 @@ class ChannelGuess:
 
 
 def guess_channel(channel: Channel) -> ChannelGuess | None:
-    """Guess the meaning of a channel; None without any clue. Fields of the guess that remain unknown are empty."""
+    """Guess the meaning of a channel from its name and unit; None without any clue. Unknown fields are empty."""
     words, family = _words_of_name(channel.name), _words_of_name(channel.family)
     kinds = quantities_of_unit(channel.unit) or tuple(QUANTITY_PATTERNS)
     what = next(
@@ -128,18 +127,20 @@ def guess_channel(channel: Channel) -> ChannelGuess | None:
 
 
 def _words_of_name(name: str) -> str:
-    """Words of a name in lower case, separated by spaces."""
+    """Words of a channel's name in lower case, separated by spaces."""
     return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
 
 
 def _suspension_words(*texts: str) -> str:
-    """First word in the names of a channel and its group that names a part of a suspension; empty if there is none."""
+    """First word in texts that names a part of a suspension; empty if there is none."""
     matches = (re.search(rf"[^ ]*({SUSPENSION_PART_PATTERN})[^ ]*", text) for text in texts)
     return next((match.group() for match in matches if match), "")
 
 
 def _unexpected_word(words: str) -> str:
-    """First word of a force channel's name that is not known as a corner, a force, a wheel or a filler word."""
+    """First word of a force channel's name that is no known word for a corner, a force or a wheel, and no filler
+    word.
+    """
     for known in (*HUB_PATTERNS.values(), QUANTITY_PATTERNS["force"], WHEEL_PATTERN, UNSPECIFIC_PATTERN):
         words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
     return next((word for word in words.split() if len(word) > 1), "")
@@ -150,10 +151,10 @@ def _has_words(names: str, words: str) -> bool:
 
 
 def describe(path: Path) -> str:
-    """Text on a file: its channels with unit, rate, samples, times and range, remarks of the reader, and a scene with a
-    guessed channel map.
+    """Text on a measurement file: its channels with unit, rate, samples, times and range, findings of the reader, and a
+    scene with a guessed channel map.
 
-    All lines but those of the scene are comments, so that the text is a scene file.
+    All lines except those of the scene are comments, so that the text is a scene file.
 
     Raises InputError for a file that is no measurement.
     """
@@ -181,7 +182,9 @@ def _range_texts(source: Source, names: list[str]) -> dict[str, str]:
     """Text for each channel of a group: rate, number of samples, first and last time, least and largest value."""
     count = next(channel.count for channel in source.channels if channel.name == names[0])
     firsts = (
-        sorted({*range(0, count, max(SAMPLES_PER_BLOCK, -(-count // LOOKED_AT))), max(count - SAMPLES_PER_BLOCK, 0)})
+        sorted(
+            {*range(0, count, max(SAMPLES_PER_BLOCK, -(-count // MOST_BLOCKS_READ))), max(count - SAMPLES_PER_BLOCK, 0)}
+        )
         if count
         else []
     )
@@ -200,13 +203,13 @@ def _range_texts(source: Source, names: list[str]) -> dict[str, str]:
 
 
 def scene_text(source: Source) -> str:
-    """A scene for this file as TOML: entries for guessed channels, comments for the others."""
+    """Returns a draft scene for a measurement file as TOML: entries for guessed channels, comments for the others."""
     rows = [_map_entry(channel.name, guess_channel(channel)) for channel in source.channels]
     return "\n".join([SCENE_TEMPLATE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
 
 
 def _map_entry(name: str, guess: ChannelGuess | None) -> str:
-    """An entry of the channel map, as a comment where anything is missing or uncertain."""
+    """Returns an entry of the channel map as TOML, as a comment where anything is missing or uncertain."""
     if guess is None:
         return f"  # {{ channel = {_toml_string(name)} }},  # not known"
     free = guess.quantity in ("travel", "strain") or bool(guess.left_out and not guess.at)
@@ -224,5 +227,5 @@ def _map_entry(name: str, guess: ChannelGuess | None) -> str:
 
 
 def _toml_string(text: str) -> str:
-    """A text as a TOML string."""
+    """Returns a text as a quoted TOML string."""
     return json.dumps(text, ensure_ascii=False)

@@ -1,4 +1,5 @@
-"""A recording on the pitch-plane vehicle: its vertical wheel forces, summed by axle, drive it; its pitch may hold it.
+"""Run of a recording on the pitch-plane vehicle, driven by its vertical wheel forces summed by axle; the measured pitch
+may stabilise it.
 
 The vehicle, its effects, engines, trust and verdict are those of its scenes (``models.systems.pitch_plane``); the
 recording is handed to them as the files that such scenes read. A recording's pitch is positive nose down (ISO 8855),
@@ -34,19 +35,21 @@ from models.systems.pitch_plane.trust import Trust
 
 CHASSIS_NAME = "chassis"
 LONGEST_STEP = 1e-3
-"""s, the longest step: the fastest pole of the published vehicle needs one below 2.8 ms."""
+"""Longest time step (s): the fastest pole of the published vehicle needs steps below 2.8 ms."""
 UNCHECKED_TEXT = (
     "free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
     "would drive it off unseen"
 )
 EFFECT_OF_HOLD = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
+"""Effects of the pitch-plane system by stabiliser method."""
 SPRING_NAMES = {"f3": "front spring", "f4": "rear spring"}
+"""Names of the suspension forces as sections."""
 
 
 @dataclass(frozen=True)
 class PlaneJob:
-    """Job for a run in the pitch plane. parameters : name of a set, or of a TOML file; hold : as in ``section_run``;
-    step : s.
+    """Settings of a recording's run in the pitch plane. parameters : name of a parameter set, or of a TOML file; hold :
+    stabiliser of the pitch; step : time step (s).
     """
 
     recording: Recording
@@ -58,15 +61,13 @@ class PlaneJob:
 
     @property
     def effect(self) -> str | None:
-        """Name of the effect that holds the pitch; None for a free run."""
+        """Name of the effect that stabilises the pitch; None for a free run."""
         return EFFECT_OF_HOLD.get(self.hold.method)
 
 
 @dataclass(frozen=True)
 class PlaneRun:
-    """A run in the pitch plane: its result, the predicted limits of trust, the verdict, and section forces as
-    ``section_run`` gives them.
-    """
+    """A run in the pitch plane: its result, the predicted time of trust, the verdict, and the section forces."""
 
     result: Result
     trust: Trust | None
@@ -75,9 +76,10 @@ class PlaneRun:
 
 
 def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool = False) -> PlaneRun:
-    """Write the files of a scene into a new folder, and run it; raises InputError, Refused, RunFailed.
+    """Run a recording on the pitch-plane vehicle; files of its scene are written into a new folder. Raises InputError,
+    Refused or RunFailed.
 
-    error : whether the error of the steps is estimated, by further runs.
+    error : whether the error of the time steps is estimated, by further runs.
     """
     folder.mkdir(parents=True)
     scene, said = scene_of(job, folder)
@@ -93,15 +95,14 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
         figures, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
     )
     if job.effect is None and verdict.word == "accepted":
-        verdict = _beside_pitch(job, result, limits or Limits(), verdict)
+        verdict = _verdict_with_measured_pitch(job, result, limits or Limits(), verdict)
     return PlaneRun(result, limited, verdict, _section_outcome(result, said, folder))
 
 
-def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
-    """The verdict on a free run that ends before noise drives it off, after its pitch is compared with the measured
-    pitch.
+def _verdict_with_measured_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
+    """Returns the verdict on an accepted free run after its pitch is compared with the measured pitch.
 
-    Where forces turn with the vehicle no error grows, but offsets and forces in another frame still drive it off, and
+    Where forces turn with the vehicle no error grows, but offsets and forces in another frame still make it drift, and
     its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
     angles = job.recording.find("angle", CHASSIS_NAME, "pitch")
@@ -118,14 +119,16 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
 
 
 def _force_frames(job: PlaneJob) -> set[str]:
-    """Frames of the forces at both axles."""
+    """Frames ("inertial", "body" or "hub") of the vertical forces at both axles."""
     return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(job.recording, axle)}
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
-    """A pitch-plane scene of the recording, whose files are written into the folder, and findings on bridged gaps."""
+    """Returns a pitch-plane scene of a recording, whose files are written into the folder, and findings on bridged
+    gaps.
+    """
     period, said, frames = job.recording.period, list[Finding](), _force_frames(job)
-    forces = {axle: ("N", _axle(job, axle, said)) for axle in FORCE_PLACES}
+    forces = {axle: ("N", _axle_force(job, axle, said)) for axle in FORCE_PLACES}
     write_time_series(folder / "wheel_forces.csv", forces, period)
     if "inertial" in frames and len(frames) > 1:
         text = "vertical forces must all keep their direction in space, or all turn with the vehicle"
@@ -153,19 +156,21 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
 
 
 def trusted_time(scene: Scene, deviation: float) -> Trust | None:
-    """Time for which a scene's run can be trusted when its forces have noise of this standard deviation (N); None where
-    the pitch is held to a measured pitch.
+    """Predict how long a pitch-plane scene's run can be trusted, under force noise of standard deviation ``deviation``
+    (N); None where the pitch is stabilised.
     """
     assembly = assembly_of_scene(scene)
     bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
         return bounds
-    noise = drift_trust.noise(assembly, deviation).passing_time(bounds.angle)
+    noise = drift_trust.noise_error_curve(assembly, deviation).passing_time(bounds.angle)
     return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
 
 
-def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
-    """Vertical force (n,) of an axle with short gaps bridged; InputError for a long gap or a missing wheel."""
+def _axle_force(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
+    """Vertical force (n,) of an axle in N with short gaps bridged. Raises InputError for a long gap
+    or a missing wheel.
+    """
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
         axle_place, left, right = map(repr, FORCE_PLACES[axle])
@@ -181,7 +186,9 @@ def _samples_without_gaps(job: PlaneJob, signal: Signal, all_findings: list[Find
 
 
 def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any]:
-    """The table of the effect that holds the pitch; the measured pitch and rate, nose up, are written into a file."""
+    """Returns the scene table of the effect that stabilises the pitch, and writes the measured pitch and rate, nose up,
+    to a file.
+    """
     hold, filtered = job.hold, job.hold.method == "kalman"
     columns, deviations = dict[str, tuple[str, np.ndarray]](), dict[str, float]()
     known = (
@@ -202,7 +209,9 @@ def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> d
 
 
 def _section_outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> SectionOutcome:
-    """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
+    """Returns section forces in body axes (x forward, z up) and pitch (positive nose down) of a pitch-plane result as a
+    ``SectionOutcome``.
+    """
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
     channels = dict[SectionChannel, np.ndarray]()
     for name, spring in SPRING_NAMES.items():

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.finding import finding_lines as told_of
+from models.core.finding import finding_lines as finding_texts
 from models.core.scene_effects import effect_lines as effect_lines
 from models.measured.channel import Source
 from models.measured.formats import open_source
@@ -21,7 +21,9 @@ MISSING_FORCE_TEXT = "no vertical force is mapped at {}: without it the vehicle 
 
 
 def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
-    """Everything that can be refused before a run is refused here, before any file is written."""
+    """Raise InputError, before any file is written, for wrong engines, vehicles, files, channel maps or virtual
+    measurements.
+    """
     if len(engines) != 1:
         raise InputError("--engine", "", "all", "a recording is run in one engine: name one, or leave it out")
     rig = scene.rig()
@@ -33,12 +35,14 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
 
 
 def opened_files(scene: MeasuredScene) -> tuple[Source, ...]:
-    """The scene's files, opened; raises InputError."""
+    """Opens the measurement files of a scene; raises InputError."""
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 
 def signals_of_files(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
-    """Signals of all files. InputError also where a wheel has no vertical force, or the stabiliser no angles."""
+    """Returns the signals of all mapped channels. Raises InputError also where a wheel has no vertical force, or the
+    stabiliser no angles.
+    """
     signals, method = mapped_signals(scene, sources, rig.places), scene.stabilise.method
     driving = {(s.quantity, s.at, s.component) for s in signals if not s.check}
     for hub in rig.hubs if rig.vehicle else ():
@@ -72,7 +76,9 @@ def _check_names(scene: MeasuredScene, rig: Rig) -> None:
 
 
 def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
-    """Doubts about implausible parameters of the vehicle; doubts about the recording are found by its study."""
+    """Returns doubts about implausible parameters of the vehicle; the study of the recording reports those about the
+    measurement.
+    """
     accept, plane = scene.vehicle.accept, scene.plane()
     if plane is not None:
         return plausible_plane(plane, accept)
@@ -81,18 +87,22 @@ def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
 
 
 def describe(scene: MeasuredScene) -> str:
-    """The scene's plan as text."""
+    """Returns the plan of a recording's scene as text: vehicle, files and channels, runs, output files, assumptions."""
     rig = scene.rig()
     _check_names(scene, rig)
     size = f"{rig.vehicle.size} freedoms, cut at {', '.join(rig.hubs)}" if rig.vehicle else "the pitch plane"
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("vehicle", f"{rig.name}: {size}")]
+    lines = [
+        scene.title,
+        _plan_line("scene", f"{scene.file}, study {scene.study}"),
+        _plan_line("vehicle", f"{rig.name}: {size}"),
+    ]
     virtual, stabilised, handed_on = scene.virtual, scene.stabilise, scene.hand_on
     if virtual is None:
         lines += _file_lines(scene, rig)
     else:
         road = f"{virtual.duration:g} s on ISO 8608 class {virtual.road.iso8608} at {virtual.road.speed:g} m/s"
         text = f"virtually: {road}, {virtual.sampling_rate:g} Hz, as {virtual.format} and back"
-        lines.append(_line("measured", text))
+        lines.append(_plan_line("measured", text))
     text_of_method = {
         "kalman": f"Kalman filter of roll and pitch, a moment towards it of {stabilised.bandwidth:g} Hz",
         "prescribed": f"measured roll and pitch enforced, smoothed at {stabilised.smoothing:g} Hz",
@@ -103,28 +113,30 @@ def describe(scene: MeasuredScene) -> str:
         ", ".join(f"{each:g}" for each in handed_on.slopes),
     )
     lines += [
-        _line("runs", f"free, and held by: {text_of_method[stabilised.method]}; {scene.run.engine}"),
-        _line("hand on", f"{sections}; as {', '.join(handed_on.formats)}; damage of slopes {slopes}"),
+        _plan_line("runs", f"free, and held by: {text_of_method[stabilised.method]}; {scene.run.engine}"),
+        _plan_line("hand on", f"{sections}; as {', '.join(handed_on.formats)}; damage of slopes {slopes}"),
     ]
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])
 
 
 def _file_lines(scene: MeasuredScene, rig: Rig) -> list[str]:
-    """Lines on every file and its channels, as these will be read."""
+    """Lines of text on every measurement file and its mapped channels: quantity, place, axes, factor to SI."""
     sources, lines = opened_files(scene), list[str]()
     signals = signals_of_files(scene, sources, rig)
     for source in sources:
         began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
-        lines.append(_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))
+        lines.append(_plan_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))
         for s in (s for s in signals if s.file == source.path.name):
             what = f"{s.quantity} {s.component}".strip()
             sign, use = "-" if s.sign < 0 else "", ", only compared with" if s.check else ""
             lines.append(
-                _line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x [{s.unit}]{use}")
+                _plan_line(
+                    "", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x [{s.unit}]{use}"
+                )
             )
-        lines += told_of(source.findings)
+        lines += finding_texts(source.findings)
     return lines
 
 
-def _line(label: str, text: str) -> str:
+def _plan_line(label: str, text: str) -> str:
     return f"  {label:<10} {text}"

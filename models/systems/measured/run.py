@@ -1,7 +1,7 @@
-"""A scene of a recording, run: its files on one clock, checked, run free and held, judged, handed on.
+"""Runs of a recording's scene: resampling, checks, a free and a stabilised run, verdicts, and files of section forces.
 
-Whoever runs such a scene does so here. Samples lie on disk in columns, read block by block. A result holds those of the
-run that is handed on as far as they are a block, figures of every section force, and the place of the columns.
+Samples lie on disk in columns, read block by block. A result has the samples of the chosen run if they are no longer
+than a block, figures of every section force, and the path of the columns.
 """
 
 import json
@@ -36,7 +36,7 @@ from models.systems.measured.consequences import Consequence, consequences
 from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
 from models.systems.measured.hand_on import FILE_STEM, forces, hand_on, labelled_result
-from models.systems.measured.holds import FREE_RUN, QUANTITY_OF_NOISE_KEY, holds_of
+from models.systems.measured.holds import FREE_RUN, QUANTITY_OF_NOISE_KEY, stabilisers_of_runs
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as run_plane
 from models.systems.measured.plan import opened_files, signals_of_files
@@ -45,23 +45,23 @@ from models.systems.measured.section_run import AttitudeHold, SectionOutcome, Se
 from models.systems.measured.section_run import check as check_run
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import SectionChannel, Sections, accelerometer_points
-from models.systems.measured.trust import Drift, Level, predicted_drift
+from models.systems.measured.trust import Drift, MeasurementErrors, predicted_drift
 from models.systems.measured.verdict import ChannelComparison, channels_to_compare, compare, filter_doubts, judge
 from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
 from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
 from models.vehicles.cut_vehicle import CutVehicle
 
 WORK_FOLDER = "work"
-"""Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
+"""Folder from which an interrupted run is resumed: resampled recording, and runs with their checkpoints."""
 
 
 @dataclass
 class Examination:
-    """Everything that is computed for a recording, in the order of computation; what was not reached is empty.
+    """Everything that is computed for a recording, in the order of computation; fields that were not reached are empty.
 
-    scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
-    seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
-    temporary_folder : where all of it lies, None in a user's folder.
+    scene : scene that reads the files, also of a virtual measurement; holds : stabiliser of each run, by name;
+    seconds : of each stage; plane : result of the chosen run in the pitch plane; counted : section forces that are
+    written, with their cycle counts; temporary_folder : folder of all files, None in a user's folder.
     """
 
     scene: MeasuredScene
@@ -79,48 +79,48 @@ class Examination:
     channel_comparisons: tuple[ChannelComparison, ...] = ()
     plane: Result | None = None
     counted: dict[SectionChannel, CountedLoad] = field(default_factory=dict)
-    handed_files: tuple[Path, ...] = ()
+    written_files: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     temporary_folder: "TemporaryDirectory[str] | None" = None
 
     @cached_property
     def evidence(self) -> Evidence:
-        """The evidence that the checks of the recording examine."""
+        """Recording, vehicle and stated noise in the form that the checks of recordings take."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in QUANTITY_OF_NOISE_KEY.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
         return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
 
     @property
-    def is_stopped(self) -> bool:
-        """Whether the recording has an error because of which no run is made."""
+    def has_error_findings(self) -> bool:
+        """Whether the recording has a finding of weight "error", so that no run is made."""
         return any(finding.weight == "error" for finding in self.findings)
 
     @property
     def chosen_run(self) -> str:
-        """Name of the run that is handed on: with the stabiliser, or free where the scene names none."""
+        """Name of the run whose section forces are written to files: stabilised, or free without a stabiliser."""
         return [*self.holds][-1]
 
     @property
     def outcome(self) -> SectionOutcome | None:
-        """The outcome of the run that is handed on; None where no run was made."""
+        """The outcome of the chosen run; None where no run was made."""
         return self.runs.get(self.chosen_run)
 
-    def put_in(self, signal: Signal) -> bool:
-        """Whether a signal drives or holds the vehicle; other signals are only compared with the run."""
+    def is_input(self, signal: Signal) -> bool:
+        """Whether a signal is an input of the chosen run; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
         return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN))
 
     def forces(self, outcome: SectionOutcome) -> list[SectionChannel]:
-        """Section forces and moments of a run at the sections that the scene names, or at all sections if it names
-        none.
+        """Channels of section forces and moments of a run at the scene's sections, or at all sections if the scene
+        names none.
         """
         wanted = self.scene.hand_on.sections
         return [answer for answer in forces(outcome.answers) if wanted is None or answer.section in wanted]
 
     def job(self, name: str, recording: Recording | None = None) -> SectionRun | PlaneJob:
-        """The job for a run of this name, or for another recording with roll and pitch held in the same way. It gives
-        forces at all sections in the chassis' axes, and accelerations at accelerometers.
+        """Returns the settings of a run by its name, also for another recording. The run computes forces at all
+        sections in axes of the chassis, and accelerations at accelerometers.
         """
         recording, vehicle = recording or self.recording, self.rig.vehicle
         settings = self.engine, self.holds[name], self.scene.run.step, self.scene.file
@@ -132,8 +132,8 @@ class Examination:
     def march(
         self, name: str, folder: Path, progress: Callable[[float, float], None] = no_progress, error: bool = False
     ) -> SectionOutcome:
-        """Make the run of this name, or complete the one in a folder. In the pitch plane ``error`` requests its
-        error.
+        """Make a run by its name, or complete the run in a folder. error : whether the error of a run in the pitch
+        plane is estimated.
         """
         job = self.job(name)
         if isinstance(job, SectionRun):
@@ -146,7 +146,7 @@ class Examination:
         return run.outcome
 
     def rerun(self, name: str, recording: Recording, folder: Path) -> SectionOutcome:
-        """Run another recording, with roll and pitch held as in the run of this name."""
+        """Run another recording with the stabiliser of a run, given by its name."""
         job = self.job(name, recording)
         return march(job, folder / "run") if isinstance(job, SectionRun) else run_plane(job, folder / "run").outcome
 
@@ -159,16 +159,16 @@ def run(
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
-    """Run a recording with roll and pitch held as the scene says; the result's detail is the Examination.
+    """Run a recording with the scene's stabiliser; the result's detail is the Examination.
 
-    folder : where samples are kept, so that an interrupted run can continue; without one they live as long as the
-    detail. whole_run : whether the recording is also checked, run free and judged, and files are handed on. error :
-    whether the error of the steps is estimated, by further runs. Raises InputError for files that cannot be read. If a
-    whole run fails, its detail has the reason; another run raises RunFailed.
+    folder : folder of all samples, from which an interrupted run is resumed; without a folder they live as long as the
+    detail. whole_run : whether the recording is also checked, run free and judged, and section forces are written to
+    files. error : whether the error of the time steps is estimated, by further runs. Raises InputError for files that
+    cannot be read. If a run fails with whole_run, the detail has the reason; otherwise RunFailed is raised.
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
-    exam = _begun_examination(scene, engine or scene.run.engine, folder, progress, error)
+    exam = _start_examination(scene, engine or scene.run.engine, folder, progress, error)
     exam.temporary_folder = temporary
     if whole_run:
         _examine(exam, folder, progress, error)
@@ -176,7 +176,7 @@ def run(
         begun = time.process_time()
         exam.runs[exam.chosen_run] = exam.march(exam.chosen_run, folder / WORK_FOLDER / exam.chosen_run, error=error)
         exam.seconds["march"] = time.process_time() - begun
-    labelled = _judged_by_assumptions(_labelled_result(scene, exam, folder), exam)
+    labelled = _with_assumptions(_labelled_result(scene, exam, folder), exam)
     try:
         return _with_error(labelled, exam, folder / WORK_FOLDER / "error") if error else labelled
     except RunFailed as failure:
@@ -188,9 +188,9 @@ def run(
         return labelled
 
 
-def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
-    """The result with its assumptions and those that are broken; in the pitch plane together with those that its own
-    run states.
+def _with_assumptions(run: Result, examination: Examination) -> Result:
+    """Returns the result with its assumptions and the broken ones; in the pitch plane together with the assumptions of
+    the pitch-plane run.
     """
     if examination.outcome is None:
         return run
@@ -205,7 +205,7 @@ def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
 
 
 def _with_error(run: Result, examination: Examination, work: Path) -> Result:
-    """The result with the error of the steps of the run that is handed on."""
+    """Returns the result with the errors of the time steps of the chosen run."""
     job, outcome = examination.job(examination.chosen_run), examination.outcome
     if outcome is None or not isinstance(job, SectionRun):
         return run
@@ -219,10 +219,8 @@ def _with_error(run: Result, examination: Examination, work: Path) -> Result:
     return with_stated_errors(run, errors, "a part from the middle, in its steps and in half of them")
 
 
-def _begun_examination(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
-    """Start an examination: bring the recording onto one clock, from the scene's files or from those of a virtual
-    measurement.
-    """
+def _start_examination(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
+    """Start an examination: resample the recording from the scene's files, or from those of a virtual measurement."""
     rig, virtual, seconds, start_time = scene.rig(), None, dict[str, float](), time.perf_counter()
     (folder / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
@@ -233,37 +231,39 @@ def _begun_examination(scene: MeasuredScene, engine: str, folder: Path, progress
         scene = load(folder / "scene.toml")
         seconds["virtual measurement"] = time.perf_counter() - start_time
     recording = read_files(scene, folder / WORK_FOLDER, lambda text, part: progress(text, 0.2 * part))
-    exam = Examination(scene, rig, engine, recording, virtual, holds_of(scene, recording), seconds=seconds)
+    exam = Examination(scene, rig, engine, recording, virtual, stabilisers_of_runs(scene, recording), seconds=seconds)
     _record_seconds(exam, "reading", start_time)
     return exam
 
 
 def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
-    """The files of a scene as a recording on one clock, with columns in a folder; InputError for unusable files."""
+    """Reads the files of a scene as a recording with common sample times, stored in a folder. Raises InputError for
+    unusable files.
+    """
     sources, rig = opened_files(scene), scene.rig()
     return record_on_clock(scene, sources, signals_of_files(scene, sources, rig), rig.hubs, folder, progress)
 
 
 def _record_seconds(examination: Examination, stage: str, start_time: float) -> None:
-    """Record the seconds of a stage that has ended: time since ``start_time`` less that of the earlier stages."""
+    """Record the seconds of a stage that has ended: time since ``start_time`` less the seconds of earlier stages."""
     examination.seconds[stage] = time.perf_counter() - start_time - sum(examination.seconds.values())
 
 
 def _examine(examination: Examination, folder: Path, progress: Progress, error: bool) -> None:
-    """Check the recording, predict its drift, run it, judge the runs and hand on forces, as far as the recording can be
-    used.
+    """Check the recording, predict the drift, make the runs, judge them, and write section forces to files; stops after
+    the checks if these find an error.
     """
     lap = partial(_record_seconds, examination, start_time=time.perf_counter() - sum(examination.seconds.values()))
     progress("checks", 0.2)
     examination.findings = findings_of_all_checks(examination.evidence)
     lap("checks")
-    if examination.is_stopped:
+    if examination.has_error_findings:
         return
     if examination.rig.vehicle is not None:
         _predict_drift(examination, examination.rig.vehicle)
-    _run(examination, folder / WORK_FOLDER, progress, error)
+    _make_runs(examination, folder / WORK_FOLDER, progress, error)
     if examination.rig.vehicle is not None:
-        _with_verdicts(examination)
+        _add_verdicts(examination)
     lap("runs")
     if examination.outcome is not None:
         named = {(finding.check, finding.signals, finding.place) for finding in examination.findings}
@@ -272,7 +272,7 @@ def _examine(examination: Examination, folder: Path, progress: Progress, error: 
         )
         examination.findings += filter_doubts(examination.outcome)
     progress("what the findings do", 0.9)
-    _with_consequences(examination, folder / WORK_FOLDER)
+    _add_consequences(examination, folder / WORK_FOLDER)
     lap("what the findings do")
     if examination.outcome is not None:
         progress("files", 0.95)
@@ -281,8 +281,8 @@ def _examine(examination: Examination, folder: Path, progress: Progress, error: 
 
 
 def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
-    """Predict the drift of the free run, which begins level and at rest: from noise, from moments that the motion
-    contradicts, and from the measured initial tilt and rates.
+    """Predict the drift of the free run, which begins level and at rest: from noise, from mean moments that contradict
+    the motion, and from the measured initial tilt and rates.
     """
     recording, free = examination.recording, examination.holds[FREE_RUN]
     tilt, rate = (
@@ -292,7 +292,7 @@ def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
     couple = mean_hub_moments(examination.evidence)  # that the motion does not bear out, at the first hub
     bias = np.concatenate([np.zeros(3), couple, np.zeros(WRENCH * len(vehicle.hubs) - 5)]) if couple.any() else None
     frame = next(s.frame for s in recording.signals if s.at in vehicle.hubs)
-    level = Level(free.force, free.moment, bias, tilt, rate)
+    level = MeasurementErrors(free.force, free.moment, bias, tilt, rate)
     examination.drift = predicted_drift(vehicle, level, recording.period, recording.duration, frame)
     lacking = examination.evidence.missing_data_text
     unchecked_text = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
@@ -303,15 +303,15 @@ def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
 
 
 def _initial_value(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
-    """Mean (rad, rad/s) of an angle or a rate over its first tenth of a second; 0 where it is not measured."""
+    """Mean of an angle (rad) or a rate (rad/s) over the first 0.1 s of a recording; 0 where it is not measured."""
     for signal in recording.find(quantity, chassis, axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
         return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
     return 0.0
 
 
-def _run(examination: Examination, work: Path, progress: Progress, error: bool) -> None:
-    """Run the vehicle free, and with the stabiliser of the scene; a run that fails keeps its samples up to the
+def _make_runs(examination: Examination, work: Path, progress: Progress, error: bool) -> None:
+    """Make the free run and the run with the scene's stabiliser; a run that fails keeps its samples up to the
     failure."""
     for name in examination.holds:
         if isinstance(job := examination.job(name), SectionRun):
@@ -334,7 +334,7 @@ def _run(examination: Examination, work: Path, progress: Progress, error: bool) 
 
 
 def _with_time_left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
-    """Progress callback of a run that adds an estimate of the remaining time."""
+    """Returns a progress callback of a run that adds an estimate of the remaining time."""
     started, first = time.monotonic(), [-1.0]
 
     def report(completed: float, total: float) -> None:
@@ -348,8 +348,8 @@ def _with_time_left(name: str, progress: Progress, begin: float, share: float) -
     return report
 
 
-def _with_verdicts(examination: Examination) -> None:
-    """Compare check channels with the run that is handed on, and judge every run."""
+def _add_verdicts(examination: Examination) -> None:
+    """Compare measured check channels with the chosen run, and judge every run."""
     assert examination.drift is not None
     recording, slopes = examination.recording, tuple(examination.scene.hand_on.slopes)
     for name, outcome in examination.runs.items():
@@ -368,9 +368,9 @@ def _with_verdicts(examination: Examination) -> None:
             examination.channel_comparisons = comparisons
 
 
-def _with_consequences(examination: Examination, work: Path) -> None:
-    """Compute how each finding changes the section forces, and revise the verdicts. The run with the stabiliser is
-    used, or the free run where that failed.
+def _add_consequences(examination: Examination, work: Path) -> None:
+    """Compute the effect of each finding on the section forces, and revise the verdicts. The chosen run is used, or the
+    free run where the chosen run failed.
     """
     name = (
         examination.chosen_run
@@ -389,13 +389,13 @@ def _with_consequences(examination: Examination, work: Path) -> None:
 
 
 def _save_section_forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> None:
-    """Count the cycles of the section forces, and write these in every format that the scene names. Existing files of
-    an interrupted run are kept.
+    """Count the cycles of the section forces, and write the forces in every format of the scene. Existing files of an
+    interrupted run are kept.
     """
     answers, settings = examination.forces(outcome), examination.scene.hand_on
     examination.counted = {answer: counted_load(outcome.samples(answer), tuple(settings.slopes)) for answer in answers}
-    examination.handed_files = tuple(folder / f"{FILE_STEM}.{form}" for form in settings.formats)
-    formats = [path.suffix[1:] for path in examination.handed_files if not path.exists()]
+    examination.written_files = tuple(folder / f"{FILE_STEM}.{form}" for form in settings.formats)
+    formats = [path.suffix[1:] for path in examination.written_files if not path.exists()]
     comment = (
         f"{examination.scene.title}; computed from wheel forces, {examination.chosen_run} run, {examination.engine}"
     )
@@ -403,7 +403,7 @@ def _save_section_forces(examination: Examination, outcome: SectionOutcome, fold
 
 
 def _labelled_result(scene: MeasuredScene, examination: Examination, folder: Path) -> Result:
-    """The result of a scene, whose detail is its examination."""
+    """Returns the result of a recording's scene; its detail is the examination."""
     return labelled_result(
         scene,
         examination.outcome,
@@ -419,6 +419,6 @@ def _labelled_result(scene: MeasuredScene, examination: Examination, folder: Pat
 
 
 def _endings_of_runs(examination: Examination) -> dict[str, str]:
-    """Verdicts on the runs and reasons of failures, as attributes of the result."""
+    """Verdicts on the runs and reasons of failures as JSON texts, for the attributes of the result."""
     verdicts = {name: [verdict.word, verdict.reason] for name, verdict in examination.verdicts.items()}
     return {"verdicts": json.dumps(verdicts), "failed": json.dumps(examination.failed)}

@@ -1,4 +1,4 @@
-"""Scenes of an engineer's own measurements: files and their channel map, vehicle, stabiliser, what is handed on."""
+"""Scenes of measured recordings: files and their channel map, vehicle, stabiliser, and output of section forces."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ Engine = Literal["reference", "exudyn", "mujoco"]
 
 @dataclass(frozen=True)
 class Rig:
-    """The vehicle that a recording drives, and the places of its sensors and sections.
+    """The vehicle that a recording drives, with the places of its sensors and sections.
 
-    name : of the vehicle or the parameter set; chassis : body whose angles are measured; sections : those at which
-    forces can be requested; angles : components of the measured angles; vehicle : cut at its wheels, None in the pitch
-    plane.
+    name : of the vehicle or the parameter set; chassis : body whose angles are measured; sections : names of sections
+    at which forces can be requested; angles : components of the measured angles; vehicle : without wheels, None in the
+    pitch plane.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Rig:
 
 
 class Vehicle(Strict):
-    """[vehicle]: a vehicle file and the body that the others ride on, or a parameter set of the pitch plane."""
+    """[vehicle]: a vehicle file and the name of its chassis, or a parameter set of the pitch-plane vehicle."""
 
     file: str | None = Field(
         default=None, description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
@@ -60,7 +60,7 @@ class Vehicle(Strict):
 
 
 class MappedChannel(Strict):
-    """One of [[files.channels]]: what a channel of the file measures."""
+    """[[files.channels]]: quantity, place, component, axes and unit of a channel of the file."""
 
     channel: str = Field(description="name in the file")
     quantity: Quantity = Field(description="what it measures")
@@ -75,7 +75,7 @@ class MappedChannel(Strict):
 
 
 class MeasuredFile(Strict):
-    """One of [[files]]: CSV, MDF4, RPC III or TDMS."""
+    """[[files]]: a measurement file (CSV, MDF4, RPC III or TDMS), its clock and its channel map."""
 
     file: str = Field(description="the file, beside the scene")
     offset: float = quantity("s", "added to its clock", default=0.0, signed=True)
@@ -84,14 +84,14 @@ class MeasuredFile(Strict):
 
 
 class Sensor(Strict):
-    """[sensors.NAME]: where an accelerometer or gyro sits."""
+    """[sensors.NAME]: body and position of an accelerometer or gyro."""
 
     body: str = Field(description="that carries it")
     position: list[float] = Field(min_length=3, max_length=3, description="x, y, z in m, in the vehicle's design axes")
 
 
 class Clock(Strict):
-    """[clock]: of the recording; without it that of the wheel forces."""
+    """[clock]: sampling rate, start and duration of the recording; by default those of the wheel forces."""
 
     rate: float | None = quantity("Hz", "samples per second of the recording", default=None)
     start: float = quantity("s", "left out at the beginning", default=0.0, zero=True)
@@ -99,7 +99,7 @@ class Clock(Strict):
 
 
 class Deviations(Strict):
-    """[noise]: standard deviation of the white noise on each sample; what is not named is estimated by the checks."""
+    """[noise]: standard deviations of the white noise on each sample; estimated from the recording where not given."""
 
     force: float | None = quantity("N", "of every force sample", default=None)
     moment: float | None = quantity("N m", "of every moment sample", default=None)
@@ -107,8 +107,8 @@ class Deviations(Strict):
     rate: float | None = quantity("rad/s", "of every angular rate", default=None)
 
 
-class Stabilise(Strict):
-    """[stabilise]: how roll and pitch are held."""
+class Stabiliser(Strict):
+    """[stabilise]: method by which roll and pitch are kept from drifting off, and its settings."""
 
     method: Literal["kalman", "prescribed", "none"] = Field(default="kalman", description="what holds roll and pitch")
     bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
@@ -117,14 +117,14 @@ class Stabilise(Strict):
 
 
 class Run(Strict):
-    """[run]."""
+    """[run]: engine and time step of the runs."""
 
     engine: Engine = Field(default="mujoco", description="that computes it; --engine names another")
     step: float | None = quantity("s", "of Runge-Kutta 4; else the clock's period, or a part of it", default=None)
 
 
 class HandOn(Strict):
-    """[hand_on]: what the fatigue group gets."""
+    """[hand_on]: sections, file formats and Woehler exponents of the section forces that are written to files."""
 
     sections: list[str] | None = Field(default=None, description="springs, mounts, bars, joints; all if not named")
     formats: list[Literal["csv", "mf4", "rsp", "tdms"]] = Field(default=["csv"], description="of the section forces")
@@ -132,7 +132,7 @@ class HandOn(Strict):
 
 
 class MeasuredScene(SceneFile):
-    """One scene of a recording."""
+    """A scene of a measured recording: all tables of its scene file."""
 
     system: Literal["measured"] = "measured"
     study: str = Field(default="recording", description="the study that runs the scene")
@@ -147,15 +147,15 @@ class MeasuredScene(SceneFile):
     sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
     clock: Clock = Clock()
     noise: Deviations = Deviations()
-    stabilise: Stabilise = Stabilise()
+    stabilise: Stabiliser = Stabiliser()
     run: Run = Run()
     limits: Limits = Field(default=RUN_LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def rig(self) -> Rig:
-        """The vehicle that the recording drives. The pitch plane is driven at its axles or at the wheels of each axle.
-        Raises InputError.
+        """Returns the vehicle that the recording drives, with its places. The pitch plane is driven at its axles or at
+        the wheels of each axle. Raises InputError.
         """
         given_vehicle = self.vehicle
         if given_vehicle.file is None:
@@ -169,20 +169,22 @@ class MeasuredScene(SceneFile):
 
     @property
     def places(self) -> dict[str, TransducerPlace]:
-        """Places of the sensors by name."""
+        """Body and position of each sensor, by name."""
         return {
             name: TransducerPlace(s.body, (s.position[0], s.position[1], s.position[2]))
             for name, s in self.sensors.items()
         }
 
     def plane(self) -> Parameters | None:
-        """Parameters of the vehicle if it is one in the pitch plane, None for a vehicle in space; raises InputError."""
+        """Returns the parameters of a pitch-plane vehicle, None for a vehicle in space; raises InputError."""
         parameters = self.vehicle.parameters
         return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked scene of a recording from the nested tables of a scene file. Raises InputError for unknown keys
+    and for values outside their ranges.
+    """
     scene = checked(MeasuredScene, table, file, folder)
     vehicle, names = scene.vehicle, [each.file for each in scene.files]
     if (vehicle.file is None) == (vehicle.parameters is None):

@@ -1,7 +1,7 @@
-"""The run of a recording: a cut vehicle marched block by block, each ending in a checkpoint from which it goes on.
+"""Run of a recording on a spatial vehicle without wheels, block by block; each block ends with a checkpoint.
 
-Only a block is in memory. The state goes from block to block as it is, the stabiliser's filter with it, and inputs are
-read alike whatever the block: a run in blocks, or resumed after any interruption, has the bits of a run in one piece.
+Only a block is in memory. The state and the stabiliser's filter are passed from block to block, and inputs do not
+depend on the blocks: a run in blocks, or resumed after an interruption, equals a run in one piece to the last bit.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
-from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
+from models.systems.measured.inputs import Inputs, PrescribedAngles, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid_vehicle
 
@@ -33,20 +33,22 @@ if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import TiltFilter
 
 CHECKPOINT_INTERVAL = 60.0
-"""s of recording between two checkpoints."""
+"""Time (s) of the recording between checkpoints."""
 PULL_DAMPING = 0.7
-"""Of the moment towards the filter's estimate, of the critical one."""
+"""Damping ratio of the moment towards the filter's estimate."""
 STIFFEST_PULL = 0.1
-"""Bandwidth of the pull by the rate of the steps: a stiffer one outruns Runge-Kutta 4."""
+"""Largest bandwidth of the moment towards the filter's estimate, divided by the rate of the time steps; beyond,
+Runge-Kutta 4 becomes inaccurate.
+"""
 Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
 class AttitudeHold:
-    """Way in which roll and pitch are held; bandwidth (Hz), model (rad/s^2) and smoothing (Hz) as in the scene's table
-    ``stabilise``.
+    """Stabiliser of roll and pitch in a run; bandwidth (Hz), model (rad/s^2) and smoothing (Hz) as in the scene's table
+    [stabilise].
 
-    Standard deviations of the noise of samples: force (N), moment (N m), angle (rad), rate (rad/s).
+    force (N), moment (N m), angle (rad), rate (rad/s) : standard deviations of the noise of samples.
     """
 
     method: Literal["kalman", "prescribed", "none"] = "kalman"
@@ -61,8 +63,8 @@ class AttitudeHold:
 
 @dataclass(frozen=True)
 class SectionRun:
-    """Job for a run of a cut vehicle. ``step`` is in s, the recording's period if None; ``file`` is the scene that
-    messages name.
+    """Settings of a recording's run on a vehicle without wheels. hold : stabiliser; step : time step (s), the
+    recording's sampling period if None; file : the scene that messages name.
     """
 
     vehicle: CutVehicle
@@ -75,20 +77,20 @@ class SectionRun:
 
     @property
     def grid(self) -> StepGrid:
-        """Steps of the run, in relation to the recording's samples."""
+        """Time steps of the run in relation to the recording's samples."""
         return StepGrid(self.step or self.recording.period, self.recording.period)
 
     @property
     def count(self) -> int:
-        """Number of output samples in the whole run."""
+        """Number of output samples of the run."""
         return (self.recording.count - 1) // self.grid.samples_per_output + 1
 
 
 @dataclass(frozen=True)
 class SectionOutcome:
-    """Output channels of a run, ``period`` (s) apart, of which ``done`` samples exist; ``normalised_innovation`` and
-    ``filter_objections`` of the filter about its measurements, NaN and none without one; counts of steps, force calls
-    and states.
+    """Output of a recording's run. answers : channels; period : between output samples (s); done : number of samples
+    that exist; normalised_innovation, filter_objections : of the stabiliser's filter, NaN and empty without a filter;
+    counts : of steps, force calls and states.
     """
 
     columns: Columns
@@ -101,22 +103,22 @@ class SectionOutcome:
     counts: dict[str, int] = field(default_factory=dict)
 
     def samples(self, answer: SectionChannel | str) -> np.ndarray:
-        """Samples (done,) of one channel, which is given itself or by its name."""
+        """Returns the samples (done,) of a channel, which is given itself or by its name."""
         return self.columns.read(answer if isinstance(answer, str) else answer.name, 0, self.done)
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file of arrays and the inputs that these depend on: ``input_checksums`` has a checksum of each
-    input by a name that users understand.
+    """File of arrays of an unfinished run. input_checksums : checksum of each input on which the run depends, by a name
+    that users understand.
     """
 
     path: Path
     input_checksums: dict[str, str] = field(default_factory=dict)
 
     def load(self) -> dict[str, np.ndarray] | None:
-        """The saved arrays, None without a checkpoint. InputError if they depend on other inputs; it names the one that
-        differs.
+        """Returns the saved arrays, None without a checkpoint. Raises InputError if they depend on other inputs; it
+        names the input that differs.
         """
         if not self.path.is_file():
             return None
@@ -137,14 +139,14 @@ class Checkpoint:
         return arrays
 
     def save(self, **arrays: np.ndarray) -> None:
-        """Save these arrays in place of the earlier ones."""
+        """Save arrays by name in place of the earlier arrays."""
         buffer = BytesIO()
         np.savez(buffer, of=np.array(json.dumps(self.input_checksums)), **arrays)  # type: ignore[arg-type]
         write_whole(self.path, buffer.getvalue())
 
 
 def digest_of(*parts: object) -> str:
-    """Digest of objects: arrays count by their bytes, other objects by their ``repr``."""
+    """Checksum of objects: of the bytes of arrays, and of the ``repr`` of other objects."""
     total = hashlib.blake2b(digest_size=16)
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -156,7 +158,7 @@ def digest_of(*parts: object) -> str:
 
 
 def check(job: SectionRun) -> None:
-    """Refuse a job that no run can do correctly, before any run is made."""
+    """Raise InputError for settings with which a run is impossible or inaccurate, before any run is made."""
     grid, hold = job.grid, job.hold
     grid.check(job.file)
     if job.count < 2:
@@ -174,10 +176,10 @@ def check(job: SectionRun) -> None:
 def run(
     job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = CHECKPOINT_INTERVAL
 ) -> SectionOutcome:
-    """Run a recording, or the part of it that ``folder`` lacks; ``progress`` is called with the simulated and the total
-    seconds.
+    """Run a recording, or complete its run in ``folder``; ``progress`` is called with the simulated and the total time
+    (s).
 
-    ``block`` : s between checkpoints, which changes no bit of the answers. Raises InputError where the folder holds a
+    block : time (s) between checkpoints, which changes no bit of the results. Raises InputError where the folder has a
     run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle topples.
     """
     check(job)
@@ -191,7 +193,7 @@ def run(
 
 
 class _March:
-    """A run in progress: ``done`` output samples are on disk, and ``state`` (2 n,) belongs to the next one."""
+    """A run in progress: ``done`` output samples are on disk; ``state`` (2 n,) is the state at the next sample."""
 
     def __init__(self, job: SectionRun, folder: Path, length: int) -> None:
         self.job, self.grid, self.length, hold = job, job.grid, length, job.hold
@@ -199,7 +201,7 @@ class _March:
         self.filter = self._filter() if hold.method == "kalman" else None
         self.prescribed = None
         if hold.method == "prescribed":
-            self.prescribed = Prescribed(self.inputs, self.grid, hold.smoothing, job.file)
+            self.prescribed = PrescribedAngles(self.inputs, self.grid, hold.smoothing, job.file)
         folder.mkdir(parents=True, exist_ok=True)
         self._checkpoint = Checkpoint(folder / "run.npz", _inputs_of(job, self.inputs))
         saved = self._checkpoint.load()
@@ -212,7 +214,7 @@ class _March:
         self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
 
     def outcome(self) -> SectionOutcome:
-        """The outcome of the march up to now."""
+        """Returns the outcome of the run up to now."""
         steps = (self.done - 1) * self.grid.steps_per_output
         return SectionOutcome(
             self.columns,
@@ -226,7 +228,7 @@ class _March:
         )
 
     def advance(self) -> None:
-        """March a block and save it; RunFailed carries the outcome so far."""
+        """Run a block and save its samples. Raises RunFailed, whose ``partial`` is the outcome so far."""
         grid, last = self.grid, self.job.count - 1
         sample_count = min(self.length, max(last - self.done, 1))
         hub_inputs = self._hub_inputs(self.done * grid.samples_per_output, sample_count * grid.steps_per_output)
@@ -244,8 +246,8 @@ class _March:
         self._save()
 
     def _marched(self, model: HubModel) -> tuple[np.ndarray, RunFailed | None]:
-        """States of a block until its end or until the vehicle topples, and in the latter case the failure with its
-        time.
+        """Returns the states of a block up to its end, or up to the time at which the vehicle topples together with the
+        failure.
         """
         began, steps = self.done * self.grid.period * self.grid.samples_per_output, model.steps
         try:
@@ -267,8 +269,8 @@ class _March:
         return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
     def _march_until_failure(self, model: HubModel) -> np.ndarray:
-        """States of a block that the engine did not complete: the longest beginning that it can march, found by
-        bisection.
+        """Returns the states of a block that the engine did not complete: of the longest part from its beginning that
+        the engine can run, by bisection.
         """
         good, bad, states = 0, model.steps, self.state[None]
         while bad - good > 1:
@@ -281,8 +283,8 @@ class _March:
         return states
 
     def _hub_inputs(self, first: int, steps: int) -> HubInputs:
-        """Inputs at half steps of a block that begins at sample ``first``: hub forces and, where they are held, roll
-        and pitch.
+        """Returns the inputs at half steps of a block that begins at sample ``first``: hub forces and, with a
+        stabiliser, roll and pitch.
         """
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.half_step_ratio) + 1
@@ -307,7 +309,7 @@ class _March:
         return replace(free, guide=guide, pull=pull)
 
     def _start(self) -> np.ndarray:
-        """Initial state: at rest in the design position; where roll and pitch are held, these and their rates as
+        """Initial state (2 n,): at rest in the design position; with a stabiliser, roll, pitch and their rates as
         measured."""
         n = self.job.vehicle.size
         state, held_columns = np.zeros(2 * n), [ROLL, PITCH, n + ROLL, n + PITCH]
@@ -331,7 +333,7 @@ class _March:
 
 
 def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
-    """Checksums of all inputs that decide a run's values, by names that a user understands."""
+    """Checksums of all inputs on which a run's results depend, by names that users understand."""
     library = {"reference": "numpy"}.get(job.engine, job.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
     idle = HubInputs(np.zeros((1, 6 * len(inputs.hubs))))

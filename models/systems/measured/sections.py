@@ -1,10 +1,10 @@
-"""Section forces and moments of a cut vehicle: what can be asked for, its names, units, axes and signs.
+"""Section forces and moments of a vehicle without wheels: their names, units, axes and signs.
 
-- a spring, mount, seat or bar, by its own name: the force along its own axis, positive in compression; of an
-  anti-roll bar the moment, positive where the left end is pushed up;
-- ``NAME guide``: what the chassis, or another body that carries it, exerts on the body NAME through its guide, about
-  the body's joint; components along which the body slides freely are nought and left out;
-- ``NAME hub``: what acts on the hub NAME from outside, about the hub.
+- a spring, mount, seat or bar, by its name: the force along its axis, positive in compression; of an anti-roll bar the
+  moment, positive where the left end is pushed up;
+- ``NAME guide``: force and moment on the body NAME from the chassis, or from another body that carries it, through its
+  guide, about the body's joint; components along which the body slides freely are zero and left out;
+- ``NAME hub``: force and moment on the hub NAME from outside, about the hub.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,15 +30,17 @@ MOTION_CHANNELS: tuple[tuple[str, Quantity | None, str, str], ...] = (
     ("pitch rate", "angular rate", "pitch", "rad/s"),
     ("yaw rate", "angular rate", "yaw", "rad/s"),
 )
-"""Of the chassis: position and angles in the space, rates about its own axes."""
+"""Channels of the chassis' motion (name, quantity, component, unit): position and angles in space, rates about axes of
+the chassis.
+"""
 
 
 @dataclass(frozen=True)
 class SectionChannel:
-    """One output channel of a run: a section force, a motion or a stabilising moment.
+    """An output channel of a run: a section force, a motion or a stabilising moment.
 
-    section : the element, guide or hub that it belongs to, empty of motion and of what stabilises; quantity, at and
-    component : as those of a signal that measures the same; comment : axes and sign, as the files say them.
+    section : element, guide or hub of a section force, else empty; quantity, at and component : as in a signal that
+    measures the same; comment : text on axes and sign.
     """
 
     name: str
@@ -50,13 +52,15 @@ class SectionChannel:
     component: str = ""
 
     def measures(self, signal: Signal) -> bool:
-        """Whether a signal measures the same as this channel."""
+        """Whether a signal measures the quantity of this channel at the same place and in the same component."""
         return (self.quantity, self.at, self.component) == (signal.quantity, signal.at, signal.component)
 
 
 @dataclass(frozen=True)
 class AccelerometerPoint:
-    """Where an accelerometer sits: name, body, position (m) in the design state; whether it feels gravity."""
+    """Position of an accelerometer: name, body, position (m) in the design state; gravity : whether
+    it feels gravity.
+    """
 
     name: str
     body: str
@@ -66,10 +70,11 @@ class AccelerometerPoint:
 
 @dataclass(frozen=True)
 class Sections:
-    """Section forces and other channels that are computed from a vehicle's run. answers : channels in the order of
-    their columns; columns : their indices in the kernel's row.
+    """Section forces and other channels that are computed from a vehicle's run. wanted : names of sections, None for
+    all; answers : channels; columns : their indices in a row of the compiled kernel.
 
-    frame : axes of guides and hubs, "body" for the chassis', "hub" for those of what they carry.
+    frame : axes of guide and hub forces, "body" for axes of the chassis, "hub" for axes of the guided body or wheel
+    carrier.
     """
 
     vehicle: CutVehicle
@@ -101,8 +106,8 @@ class Sections:
         object.__setattr__(self, "_places", SectionPlaces(*_guide_arrays(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, stride: int) -> np.ndarray:
-        """Values (n, answers) of the channels at states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in
-        ``HubModel``.
+        """Computes all channels (n, channels) at states (n, 2 c) that are ``stride`` half steps apart; numbers :
+        parameters as in ``HubModel``.
         """
         wrenches, points = len(self._places.guide_joints) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
@@ -118,14 +123,14 @@ def section_names(vehicle: CutVehicle) -> tuple[str, ...]:
 
 
 def guided_bodies(vehicle: CutVehicle) -> tuple[str, ...]:
-    """Names of the bodies that are guided by the chassis or by another body."""
+    """Names of the bodies that the chassis or another body guides: all except the chassis."""
     return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
 
 def _kernel_columns(
     vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]
 ) -> Iterator[SectionChannel]:
-    """The channel of every column in the kernel's row."""
+    """Yields the channel of every column in a row of the compiled kernel."""
     chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
     for e in vehicle.elements:
         if e.unit == "N":
@@ -159,7 +164,7 @@ def _kernel_columns(
 
 
 def _zero_components(vehicle: CutVehicle, frame: str) -> set[str]:
-    """Names of the guides' force components that are zero, as they act along the guide's free direction."""
+    """Names of the guide force channels that are zero, as they act along a free direction of the guide."""
     sliding = set[str]()
     for name in guided_bodies(vehicle):
         body = vehicle.uncut.body(name)
@@ -170,8 +175,8 @@ def _zero_components(vehicle: CutVehicle, frame: str) -> set[str]:
 
 
 def _guide_arrays(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
-    """For every guided body its last joint (g,), and which bodies, hubs and elements act behind that joint (g, b + h +
-    3 e), in the kernel's format.
+    """Returns the last joint of every guided body (g,), and which bodies, hubs and elements act behind that joint
+    (g, b + h + 3 e), in the format of the compiled kernel.
     """
     heavy = [body.name for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
     ends = [end for element in vehicle.elements for end in (element.first_body, element.second_body, element.frame)]
@@ -189,7 +194,7 @@ def _guide_arrays(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.n
 def accelerometer_points(
     vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, TransducerPlace]
 ) -> tuple[AccelerometerPoint, ...]:
-    """Points at which accelerations are measured: sensors, which ``places`` lists, and centres of bodies."""
+    """Points at which acceleration signals are measured: sensors in ``places``, and centres of bodies."""
     section_points = dict[str, AccelerometerPoint]()
     for signal in (signal for signal in signals if signal.quantity == "acceleration"):
         if signal.at in places:

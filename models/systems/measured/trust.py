@@ -1,4 +1,4 @@
-"""How long a free run of a vehicle in space on measured hub forces can be trusted, said before it starts.
+"""Time up to which a free run of a spatial vehicle on measured hub forces can be trusted, predicted before the run.
 
 The cut vehicle as one rigid body (``models.vehicles.cut_vehicle``). An error of roll, pitch and heading, e (3,), obeys
 
@@ -27,15 +27,15 @@ from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, RigidVehicle, rigid_vehicle
 
 SUMMED_TIMES = 2000
-"""Times at which the laws are summed."""
+"""Number of time intervals by which the laws of drift are integrated."""
 
 
 @dataclass(frozen=True)
-class Level:
-    """Errors of a measurement: noise of forces and moments, their bias, and the initial error of tilt and rate.
+class MeasurementErrors:
+    """Errors of measured hub forces: noise of forces and moments, their bias, and the initial error of tilt and rate.
 
-    force, moment : standard deviation of the white noise of each sample, N and N m. bias (6 h,) : N and N m hub by
-    hub, None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
+    force, moment : standard deviation of the white noise of each sample (N, N m). bias (6 h,) : N and N m hub by hub,
+    None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
     """
 
     force: float
@@ -45,16 +45,16 @@ class Level:
     rate: Sequence[float] = (0.0, 0.0)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
-        """Standard deviations (6 h,) of the samples' noise, N and N m hub by hub."""
+        """Standard deviations (6 h,) of the noise of each hub force (N) and moment (N m), hub by hub."""
         return np.tile(np.repeat([self.force, self.moment], 3), len(vehicle.hubs))
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of a free run that the errors of its measurement cause.
+    """Predicted drift of a free run by the errors of measured hub forces.
 
-    mean_errors : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) :
-    standard deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
+    mean_errors : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) in s; deviations (n, 3) :
+    standard deviations caused by noise (rad); rates : growth rates of errors (1/s).
     """
 
     times: np.ndarray
@@ -64,9 +64,10 @@ class Drift:
     frame: str = "hub"
 
     def passing_time(self, angle: float = UNTRUSTED_PITCH, source: str | None = None) -> float | None:
-        """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad).
+        """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad); None if
+        never.
 
-        source : one of ``mean_errors`` or "noise" alone; None: all together.
+        source : a key of ``mean_errors``, or "noise" alone; None: all together.
         """
         from scipy.special import ndtr
 
@@ -92,17 +93,17 @@ class Drift:
         return float(self.times[-1]) if passed is None else passed
 
     def trust(self, angle: float | None = None) -> Trust:
-        """Time by source of error at which ``angle`` (rad) is passed, by default that of section forces; 0.05 rad for
-        the motion itself.
+        """Returns the time at which each source of error exceeds ``angle`` (rad), by default the limit for section
+        forces; 0.05 rad is the limit for the motion.
         """
         limit = self.angle if angle is None else angle
         times = {name: self.passing_time(limit, name) for name in ("noise", *self.mean_errors)}
         return Trust({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
 
 
-def predicted_drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
-    """Drift of a free run under hub forces that are given in a frame and sampled every ``period`` (s), over a duration
-    (s).
+def predicted_drift(vehicle: CutVehicle, level: MeasurementErrors, period: float, duration: float, frame: str) -> Drift:
+    """Predict the drift of a free run over a duration (s), under hub forces in a frame, sampled
+    every ``period`` (s).
     """
     body, law = (
         rigid_vehicle(vehicle),
@@ -122,12 +123,12 @@ def predicted_drift(vehicle: CutVehicle, level: Level, period: float, duration: 
     return Drift(law.times, means, spread, law.rates, frame)
 
 
-def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray, frame: str) -> np.ndarray:
-    """Error (n, 3) in m of x, y, z of a free run at times (n,), from noise, bias and the initial tilt.
+def position(vehicle: CutVehicle, level: MeasurementErrors, period: float, times: np.ndarray, frame: str) -> np.ndarray:
+    """Error (n, 3) in m of the position x, y, z of a free run at times (n,) in s, from noise, bias and initial tilt.
 
-    Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; in the frame "inertial" there are only
-    noise and bias of the forces. The result combines one standard deviation of the noise with the means of the other
-    errors.
+    With forces that turn with the vehicle, gravity moves a tilted vehicle by g tilt t^2 / 2; in the frame "inertial"
+    only noise and bias of the forces act. The result combines one standard deviation of the noise with the means of the
+    other errors.
     """
     body, deviation = rigid_vehicle(vehicle), level.deviations(vehicle)
     mean = np.zeros((len(times), 3))
@@ -143,7 +144,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 
 @dataclass(frozen=True)
 class _AngleResponse:
-    """Response of the rigid vehicle's angles to errors, at times (n,), equally spaced from 0."""
+    """Response of the rigid vehicle's roll, pitch and heading to errors, at times (n,) in s, equally spaced from 0."""
 
     rigid: RigidVehicle
     frame: str
@@ -157,26 +158,26 @@ class _AngleResponse:
 
     @property
     def rates(self) -> np.ndarray:
-        """Growth rates (3,), 1/s, 0 where an error does not grow by itself."""
+        """Growth rates (3,) of an error in 1/s; 0 where an error does not grow by itself."""
         return np.asarray(self._modes[0].real)
 
     def _matrices_of_modes(self, factors: np.ndarray) -> np.ndarray:
-        """Matrices (n, 3, 3) of the angles from the factors (n, 3) of the modes."""
+        """Response matrices (n, 3, 3) of the angles from the time functions (n, 3) of the modes."""
         shapes = self._modes[1]
         return np.asarray(((shapes * factors[:, None, :]) @ np.linalg.inv(shapes)).real)
 
     @cached_property
     def impulse(self) -> np.ndarray:
-        """Response G (n, 3, 3) of the angles to a sudden rate."""
+        """Response G (n, 3, 3) of the angles to a sudden change of their rates, in s."""
         turns = np.outer(self.times, self._modes[0])
         return self._matrices_of_modes(self.times[:, None] * np.sinc(1j * turns / np.pi))
 
     @cached_property
     def step(self) -> np.ndarray:
-        """Response (n, 3, 3) of the angles to an initial tilt."""
+        """Response (n, 3, 3) of the angles to an initial tilt, dimensionless."""
         return self._matrices_of_modes(np.cosh(np.outer(self.times, self._modes[0])))
 
     def time_integral(self, values: np.ndarray) -> np.ndarray:
-        """Integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""
+        """Time integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""
         steps = 0.5 * (values[1:] + values[:-1]) * self.times[1]
         return np.concatenate((np.zeros_like(values[:1]), np.cumsum(steps, axis=0)))

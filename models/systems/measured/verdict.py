@@ -1,11 +1,10 @@
-"""Verdict on a recording's run: accepted, rejected, or to be stabilised first, with the threshold that says so.
+"""Verdict on a recording's run (accepted, rejected, or to be stabilised first) with its reason, and comparison of
+measured channels with the run.
 
-A measured channel that was not put in is held beside what the run says of it: error by frequency, damage, trust.
-
-The concept is that of the pitch plane (``models.drift.score``), with both angles of a vehicle in space: the artificial
-moment by what turns the chassis, the angles, and what the measurement leaves unknown of them. A true run, which only a
-virtual measurement has, adds damage and angle errors. Channels that were measured but not put in are compared with
-what the run says of them; one that disagrees rejects the run, whatever its own figures are.
+The concept is that of the pitch plane (``models.drift.score``), with roll and pitch: the artificial moment divided by
+the chassis' inertia term, the size of the angles, and their uncertainty. A true run, which only a virtual measurement
+has, adds damage and angle errors. Measured channels that are no inputs are compared with the run: error by frequency,
+damage, time of trust. A channel that disagrees rejects the run, whatever its other figures are.
 """
 
 import math
@@ -35,19 +34,25 @@ from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
 
 RUN_LIMITS = Limits(artificial_share=0.1)
-"""From where on a run is not good enough. A pull of 5 Hz, whose moment is 12 % of what turns the chassis, takes 5 % off
-the damage of engine mounts on a rough road; one of 0.7 Hz 2 % of it and 1 %."""
+"""Default limits of the verdict. A stabilising moment of 5 Hz, which is 12 % of the chassis' inertia term, takes 5 %
+off the damage of engine mounts on a rough road; a moment of 0.7 Hz is 2 % of that term and takes 1 % off.
+"""
 LARGEST_DISAGREEMENT = 0.15
-"""Rms of the error of a check channel by its own, both without means and without what is known to be noise: a gain
-wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
+"""Largest rms error of a check channel divided by its rms, both without means and known noise: a gain wrong by 5 % and
+a delay of 2 ms at 10 Hz together stay below it.
+"""
 LARGEST_NOISE_SHARE = 1 / 3
-"""Part of a check channel that may be noise."""
+"""Largest noise of a check channel divided by its rms; a noisier channel is not compared."""
 FREQUENCY_BANDS = (0.0, 0.5, 4.0, 20.0, 80.0, math.inf)
-"""Hz: drift and slow motion, the body on its springs, wheels and engine, what stiff mounts pass on, the rest."""
+"""Bounds (Hz) of the frequency bands: drift and slow motion, body on its springs, wheels and engine, stiff mounts,
+above.
+"""
 SEGMENT_LENGTH = 8.0
-"""s, of the stretches whose spectra are averaged."""
+"""Length (s) of the segments whose spectra are averaged."""
 STRETCH_LENGTH, STRETCH_ERROR_LIMIT = 1.0, 0.5
-"""s; part of a channel's own rms: a stretch this long with a larger error is not to be trusted."""
+"""Length (s) of a stretch of a channel, and the rms error divided by the channel's rms above which a stretch is not
+trusted.
+"""
 WORDS_OF_SCORE = {
     "I pitch''": "what turns the chassis",
     "the measured pitch": "measured roll and pitch",
@@ -55,15 +60,15 @@ WORDS_OF_SCORE = {
     "pitch known": "roll or pitch known",
     "pitch of": "roll or pitch of",
 }
-"""What ``score`` says of the pitch plane, and what it means here."""
+"""Words of verdicts on the pitch plane (``models.drift.score``), and the words for a spatial vehicle."""
 EFFECTS_OF_HOLD = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
-"""Methods of holding a run, by the names that ``score`` has for them."""
+"""Names that ``models.drift.score`` uses for each stabiliser method."""
 
 
 @dataclass(frozen=True)
-class Band:
-    """A frequency band from ``low`` to ``high`` (Hz), with the rms of the measured values and of the error in it, in
-    the channel's unit.
+class FrequencyBand:
+    """A frequency band from ``low`` to ``high`` (Hz), with the rms of the measured values and the rms of the error in
+    this band, in the channel's unit.
     """
 
     low: float
@@ -74,28 +79,28 @@ class Band:
 
 @dataclass(frozen=True)
 class ChannelComparison:
-    """Comparison of one check channel with the run.
+    """Comparison of a measured check channel with the run.
 
-    offset : mean of the error; bands : of all but that; explained_variance : part of the measured variance that the run
-    gives, 1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
-    trusted_time : s until the error of a stretch of ``STRETCH_LENGTH`` s exceeds ``STRETCH_ERROR_LIMIT`` of the
-    channel's rms, infinite if never.
+    offset : mean of the error; bands : rms without means by frequency band; explained_variance : share of the measured
+    variance that the run explains, 1 at best; damage : damage of the run divided by that of the channel, by slope, NaN
+    where the channel never moves; trusted_time : time (s) until the error of a stretch of ``STRETCH_LENGTH`` s exceeds
+    ``STRETCH_ERROR_LIMIT`` of the channel's rms, infinite if never.
     """
 
     signal: Signal
     answer: SectionChannel
     offset: float
-    bands: tuple[Band, ...]
+    bands: tuple[FrequencyBand, ...]
     explained_variance: float
     damage: dict[float, float]
     trusted_time: float
 
 
 def channels_to_compare(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
-    """Every measured channel that the run is compared with, and the run's channel for it: channels named as checks, and
+    """Returns pairs of a measured signal and the run's channel of the same quantity, for check signals and
     accelerations.
 
-    The run has none for strains and for sensors of unknown place.
+    The run has no channel for strains and for sensors of unknown place.
     """
     outside = [s for s in job.recording.signals if s.check or s.quantity == "acceleration"]
     return tuple((s, a) for s in outside if _same_axes(job, s) for a in job.sections.answers if a.measures(s))
@@ -111,7 +116,7 @@ def _same_axes(job: SectionRun, signal: Signal) -> bool:
 def paired_channels(
     recording: Recording, run: SectionOutcome, signal: Signal, answer: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times (n,) in s of a run, and the measured and the computed values (n,) of one channel."""
+    """Returns times (n,) in s of a run, and measured and computed values (n,) of a channel."""
     computed, skip = run.samples(answer), round(run.period / recording.period)
     measured = recording.columns.read(signal.name, 0, (len(computed) - 1) * skip + 1)[::skip]
     return run.period * np.arange(len(computed)), measured, computed
@@ -124,7 +129,7 @@ def compare(
     answer: SectionChannel,
     slopes: tuple[float, ...] = (3.0, 5.0, 8.0),
 ) -> ChannelComparison:
-    """Compare a measured channel with the run's channel over the time of the run."""
+    """Compare a measured signal with the run's channel over the time of the run; slopes : Woehler exponents."""
     _, measured, computed = paired_channels(recording, run, signal, answer)
     known = np.isfinite(measured)
     if not known.any():
@@ -145,9 +150,9 @@ def compare(
     )
 
 
-def _rms_by_band(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band, ...]:
-    """Rms of the measured values and of the error by frequency band, from averaged spectra of overlapping segments
-    under a Hann window. Segments with gaps are left out.
+def _rms_by_band(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[FrequencyBand, ...]:
+    """Rms of measured values and of errors by frequency band, from averaged spectra of overlapping segments under a
+    Hann window. Segments with gaps are left out.
     """
     length = min(round(SEGMENT_LENGTH / period), len(error))
     window = np.hanning(length + 1)[:-1]
@@ -164,13 +169,13 @@ def _rms_by_band(measured: np.ndarray, error: np.ndarray, period: float) -> tupl
     for low, high in pairwise(FREQUENCY_BANDS):
         inside = (frequencies >= low) & (frequencies < high)
         if inside.any():
-            bands.append(Band(low, min(high, 0.5 / period), *np.sqrt(power[:, inside].sum(axis=1))))
+            bands.append(FrequencyBand(low, min(high, 0.5 / period), *np.sqrt(power[:, inside].sum(axis=1))))
     return tuple(bands)
 
 
 def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
-    """Time (s) at which the rms error of a stretch first exceeds ``STRETCH_ERROR_LIMIT`` of ``size``; infinite if it
-    never does.
+    """Time (s) of the first stretch whose rms error exceeds ``STRETCH_ERROR_LIMIT`` of ``size``; infinite if there is
+    none.
     """
     length = max(round(STRETCH_LENGTH / period), 1)
     whole = error[: len(error) // length * length].reshape(-1, length)
@@ -187,10 +192,10 @@ def judge(
     compared: Sequence[ChannelComparison] = (),
     noise: Mapping[str, float] | None = None,
 ) -> Verdict:
-    """The verdict on the run of a job that an engineer can give without knowing the true run.
+    """Judge a recording's run without knowledge of the true run.
 
-    trusted : time (s) predicted for a free run (``trust``), None if not known. compared : comparisons of check channels
-    with the run; noise : standard deviation of the white noise of each channel, by name, in SI.
+    trusted : predicted time (s) for which a free run can be trusted, None if not known; compared : comparisons of check
+    channels with the run; noise : standard deviation of the white noise of each channel, by name, in SI.
     """
     shares = {
         channel.signal.name: disagreement(channel, (noise or {}).get(channel.signal.name, 0.0)) for channel in compared
@@ -209,13 +214,11 @@ def judge(
         trusted,
         uncertainty=uncertainty(job.vehicle, job.hold, job.recording.period),
     )
-    return _in_space(verdict)
+    return _worded_for_spatial_vehicle(verdict)
 
 
 def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
-    """Doubts because the innovations of the filter that held a run are too large, or because it calls measurements
-    biased.
-    """
+    """Returns doubts where the innovations of the stabiliser's filter are too large, or biased."""
     if not run.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT:
         return tuple(
             Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.filter_objections
@@ -236,13 +239,13 @@ def judge_beside_truth(
     limits: Limits = RUN_LIMITS,
     slope: float = WOEHLER_SLOPE,
 ) -> Verdict:
-    """The verdict on a run of a virtual measurement, from its comparison with the true run."""
+    """Judge a run on a virtual measurement by comparison with the true run; slope : Woehler exponent."""
     figures = figures_of_run(run, true.vehicle), errors_of_run(run, true, slope)
-    return _in_space(score.verdict_on_run(*figures, EFFECTS_OF_HOLD[hold.method], limits))
+    return _worded_for_spatial_vehicle(score.verdict_on_run(*figures, EFFECTS_OF_HOLD[hold.method], limits))
 
 
-def _in_space(verdict: Verdict) -> Verdict:
-    """The verdict with the words for the pitch plane replaced by those for a vehicle that also rolls."""
+def _worded_for_spatial_vehicle(verdict: Verdict) -> Verdict:
+    """Returns the verdict with words for the pitch plane replaced by words for a spatial vehicle."""
     reason = verdict.reason
     for plane, space in WORDS_OF_SCORE.items():
         reason = reason.replace(plane, space)
@@ -250,7 +253,9 @@ def _in_space(verdict: Verdict) -> Verdict:
 
 
 def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
-    """Figures of a run that need no true run, for roll or pitch, whichever is worse; the cost is left at 0."""
+    """Figures of a run that need no true run (stabilising moment, its share, tilt), for roll or pitch, whichever is
+    worse; costs are 0.
+    """
     inertia, chassis = np.diag(rigid_vehicle(vehicle).inertia), vehicle.chassis
     tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
     figures = list[RunFigures]()
@@ -271,12 +276,12 @@ def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
 
 
 def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float:
-    """Twice the standard deviation (rad) of roll or pitch in a run where they are held; 0 for a free run.
+    """Twice the standard deviation (rad) of roll or pitch in a stabilised run; 0 for a free run.
 
-    A moment I (w^2 (measured - angle) + 2 z w (measured rate - rate)) lets white noise of the angle through with
-    period w / (4 z) of its variance, that of the rate with period z / w, and that of the hub forces' moments, as
-    acceleration, with period / (4 z w^3). A filter before it can only leave less. An angle that is enforced has the
-    noise of its low-pass, 2 x bandwidth x period of its variance. At the start, which is as measured, it is more.
+    A moment I (w^2 (measured - angle) + 2 z w (measured rate - rate)) passes white noise of the angle with the factor
+    period w / (4 z) on its variance, noise of the rate with period z / w, and noise of the hub forces' moments, as
+    acceleration, with period / (4 z w^3). A filter before it can only reduce this. An enforced angle has the noise of
+    its low-pass, 2 x bandwidth x period of its variance. At the start, which is as measured, the noise is larger.
     """
     if hold.method == "none":
         return 0.0
@@ -314,10 +319,10 @@ def errors_of_run(run: SectionOutcome, true: VirtualMeasurement, slope: float = 
 
 
 def disagreement(compared_channel: ChannelComparison, noise: float = 0.0) -> float:
-    """Ratio of the rms error of a check channel to the channel's rms, after its noise (standard deviation) is removed
-    from both.
+    """Rms error of a check channel divided by the channel's rms, after its noise (standard deviation) is removed from
+    both.
 
-    0 of a channel that is more than a third noise: it can contradict nothing. Noise that is not known, NaN, is none.
+    0 for a channel that is more than a third noise, as it cannot contradict the run. Unknown noise, NaN, counts as 0.
     """
     noise = 0.0 if math.isnan(noise) else noise
     error, whole = (sum(getattr(band, name) ** 2 for band in compared_channel.bands) for name in ("error", "measured"))

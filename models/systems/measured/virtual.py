@@ -1,4 +1,4 @@
-"""A virtual measurement: a vehicle in space on a rough road, what transducers on it would write, and their file."""
+"""Virtual measurement: a spatial vehicle on a rough road, the samples of virtual transducers on it, and their file."""
 
 import json
 from dataclasses import dataclass, field
@@ -43,14 +43,14 @@ FILE_UNITS: dict[Quantity, tuple[str, float]] = {
     "travel": ("mm", 1e-3),
     "strain": ("-", 1.0),
 }
-"""Unit of each quantity in the files that are written, and its factor: those of a test track, not SI throughout."""
+"""Unit of each quantity in written files, with its factor to SI: units as on a test track, not all SI."""
 START_OF_MEASUREMENT = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
-"""When a virtual measurement began: the same in every one, so that it repeats bit for bit."""
+"""Start time of every virtual measurement: always the same, so that files repeat bit for bit."""
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class VirtualTable(Strict):
-    """[virtual]: the vehicle on a road, and what is measured of it."""
+    """[virtual]: road, duration and sampling of a virtual measurement, its transducers and their faults."""
 
     road: Road = Field(default=Road(), description="two tracks of a random road")
     duration: float = quantity("s", "of the measurement", default=15.0)
@@ -69,10 +69,10 @@ class VirtualTable(Strict):
 
 @dataclass(frozen=True)
 class VirtualMeasurement:
-    """Signals that faultless transducers would record.
+    """True run of a vehicle on its tyres, and the signals of faultless transducers on it.
 
-    signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
-    stride : steps of a sampling period. errors : of the steps of the true run, where they were requested.
+    signals : of the channels; values (n, signals) : in SI at every time step; run : the true run; stride : number of
+    time steps per sampling period; errors : of the time steps of the true run, where they were requested.
     """
 
     vehicle: CutVehicle
@@ -84,17 +84,17 @@ class VirtualMeasurement:
 
     @property
     def step(self) -> float:
-        """Step of the run (s)."""
+        """Time step of the true run (s)."""
         return float(self.run.times[1])
 
     @property
     def period(self) -> float:
-        """Sampling period (s)."""
+        """Sampling period of the transducers (s)."""
         return self.step * self.stride
 
     def samples(self, faults: Faults, seed: int, path: int = 0) -> np.ndarray:
-        """Samples (m, signals), SI, with the faults of the transducers applied; NaN where a transducer gave no
-        value.
+        """Returns the samples (m, signals) in SI with faults of the transducers; NaN where a
+        transducer has no value.
         """
         return measured_samples(faults, self.signals, self.values, self.step, self.stride, seed, path)
 
@@ -102,9 +102,10 @@ class VirtualMeasurement:
 def virtual_measurement(
     vehicle: CutVehicle, virtual: VirtualTable, engine: str, file: str = "", error: bool = False
 ) -> VirtualMeasurement:
-    """Run the vehicle on its road in an engine and read all transducers; raises InputError, Refused, RunFailed.
+    """Run the vehicle on its tyres over the road in an engine, and read all transducers. Raises InputError, Refused or
+    RunFailed.
 
-    error : whether the error of the steps on the road is estimated, by further runs.
+    error : whether the error of the time steps is estimated, by further runs.
     """
     signals = check(vehicle, virtual, file)
     run, told = on_road(
@@ -124,8 +125,8 @@ def virtual_measurement(
 
 
 def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[Signal, ...]:
-    """Signals of all channels; InputError for steps that do not divide one another, and for names that the vehicle
-    lacks.
+    """Returns the signals of all channels of a virtual measurement. Raises InputError for steps that do not divide one
+    another, and for names that the vehicle does not have.
     """
     period, divides_text = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
     if not divides(virtual.step, virtual.duration):
@@ -144,7 +145,9 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
 
 
 def _signals_of_channels(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
-    """Signals of hubs, motion and check channels, in the order of their columns."""
+    """Signals of hub forces, chassis motion, accelerometers and check channels, in the order of the
+    measured columns.
+    """
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
     rows: list[tuple[str, Quantity, str, str, Frame]] = [
         (f"{hub}_{name.lower()}", quantity, hub, axis, virtual.frame)
@@ -168,8 +171,8 @@ def _signals_of_channels(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Si
 
 
 def _chassis_motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
-    """Roll and pitch, rates about the chassis' own axes as gyros read them, and readings of its accelerometers, as
-    columns (n, m).
+    """Roll and pitch (rad), gyro rates about axes of the chassis (rad/s), and readings of its accelerometers (m/s^2),
+    as columns (n, m).
     """
     from scipy.interpolate import make_interp_spline
 
@@ -187,8 +190,8 @@ def _chassis_motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[flo
 
 
 def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Angular rates (n, 3) in rad/s about the chassis' own axes, from roll and pitch (n, 2), rad, and the rates (n, 3)
-    of roll, pitch and heading. The heading is turned first, then the pitch, then the roll.
+    """Angular rates (n, 3) in rad/s about axes of the chassis, from roll and pitch (n, 2) in rad and the rates (n, 3)
+    of roll, pitch and heading. The order of rotations is heading, pitch, roll.
     """
     (roll, pitch), (droll, dpitch, dheading) = angles.T, rates.T
     return np.column_stack(
@@ -201,7 +204,7 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
 
 
 def channel_group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> ChannelGroup:
-    """Samples (n, signals), SI, as a group of channels in the units of the file to be written."""
+    """Returns samples (n, signals) in SI as a group of channels in the units of the file to be written."""
     factors = np.array([signal.factor for signal in signals])
     blocks = (samples[i : i + SAMPLES_PER_BLOCK] / factors for i in range(0, len(samples), SAMPLES_PER_BLOCK))
     comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in signals)
@@ -210,7 +213,7 @@ def channel_group(signals: tuple[Signal, ...], samples: np.ndarray, period: floa
 
 
 def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> Path:
-    """Write samples (n, signals), SI, as ``measured.EXTENSION`` in the file's units, and a ``scene.toml`` that reads
+    """Write samples (n, signals) in SI as ``measured.EXTENSION`` in the file's units, and a ``scene.toml`` that reads
     this file.
 
     Returns the scene's path. Raises InputError where a file exists or the format has no room for the channels.
@@ -234,12 +237,14 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
 
 
 def _toml_text(value: object) -> str:
-    """TOML text of a value: a string, number, boolean or list of these."""
+    """Returns a string, number, boolean or list of these as TOML text."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
-    """TOML lines of the table [[files]] for a file with these channels; ``offset`` (s) is added to the file's clock."""
+    """Returns the TOML text of a table [[files]] with a channel map of signals; ``offset`` (s) is added to the file's
+    clock.
+    """
     lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
     for signal in signals:
         entry = {key: getattr(signal, key) for key in ("channel", "quantity", "at", "component", "frame")}
@@ -249,8 +254,8 @@ def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> st
 
 
 def recording_of_samples(virtual: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
-    """The samples (m, signals) as a recording, without detour through files and maps; ``path`` is the file of its
-    columns.
+    """Returns samples (m, signals) of a virtual measurement as a recording, without measurement files and channel maps;
+    ``path`` : file of its columns.
     """
     columns = Columns(path, tuple(signal.name for signal in virtual.signals), len(samples))
     columns.write(0, samples)

@@ -1,4 +1,4 @@
-"""Assumptions of the pitch-plane vehicle's equations; an effect says in its own file what it adds."""
+"""Assumptions of the pitch-plane vehicle's equations; effects add further assumptions in their modules."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,24 +13,27 @@ from models.engines.assembly import Assembly
 from models.vehicles.pitch_plane import Parameters
 
 SMALL_PITCH = 0.3
-"""rad: where sines are taken for angles, the pitch may be so large: 1.5 % of the sine."""
+"""Largest pitch (rad) with linear geometry: it differs from its sine by 1.5 %."""
 STEEPEST_PITCH = 0.5
-"""rad: no road is steeper, and the wheels, which only move vertically, are 12 % nearer to each other."""
+"""Largest pitch (rad): no road is steeper, and the wheels, which only move vertically, are 12 %
+nearer to each other.
+"""
 PULL_LIMIT = 1.0
-"""N: a tyre that pulls by less is at its edge."""
+"""Largest pull (N) of a tyre at the road that does not count as leaving the road."""
 LARGEST_TYRE_TRAVEL = 0.12
-"""m: a tyre that is pressed further rests on its rim; a car's sidewall is 0.1 to 0.14 m high."""
-SPRING_EDGE = 1e-3
-"""m: a spring that is longer than it is free by less is at its edge."""
+"""Largest compression (m) of a tyre: beyond, it rests on its rim; a car's sidewall is 0.1 to 0.14 m high."""
+LARGEST_SPRING_EXTENSION = 1e-3
+"""Largest extension (m) of a suspension spring beyond its free length that does not count as pulling."""
 ARTIFICIAL_SHARE_LIMIT = 0.15
-"""Rms of an artificial moment up to 15 Hz divided by that of I pitch'', and of the force divided by that of m3 z3'',
-from which on it takes part in the damage: the limit that models/drift/score.py judges stabilisers by."""
+"""Largest rms of an artificial moment up to 15 Hz divided by the rms of I pitch'', and of an artificial force divided
+by the rms of m3 z3'': beyond, it contributes to the damage. models/drift/score.py uses the same limit.
+"""
 
 
 def assumptions(assembly: Assembly) -> list[Assumption]:
-    """Assumptions of the equations of this scene."""
+    """Assumptions of the equations of an assembled scene: tyres, springs, pitch, and artificial forces."""
     lifts = any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
-    listed = _of_tyres(assembly, lifts) if assembly.mode in ("free", "road") else []
+    listed = _tyre_assumptions(assembly, lifts) if assembly.mode in ("free", "road") else []
     listed.append(_spring_assumption(assembly, lifts))
     if assembly.vehicle.geometry == "linear":
         remedy = 'use vehicle.geometry = "exact"'
@@ -38,12 +41,12 @@ def assumptions(assembly: Assembly) -> list[Assumption]:
         listed.append(Assumption("small angles", says, remedy, _watched_pitch, "rad", -SMALL_PITCH, SMALL_PITCH))
     listed.append(upright_assumption(_pitch_remedy(assembly), _watched_pitch))
     if assembly.vehicle.pitch_springs or assembly.guided:
-        listed.append(_artificial_assumption(assembly))
+        listed.append(_artificial_force_assumption(assembly))
     return [*listed, *assembly.assumptions]
 
 
 def principal_channels(assembly: Assembly) -> tuple[str, ...]:
-    """Channels whose error is estimated, without prescribed motions and forces, which have no error."""
+    """Names of the channels whose error is estimated: motions and forces that are not prescribed."""
     free = tuple(name for name, index in (("z3", 2), ("pitch", 3)) if index not in assembly.guided)
     wheels = ("f1", "f2") if assembly.mode in ("free", "road") else ()
     enforced = {"pitch": ("enforced_moment",), "heave-pitch": ("enforced_force", "enforced_moment")}
@@ -51,7 +54,7 @@ def principal_channels(assembly: Assembly) -> tuple[str, ...]:
 
 
 def watch_function(**channels: str) -> partial[Watched]:
-    """Watch function of an assumption; ``channels`` gives the run's channel for each name of a part."""
+    """Returns a function of a result that gives its channels under other names; ``channels`` : channel by name."""
     return partial(_watched_channels, channels)
 
 
@@ -62,7 +65,7 @@ def _watched_channels(channels: dict[str, str], run: Result) -> Watched:
 _watched_pitch = watch_function(chassis="pitch")
 
 
-def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
+def _tyre_assumptions(assembly: Assembly, lifts: bool) -> list[Assumption]:
     pressed = Assumption(
         "tyres not flat",
         "no tyre is pressed to its rim",
@@ -79,12 +82,12 @@ def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
 
 
 def _deflections(parameters: Parameters, run: Result) -> Watched:
-    """Deflection (n,) in m of each tyre if its spring alone carried the wheel's force."""
+    """Static deflection (n,) in m of each tyre under the wheel's force, by tyre."""
     return {"front tyre": run["f1"] / parameters.k1, "rear tyre": run["f2"] / parameters.k2}
 
 
 def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
-    """Assumption that no suspension's spring pulls: a droop stop, which would prevent it, is not in the equations."""
+    """Assumption that no suspension spring pulls, as the equations have no droop stop, which would prevent it."""
     remedy = "no effect adds a droop stop: start lower, or excite it less"
     if assembly.mode not in ("free", "road"):
         remedy = f"take wheel forces of tyres that only push (lift_off on a road); {remedy}"
@@ -96,12 +99,12 @@ def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
         remedy,
         partial(_compressions, assembly.parameters, assembly.vehicle.geometry == "exact"),
         "m",
-        lower_limit=-SPRING_EDGE,
+        lower_limit=-LARGEST_SPRING_EXTENSION,
     )
 
 
 def _compressions(parameters: Parameters, exact: bool, run: Result) -> Watched:
-    """Compression (n,) in m of each suspension's spring, from the motion of chassis and wheels."""
+    """Compression (n,) in m of each suspension spring from the motion of chassis and wheels, by axle."""
     sine_of_pitch = np.sin(run["pitch"]) if exact else run["pitch"]
     return {
         "front suspension": run["z3"] - parameters.b * sine_of_pitch - run["z1"],
@@ -110,13 +113,13 @@ def _compressions(parameters: Parameters, exact: bool, run: Result) -> Watched:
 
 
 def upright_assumption(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
-    """Assumption that the pitch stays as small as that of a vehicle on a road."""
+    """Assumption that the pitch stays within STEEPEST_PITCH; ``pitch`` : function of a result that gives it (rad)."""
     says = "the chassis pitches less than any road does, as wheels only move vertically"
     return Assumption("upright", says, remedy, pitch, "rad", -STEEPEST_PITCH, STEEPEST_PITCH)
 
 
 def _pitch_remedy(assembly: Assembly) -> str:
-    """Advice on how to keep the pitch small."""
+    """Text with advice on how to keep the pitch small in a run."""
     if assembly.guided:
         return "no effect lifts it: check the file of the prescribed pitch, and its unit"
     if assembly.mode in ("free", "road"):
@@ -124,8 +127,10 @@ def _pitch_remedy(assembly: Assembly) -> str:
     return "hold it by prescribed_pitch, kalman_filter or pitch_spring, or end the run before"
 
 
-def _artificial_assumption(assembly: Assembly) -> Assumption:
-    """Assumption that the forces which hold pitch or heave are small compared with the vehicle's own forces."""
+def _artificial_force_assumption(assembly: Assembly) -> Assumption:
+    """Assumption that artificial forces of springs or prescribed motion are small compared with the
+    chassis' inertia.
+    """
     remedy = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
     soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
     return Assumption(
@@ -139,8 +144,8 @@ def _artificial_assumption(assembly: Assembly) -> Assumption:
 
 
 def _artificial_shares(parameters: Parameters, heave: bool, run: Result) -> Watched:
-    """Ratio of the artificial moment, and of the force where the heave is held, to the chassis' inertia term, up to 15
-    Hz. Empty where the rows are too few or too far apart.
+    """Rms of the artificial moment, and of the artificial force where heave is prescribed, divided by the chassis'
+    inertia term, up to 15 Hz. Empty where the rows are too few or too far apart.
     """
     from models.drift.score import figures_of_run
 

@@ -1,4 +1,6 @@
-"""The pitch-plane vehicle as a file of its engine: bodies, struts, tyres and pitch springs, without what drives it."""
+"""Export of the pitch-plane vehicle as a model file of an engine: bodies, struts, tyres and pitch springs, without
+road, wheel forces or prescribed motion.
+"""
 
 from models.engines.assembly import Assembly, Settings
 from models.engines.export import Exported, ExportSubject, exported_exudyn_system, exported_mujoco_model
@@ -8,7 +10,7 @@ AXES = {
     "mujoco": "x forward, y right, z down, so that gravity is positive; pitch is positive with the nose up.",
     "exudyn": "x backward, y down; pitch is positive with the nose up.",
 }
-INPUTS = {
+INPUTS_OF_MODE = {
     "free": (),
     "road": ("road under the tyres, flat here",),
     "force": ("forces at the wheels, in the inertial frame",),
@@ -16,11 +18,11 @@ INPUTS = {
     "pitch": ("forces at the wheels", "prescribed pitch, free here"),
     "heave-pitch": ("forces at the wheels", "prescribed heave and pitch of the chassis, free here"),
 }
-"""What drives the vehicle, by the mode of its assembly."""
+"""Inputs of the vehicle that an export leaves out, by the mode of excitation."""
 
 
 def exported(scene: Scene, engine: str) -> Exported:
-    """Export the pitch-plane vehicle to "mujoco" or "exudyn"."""
+    """Export the pitch-plane vehicle as a model file of "mujoco" or "exudyn"."""
     assembly, subject = assembly_of_scene(scene), ExportSubject(scene.title, scene.file, AXES[engine])
     left_out = _left_out(assembly)
     if engine == "exudyn":
@@ -29,12 +31,12 @@ def exported(scene: Scene, engine: str) -> Exported:
 
 
 def _left_out(assembly: Assembly) -> list[str]:
-    """Names of the parts that the export leaves out: inputs, and springs or tyres that can lose contact within a
-    step.
+    """Names of what the export leaves out: inputs, moments on the pitch, tyres that only push, and pitch springs with a
+    dead band.
     """
     vehicle = assembly.vehicle
     return [
-        *INPUTS[assembly.mode],
+        *INPUTS_OF_MODE[assembly.mode],
         *(["moment that holds the pitch"] if assembly.moment is not None else []),
         *(f"tyre {tyre.name!r}, which only pushes" for tyre in vehicle.tyres if tyre.pushes_only),
         *(

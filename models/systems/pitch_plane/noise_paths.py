@@ -1,9 +1,8 @@
-"""Noise paths of a force-excited scene as a job: path i is the scene run with ``path = i``, to the last bit.
+"""Ensembles of noise paths of a force-excited scene: path i is the run of the scene with ``path = i``, to the last bit.
 
-Every effect that has a parameter ``path`` (``force_noise``) gets the number; what comes before the first of them is
-assembled once. A path is then marched by the engine's own adapter, so there is no second copy of the equations, and
-whatever an engine can run can be an ensemble. The reference takes some 220 ns per path and step, 30 of them for the
-noise.
+Every effect that has a parameter ``path`` (``force_noise``) gets the number; effects before the first of them are
+assembled once. A path is run by the engine itself, so there is no second copy of the equations, and every scene that an
+engine can run can be an ensemble. The reference takes some 220 ns per path and step, 30 of them for the noise.
 
 MuJoCo computes them in its own threads, too. Its callbacks are global to a process, so its runs cannot each bring their
 own into several Python threads: the compiled callback is installed once and ``rollout`` shares the models, each of
@@ -31,25 +30,25 @@ from models.ensemble.store import Arrays
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
 
 DRIFT_OFF_PITCH = 0.05
-"""A path has drifted off when its pitch is this far (rad) from the true one, unless the job says otherwise."""
+"""Difference (rad) from the true pitch beyond which a path has drifted off, unless the job has another threshold."""
 
 
 @dataclass(frozen=True)
 class NoisePaths:
-    """Job (see ``runner``) that runs a scene once per noise path: states at chosen steps, and the time at which each
-    path drifts off.
+    """Ensemble job (see ``models.ensemble.runner``) that runs a scene once per noise path. It returns states at chosen
+    steps, and the time at which each path drifts off.
 
     Attributes
     ----------
-    base : the scene as far as all paths share it
-    rest : names and parameters of the effects that have a ``path``, and of those that follow one
-    rows : steps whose states are kept, shape (rows,)
+    base : assembly of the scene with the effects that all paths share
+    path_effects : names and parameters of the effects that have a ``path``, and of effects that depend on these
+    rows : numbers of the steps whose states are returned, shape (rows,)
     truth : pitch (rad) of the true path at every step, shape (steps + 1,)
-    threshold : drift-off, rad
+    threshold : difference from the true pitch (rad) beyond which a path has drifted off
     """
 
     base: Assembly
-    rest: tuple[tuple[str, Any], ...]
+    path_effects: tuple[tuple[str, Any], ...]
     engine: str
     settings: Settings
     rows: np.ndarray
@@ -57,20 +56,20 @@ class NoisePaths:
     threshold: float = DRIFT_OFF_PITCH
 
     def assembly(self, path: int) -> Assembly:
-        """The assembly of the scene with the noise path of this number."""
+        """Returns the assembly of the scene with the noise path of a number."""
         assembly = self.base
-        for name, p in self.rest:
+        for name, p in self.path_effects:
             with_path = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
             assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
-        """Trajectory of one path over the whole run; RunFailed if it leaves all bounds."""
+        """Runs a noise path in the engine; raises RunFailed if it leaves all bounds."""
         return build(self.engine, self.assembly(path), self.settings).run()
 
     def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Trajectory of each path, or its RunFailed; PathFailed for a failure that is not one of the simulated
-        physics.
+        """Yields the trajectory of each path, or its RunFailed. Raises PathFailed for a failure that is not of the
+        simulated physics.
         """
         for path in paths:
             try:
@@ -81,11 +80,11 @@ class NoisePaths:
                 raise PathFailed(path, f"{type(error).__name__}: {error}") from error
 
     def __call__(self, paths: range) -> Arrays:
-        """Named arrays of a block of n paths.
+        """Runs a block of n paths. Returns arrays by name.
 
         ``states`` (n, rows, 8); ``drift_off`` (n,): first time (s) at which the pitch is further than ``threshold``
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
-        states are then nan and whose drift-off is at the latest that time; nan for all others.
+        states are then NaN and whose drift-off is at the latest that time; NaN for all others.
         """
         columns = zip(*map(self._saved_part, self.trajectories(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
@@ -99,7 +98,7 @@ class NoisePaths:
         return run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan
 
     def facts(self) -> dict[str, Any]:
-        """Everything on which the paths depend, by name."""
+        """Returns everything on which the paths depend, by name."""
         forces = self.base.input
         return {
             "engine": self.engine,
@@ -120,7 +119,7 @@ def noise_paths(
     threshold: float = DRIFT_OFF_PITCH,
     engine: str = "reference",
 ) -> NoisePaths:
-    """The job that runs a scene's noise paths; states are kept at ``times`` (s), multiples of the step.
+    """Returns the job that runs a scene's noise paths; states are returned at ``times`` (s), multiples of the step.
 
     truth : pitch (rad) of the true path at every step, shape (steps + 1,); None takes the run of the same scene in
     the reference without noise on its forces. Raises InputError for a scene without ``force_noise``, an integrator
@@ -147,7 +146,7 @@ def noise_paths(
 
 
 def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
-    """The assembly that all paths share, and the effects that have a path or follow an effect that has one."""
+    """Returns the assembly that all paths share, and the effects that have a path or depend on such an effect."""
     names, unshared = effects_in_order(scene), list[str]()
     for name in names:
         module = module_of(DEFAULT_SYSTEM, name)
@@ -158,7 +157,7 @@ def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, A
 
 
 def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
-    """Numbers of the steps at the requested times; InputError for a time between steps."""
+    """Numbers of the time steps at requested times (s); raises InputError for a time between steps."""
     for time in times:
         if not 0 <= time <= settings.duration * (1 + 1e-9) or (time > 0 and not divides(settings.step, time)):
             allowed = f"must lie between 0 and {settings.duration:g} s, on a multiple of the step {settings.step:g} s"
@@ -168,7 +167,7 @@ def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True)
 class MujocoThreads(NoisePaths):
-    """Noise paths whose blocks MuJoCo computes with ``threads`` threads; the results do not depend on their number."""
+    """Ensemble job of noise paths that MuJoCo computes in several threads; results do not depend on their number."""
 
     threads: int = 2
 
@@ -177,8 +176,8 @@ class MujocoThreads(NoisePaths):
             raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
 
     def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Trajectory of each path, all from one call of ``rollout``. If MuJoCo warns, the paths are run again one by
-        one.
+        """Yields the trajectory of each path, all from one call of MuJoCo's ``rollout``. If MuJoCo warns, the paths are
+        run again one by one.
         """
         models = [build("mujoco", self.assembly(path), self.settings) for path in paths]
         step_times = self.settings.step * np.arange(self.settings.steps + 1)
@@ -194,7 +193,7 @@ class MujocoThreads(NoisePaths):
                 yield error
 
     def _rollout(self, models: list[Any]) -> tuple[np.ndarray, bool]:
-        """States (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
+        """Returns the states (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
         from mujoco import rollout
 
         from models.engines.mujoco_march import warning_text
@@ -216,7 +215,7 @@ class MujocoThreads(NoisePaths):
         return states, any(warning_text(model.data) for model in working)
 
     def facts(self) -> dict[str, Any]:
-        """Facts that identify the job's saved blocks: those of ``NoisePaths``, and that threads computed them."""
+        """Returns everything on which the paths depend, as for ``NoisePaths``, and that threads computed them."""
         return {**super().facts(), "way": "threads"}
 
 
@@ -227,13 +226,15 @@ def mujoco_threads(
     threshold: float = DRIFT_OFF_PITCH,
     threads: int = 2,
 ) -> MujocoThreads:
-    """The job of ``noise_paths`` for MuJoCo with several threads."""
+    """Returns the job that runs a scene's noise paths in MuJoCo with several threads; arguments as of
+    ``noise_paths``.
+    """
     return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
 
 
 def largest_difference(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
-    """Largest difference between two sets of paths in any state before both drift off, divided by the reference's
-    largest state in that time.
+    """Largest difference in any state between two ensembles of the same paths, before both drift off, divided by the
+    reference's largest state in that time.
 
     reference, other_paths : arrays of ``NoisePaths``; the second may hold fewer paths; times (rows,) in s. After
     drift-off a rounding error is as large as the run, so that a comparison is meaningless; nan where all paths have

@@ -1,6 +1,6 @@
-"""Statistics of noise paths as they come, block by block: errors over time, drift-off, and the first paths themselves.
+"""Statistics of noise paths, accumulated block by block: errors over time, drift-off times, and the first paths.
 
-Memory is that of the rows in time, however many paths there are.
+The memory does not grow with the number of paths.
 """
 
 import numpy as np
@@ -10,15 +10,16 @@ from models.ensemble.store import Arrays
 from models.ensemble.streamed import MagnitudeQuantiles, StreamedCovariance, StreamedMoments, ValueCounts
 
 PITCH_STATE = 3
-"""Place of the pitch among the states."""
+"""Index of the pitch in a state."""
 
 
 class PathStatistics:
     """Statistics of noise paths relative to the true states (rows, 8), accumulated from the blocks of ``noise_paths``.
 
-    moments, covariance : of the errors of all states at each row; fan : of the size of the pitch error; drift_off :
-    times (s), infinite for a path that never did; lost : paths that left all bounds; steepest (rows,) : largest pitch
-    (rad) of the others; first : arrays of the first ``saved`` paths.
+    moments, covariance : of the errors of all states at each row; fan : percentiles of the size of the pitch error;
+    drift_off : tally of drift-off times (s), infinite for a path that never did; lost : number of paths that left all
+    bounds; steepest (rows,) : largest pitch (rad) among the other paths; first : arrays of the first ``saved_paths``
+    paths.
     """
 
     def __init__(self, true_states: np.ndarray, saved_paths: int) -> None:
@@ -32,7 +33,7 @@ class PathStatistics:
         self.lost, self.steepest = 0, np.full(len(true_states), np.nan)
 
     def add(self, block: Arrays) -> None:
-        """Add a block of paths."""
+        """Add a block of noise paths to all statistics."""
         errors = block["states"] - self._true
         self.moments.add(errors)
         self.covariance.add(errors)
@@ -46,12 +47,12 @@ class PathStatistics:
 
     @property
     def first(self) -> Arrays:
-        """Arrays of the first ``saved`` paths."""
+        """Arrays of the first ``saved_paths`` paths, by name."""
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
 
     @property
     def fan(self) -> np.ndarray:
-        """Percentiles FAN_PERCENTILES of the magnitude of the pitch error (5, rows), each within
+        """Percentiles FAN_PERCENTILES of the magnitude of the pitch error (rad), shape (5, rows), each within
         ``streamed.QUANTILE_ACCURACY``.
         """
         return self._spread.percentiles(FAN_PERCENTILES)

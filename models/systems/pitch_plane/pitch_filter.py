@@ -1,4 +1,4 @@
-"""An extended Kalman filter beside a force-excited vehicle: its pitch from measured angle and rate, gaps and all.
+"""Extended Kalman filter that estimates the pitch of a force-excited vehicle from measured angle and rate, with gaps.
 
 filterpy's ``ExtendedKalmanFilter`` (Joseph form) over the samples of the wheel forces. The prediction is the
 vehicle's own nonlinear step (the reference's Runge-Kutta), its Jacobians are that same step's, and the process
@@ -31,23 +31,23 @@ from models.engines.reference import compiled_closure, march_of
 from models.engines.stability import first_order, linearised
 
 KEPT_STATES = np.array([0, 1, 3, 4, 5, 7])
-"""Where (z1, z2, pitch) and their rates stand in the state (8,)."""
+"""Indices of z1, z2, pitch and their rates in the vehicle's state (8,)."""
 RELATIVE_STATES = np.eye(8)[KEPT_STATES]
 RELATIVE_STATES[0:2, 2] = RELATIVE_STATES[3:5, 6] = -1.0
-"""Matrix (6, 8) that turns a state into (z1 - z3, z2 - z3, pitch) and their rates."""
+"""Matrix (6, 8) that maps the vehicle's state to z1 - z3, z2 - z3, pitch and their rates."""
 PITCH_INERTIA = 5
-"""Where the pitch inertia stands among the parameters."""
+"""Index of the pitch inertia in the vehicle's array of parameters."""
 DIFFERENCE_WIDTHS = np.array([1.0, *[1e-5] * 6, 1e-2, *[1e3] * 4])
-"""Half widths of the differences: none, then m, rad, m/s and rad/s, share of 1/I, N."""
+"""Half widths of the central differences: none for the step itself, then of the states (m, rad, m/s, rad/s), the share
+of 1/I, and the force samples (N).
+"""
 LONGEST_SUBSTEP = 0.7
-"""Longest substep by the time constant of the fastest pole: RK4 then errs by 1e-3 of that mode a step."""
+"""Longest substep divided by the time constant of the fastest pole: RK4 then errs by 1e-3 of that mode per step."""
 
 
 @dataclass
 class PitchStep:
-    """Steps of the filter, each of ``period`` (s), under the forces of an assembly: step i starts at i period,
-    ``count`` in all.
-    """
+    """Prediction steps of the pitch filter under the wheel forces of an assembly: ``count`` steps of ``period`` (s)."""
 
     assembly: Assembly
     period: float
@@ -63,35 +63,37 @@ class PitchStep:
         per_step, ends = n * self._rows[2], 0 if signal.held else 1
         self._inputs = signal.sample(0.0, self.period / per_step, self.count * per_step + ends)
         falling = np.ones(per_step) if signal.held else np.linspace(1.0, 0.0, per_step + 1)
-        self._hats = np.column_stack([falling, 1.0 - falling])
+        self._sample_weights = np.column_stack([falling, 1.0 - falling])
         self._p = assembly.parameters.array()
         self._respond = compiled_filter_step(assembly.mode, assembly.vehicle.geometry)
 
     def advance(self, x: np.ndarray, step_number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Advance the state x (7,) by a step; returns the new state and its derivatives.
+        """Advance the filter's state x (7,) by a step. Returns the new state (7,), its derivatives with respect to x
+        (7, 7), and with respect to the force samples at the step's start and at its end, (7, 2) per N each.
 
-        x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's
-        They are those to x, (7, 7), and to the two force samples at the step's start and at its end, (7, 2) per N.
+        x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's.
         A held sample acts on the step after it alone; a spline counts as the polyline through its samples.
         """
         first = step_number * self._substeps * self._rows[2]
-        inputs = self._inputs[first : first + len(self._hats)]
-        answer = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
+        inputs = self._inputs[first : first + len(self._sample_weights)]
+        answer = self._respond(
+            x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._sample_weights
+        )
         return answer[:, 0].copy(), answer[:, 1:8], answer[:, 8:10], answer[:, 10:]
 
 
 @cache
 def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
-    """The compiled filter step with its derivatives for one mode and geometry, compiled when it is first requested.
+    """Returns the compiled filter step with its derivatives, for a mode of excitation and a geometry.
 
-    (x, step, count, inputs, rows, p, hats) -> (7, 12): x after it, its columns d/dx (7), d/d(first force sample) (2)
-    and d/d(last one) (2). step to p are those of the reference's march; hats (rows, 2) say how the first and the
-    last sample share in each row of the inputs.
+    The step maps (x, step, count, inputs, rows, p, sample_weights) to (7, 12): the new x, then derivatives with respect
+    to x (7), the first force sample (2) and the last force sample (2). step to p are those of the reference's march;
+    sample_weights (rows, 2) : weights of the first and the last sample in each row of the inputs.
     """
     # the march goes in as Python: numba cannot cache what encloses compiled code
     march = register_jitable(march_of(drive_mode, geometry).py_func)
 
-    def respond(x, step, step_count, inputs, rows, p, hats):
+    def respond(x, step, step_count, inputs, rows, p, sample_weights):
         states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), p.copy()
         for column in range(12):
             for sign in (1.0, -1.0):
@@ -102,7 +104,7 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
                     y[KEPT_STATES[column - 1]] += nudge
                 elif column > 7:
                     pushed = inputs.copy()
-                    pushed[:, (column - 8) % 2] += nudge * hats[:, (column - 8) // 2]
+                    pushed[:, (column - 8) % 2] += nudge * sample_weights[:, (column - 8) // 2]
                 march(y, step, step_count, pushed, rows, parameters, states)
                 end, share = states[step_count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):
@@ -115,9 +117,9 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
 
 
 PITCH, PITCH_RATE, INERTIA_SHARE, FILTER_STATES = 2, 5, 6, 7
-"""Where pitch, its rate and the inertia's share stand in the filter's state, and how long it is."""
+"""Indices of pitch, pitch rate and share of 1/I in the filter's state, and the length of that state."""
 KNOWN_DEVIATION = 1e-6
-"""Deviation (m, rad, m/s, rad/s, share) of what is known at the start: nothing beside any measurement, but not 0."""
+"""Standard deviation (m, rad, m/s, rad/s, share) of states that are known at the start: tiny, but not 0."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,8 @@ class Measurement:
     """Measurement of the pitch, the pitch rate, or both.
 
     values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
-    period : s; columns : PITCH, PITCH_RATE or both; deviations : white noise of each column, per sample
+    period : between rows (s); columns : PITCH, PITCH_RATE or both; deviations : standard deviation of each column's
+    white noise
     """
 
     values: np.ndarray
@@ -136,16 +139,16 @@ class Measurement:
 
 @dataclass(frozen=True)
 class PitchEstimate:
-    """Estimates of the pitch filter or smoother at times i ``period`` (s), n of them.
+    """Estimates of the pitch filter or smoother at n times, ``period`` (s) apart.
 
-    states : (n, 7), see above
-    covariances : (n, 7, 7), without what the force sample of that very instant has done already
-    pending_noise : (n, 7, 2), what it has: a root of its covariance
-    used_values, missed_values : (n,) measured values that were taken in, and that were no numbers
+    states : (n, 7), the filter's states
+    covariances : (n, 7, 7), without the effect of the force sample at the same time
+    pending_noise : (n, 7, 2), a root of the covariance that this force sample has caused already
+    used_values, missed_values : (n,) numbers of measured values that were used, and that were missing
     normalised_innovations : (n,) normalised innovation squared, chi-square of ``used_values`` degrees of freedom where
-    the filter is
-        consistent; NaN where nothing was measured
-    innovations : (n, columns), whitened: independent and of deviation 1 where it is; NaN where nothing was measured
+        the filter is consistent; NaN where nothing was measured
+    innovations : (n, columns), whitened: independent and of deviation 1 where the filter is consistent; NaN where
+        nothing was measured
     """
 
     period: float
@@ -157,15 +160,15 @@ class PitchEstimate:
     normalised_innovations: np.ndarray
     innovations: np.ndarray
 
-    def errors(self) -> np.ndarray:
-        """Covariance (n, 7, 7) of the states' errors."""
+    def error_covariances(self) -> np.ndarray:
+        """Covariance (n, 7, 7) of the errors of the estimated states."""
         return self.covariances + self.pending_noise @ self.pending_noise.transpose(0, 2, 1)
 
 
 @dataclass(frozen=True)
-class _Steps:
-    """Record of the filter steps that end at each time: predicted states (n, 7), transition and noise matrices (n, 7,
-    7).
+class _StepRecord:
+    """Record of the filter's prediction steps: predicted states (n, 7), transition and process noise matrices
+    (n, 7, 7).
     """
 
     predictions: np.ndarray
@@ -174,9 +177,7 @@ class _Steps:
 
 
 class PitchFilter(ExtendedKalmanFilter):
-    """Extended Kalman filter that predicts the vehicle's motion step by step; ``x`` (7,) and ``P`` (7, 7) as filterpy
-    names them.
-    """
+    """Extended Kalman filter of the pitch, on filterpy's class: state ``x`` (7,) and covariance ``P`` (7, 7)."""
 
     def __init__(
         self,
@@ -186,43 +187,45 @@ class PitchFilter(ExtendedKalmanFilter):
         intensity: float,
         measurement: Measurement,
     ) -> None:
-        """Initial state ``start_state`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample,
-        per step of the filter.
+        """Start from a state (7,) and a covariance (7, 7); intensity : variance (N^2) of a force sample, per step of
+        the filter.
         """
         super().__init__(dim_x=FILTER_STATES, dim_z=1)
         self.step, self.intensity, self.measured = step, intensity, measurement
         self.x, self.P = start_state.copy(), covariance.copy()
-        self.late = np.zeros((FILTER_STATES, 2))
-        self._there = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
-        self._seen = [self._model_of_columns(column_mask) for column_mask in range(1 << len(measurement.columns))]
+        self.pending_response = np.zeros((FILTER_STATES, 2))
+        self._present_columns = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
+        self._measurement_models = [
+            self._model_of_columns(column_mask) for column_mask in range(1 << len(measurement.columns))
+        ]
 
     def predict_x(self, u: Any = 0) -> None:
-        """Predict the state and its Jacobians over step number ``u``.
+        """Predict state, Jacobian and process noise over the filter's step number ``u``.
 
-        A force sample that is read linearly acts on the step before it, too. That part, ``late``, is not in P: it
-        joins one step later, with what the same sample does then. So the noise that joins is white, and the
-        covariance of the error is P with the part that is late.
+        A force sample that is interpolated linearly acts on the step before it, too. This response,
+        ``pending_response``, is not in P: it is added one step later, together with the sample's response in that step.
+        So the added noise is white, and the covariance of the error is P plus the pending part.
         """
         self.x, self.F, early, late = self.step.advance(self.x, u)
-        push = early + self.F.dot(self.late)
-        self.Q, self.late = self.intensity * push.dot(push.T), late
+        push = early + self.F.dot(self.pending_response)
+        self.Q, self.pending_response = self.intensity * push.dot(push.T), late
 
     def measure(self, row_number: int) -> np.ndarray:
-        """Update the filter with the finite values in a row of the measurement; returns whitened innovations
+        """Update the filter with the finite values in a row of the measurement. Returns whitened innovations
         (columns,), NaN for missing values."""
-        white, columns_present = np.full(len(self.measured.columns), math.nan), self._there[row_number]
+        white, columns_present = np.full(len(self.measured.columns), math.nan), self._present_columns[row_number]
         if not columns_present:
             return white
-        chosen, rows, variance = self._seen[columns_present]
-        late = rows.dot(self.late)
+        chosen, rows, variance = self._measurement_models[columns_present]
+        late = rows.dot(self.pending_response)
         values = self.measured.values[row_number, chosen]
         self.update(values, lambda x: rows, rows.dot, R=variance + self.intensity * late.dot(late.T))
         white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
         return white
 
     def _model_of_columns(self, column_bits: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Measurement model of the columns whose bits are set in ``column_bits``: their indices, rows (m, 7) that
-        select them from the state, and noise covariance (m, m).
+        """Returns the measurement model of the columns whose bits are set in ``column_bits``: their indices, rows
+        (m, 7) that select them from the state, and noise covariance (m, m).
         """
         chosen = np.array([i for i in range(len(self.measured.columns)) if column_bits >> i & 1], dtype=int)
         return (
@@ -241,12 +244,12 @@ def estimate(
     inertia_deviation: float = 0.0,
     smoother: bool = False,
 ) -> PitchEstimate:
-    """Filter the pitch of a force-excited assembly over its run.
+    """Estimate the pitch of a force-excited assembly over its run from a measurement, by the Kalman filter or smoother.
 
-    deviation : N, standard deviation of the noise of each force sample, white
-    start_deviation : rad, that of the pitch at the start, the vehicle turned as a whole
-    inertia_deviation : standard deviation of the share by which 1/I may differ from the model's; 0 trusts it
-    smoother : whether each estimate knows of later measurements, too
+    deviation : standard deviation of the white noise on each force sample (N)
+    start_deviation : standard deviation of the pitch at the start, by a rotation of the vehicle (rad)
+    inertia_deviation : standard deviation of the share by which 1/I may differ from the model's; 0 trusts the model
+    smoother : whether each estimate uses later measurements, too
 
     The steps are the finer of the two sampling periods, of which the coarser one is a multiple; between force
     samples that are coarser the noise keeps its intensity, not its correlation over their period. Raises RunFailed
@@ -255,15 +258,15 @@ def estimate(
     assert assembly.input is not None and assembly.input.period is not None
     period = min(assembly.input.period, measurement.period)
     step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
-    start = _start(assembly, start_deviation, inertia_deviation)
+    start = _initial_state_and_covariance(assembly, start_deviation, inertia_deviation)
     estimated, steps = _march_filter(
         PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measurement)
     )
     return _smoothed_estimate(estimated, steps) if smoother else estimated
 
 
-def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
-    """Run the filter: predict each step, update with the measurement at its end, and record all of it."""
+def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _StepRecord]:
+    """Run the filter: predict each step, update with the measurement at its end. Returns estimates and step records."""
     n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
     stride, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
@@ -278,16 +281,16 @@ def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
         if i % stride == 0 and i // stride < len(measured.values):
             innovations[i] = filtered.measure(i // stride)
             missed[i] = np.count_nonzero(np.isnan(innovations[i]))
-        states[i], covariances[i], pending[i] = filtered.x, filtered.P, filtered.late
+        states[i], covariances[i], pending[i] = filtered.x, filtered.P, filtered.pending_response
     pending *= math.sqrt(filtered.intensity)
     used = np.count_nonzero(np.isfinite(innovations), axis=1)
     surprises = np.where(used > 0, np.nansum(innovations**2, axis=1), np.nan)
     estimated = PitchEstimate(period, states, covariances, pending, used, missed, surprises, innovations)
-    return estimated, _Steps(predictions, transitions, noises)
+    return estimated, _StepRecord(predictions, transitions, noises)
 
 
-def _smoothed_estimate(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
-    """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
+def _smoothed_estimate(filtered: PitchEstimate, steps: _StepRecord) -> PitchEstimate:
+    """Smooth the filter's estimate by filterpy's Rauch-Tung-Striebel smoother.
 
     The smoother supports linear steps only, x -> F x. An eighth state, always 1, carries the difference between the
     nonlinear step and F x.
@@ -306,17 +309,19 @@ def _smoothed_estimate(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
 
 
 def _covariance_inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of a covariance (8, 8) of seven states and an eighth that is certain; its row and column are left
-    zero.
-    """
+    """Inverse of a covariance (8, 8) of seven states and an eighth that is certain, whose row and column stay zero."""
     inverse = np.zeros((8, 8))
     inverse[:7, :7] = np.linalg.inv(matrix[:7, :7])
     return inverse
 
 
-def _start(assembly: Assembly, turn_deviation: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
-    """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by
-    ``turn_deviation`` (rad) and from ``inertia``, the standard deviation of the share by which 1/I is off.
+def _initial_state_and_covariance(
+    assembly: Assembly, turn_deviation: float, inertia: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """State (7,) and covariance (7, 7) of the filter at the start.
+
+    turn_deviation : standard deviation of a rotation of the vehicle (rad); inertia : standard deviation of the share by
+    which 1/I is wrong.
     """
     p = assembly.parameters
     rotated_state = turn_deviation * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])

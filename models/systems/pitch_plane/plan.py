@@ -26,7 +26,9 @@ MODE_TEXTS = {
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
-    """Refuse a scene that cannot be run, before any file is written."""
+    """Raise InputError or Refused, before any file is written, for a scene that cannot be assembled or an engine that
+    cannot run it.
+    """
     assembly = assembly_of_scene(scene)
     for engine in engines:
         try:
@@ -36,47 +38,53 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: Scene) -> tuple[Finding, ...]:
-    """Doubts about implausible parameters of the vehicle, and about the inputs that drive and hold it."""
+    """Returns doubts about implausible parameters of the vehicle, and about wheel forces and prescribed motions."""
     doubts = (Finding("input", "doubt", scene.file, text) for text in assembly_of_scene(scene).doubts)
     return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 
 
 def describe(scene: Scene) -> str:
-    """The scene's plan as text: vehicle, states, effects, channels, and what each engine builds."""
+    """Returns the plan of a pitch-plane scene as text: vehicle, states, effects, channels, assumptions, and what each
+    engine builds.
+    """
     assembly = assembly_of_scene(scene)
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    lines = [scene.title, _plan_line("scene", f"{scene.file}, study {scene.study}")]
     motion = f"{MODE_TEXTS[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
-    lines += [_line("motion", motion)]
-    lines += _vehicle(scene, assembly) + effect_lines(scene)
-    lines += [_line("channels", ", ".join(_channel_lines(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
-    lines += [*assumption_lines(assumptions(assembly)), "", *_engines(scene, assembly)]
+    lines += [_plan_line("motion", motion)]
+    lines += _vehicle_lines(scene, assembly) + effect_lines(scene)
+    lines += [
+        _plan_line("channels", ", ".join(_channel_lines(assembly))),
+        *trust_line(assembly),
+        *doubt_lines(assembly),
+    ]
+    lines += [*assumption_lines(assumptions(assembly)), "", *_engine_table(scene, assembly)]
     return "\n".join(lines)
 
 
-def _line(label: str, text: str) -> str:
+def _plan_line(label: str, text: str) -> str:
     return f"  {label:<10} {text}"
 
 
-def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
-    """Lines on the parameter set, the bodies, the struts and the initial state."""
+def _vehicle_lines(scene: Scene, assembly: Assembly) -> list[str]:
+    """Lines of text on the parameter set, the bodies, the struts, the pitch springs and the initial state."""
     scene_vehicle, vehicle = scene.vehicle, assembly.vehicle
     changed = ", ".join(f"{name} = {value:g}" for name, value in scene_vehicle.override.items())
-    lines = [_line("vehicle", scene_vehicle.parameters + (f", but {changed}" if changed else ""))]
+    lines = [_plan_line("vehicle", scene_vehicle.parameters + (f", but {changed}" if changed else ""))]
     for body in vehicle.bodies:
         inertia = "" if body.pitch_inertia is None else f", {body.pitch_inertia:g} kg m^2"
-        lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg{inertia}"))
+        lines.append(_plan_line("  body", f"{body.name:<12} {body.mass:g} kg{inertia}"))
     for strut in vehicle.struts:
         ends = f"{strut.upper.body} - {strut.lower.body or 'ground'}"
         pushes = ", only pushes" if strut.pushes_only else ""
         text = f"{strut.name:<12} {strut.stiffness:g} N/m, {strut.damping:g} N s/m, {ends}{pushes}"
-        lines.append(_line("  strut", text))
+        lines.append(_plan_line("  strut", text))
     for spring in vehicle.pitch_springs:
         band = f", beyond {spring.dead_band:g} rad" if spring.dead_band else ""
         text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground{band}"
-        lines.append(_line("  spring", text))
+        lines.append(_plan_line("  spring", text))
     values = zip(STATE_NAMES, assembly.initial, strict=True)
     start = ", ".join(f"{name} {value:.4g}" for name, value in values if value)
-    return [*lines, _line("states", ", ".join(STATE_NAMES)), _line("start", start or "all zero")]
+    return [*lines, _plan_line("states", ", ".join(STATE_NAMES)), _plan_line("start", start or "all zero")]
 
 
 def _channel_lines(assembly: Assembly) -> list[str]:
@@ -88,7 +96,9 @@ def _channel_lines(assembly: Assembly) -> list[str]:
 
 
 def trust_line(assembly: Assembly) -> list[str]:
-    """One line on how long the pitch of a force-excited run can be trusted; none on a road or for a guided run."""
+    """Line of text on how long the pitch of a force-excited run can be trusted; none on a road or with prescribed
+    pitch.
+    """
     if assembly.mode not in ("force", "force-body"):
         return []
     from models.systems.pitch_plane.trust import predict_trust
@@ -97,28 +107,28 @@ def trust_line(assembly: Assembly) -> list[str]:
     if limit is None:
         return []
     if limit.until is None and assembly.doubts:
-        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked_text}")]
-    return [_line("trust", str(limit))]
+        return [_plan_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked_text}")]
+    return [_plan_line("trust", str(limit))]
 
 
 def doubt_lines(assembly: Assembly) -> list[str]:
-    """Lines with the sentences on what contradicts the scene."""
-    return [_line("doubt", text) for text in assembly.doubts]
+    """Lines of text with the doubts about a scene's inputs."""
+    return [_plan_line("doubt", text) for text in assembly.doubts]
 
 
 TABLE_HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")
 
 
-def _engines(scene: Scene, assembly: Assembly) -> list[str]:
-    """Table of what each engine builds, or why it refuses."""
-    rows = [TABLE_HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
+def _engine_table(scene: Scene, assembly: Assembly) -> list[str]:
+    """Lines of a text table on what each engine builds, or why it refuses the scene."""
+    rows = [TABLE_HEADINGS, *(_engine_row(scene, assembly, engine) for engine in CATALOGUE)]
     widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(TABLE_HEADINGS))]
     padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
     note = ["  exudyn is handed M, D and K of the linear vehicle: no spring of its own takes part"]
     return ["  " + "  ".join(row).rstrip() for row in padded] + (note if scene.vehicle.geometry == "linear" else [])
 
 
-def _engine(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:
+def _engine_row(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:
     settings = settings_of(scene, engine)
     try:
         plan = build(engine, assembly, settings).plan()

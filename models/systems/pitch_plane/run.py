@@ -1,4 +1,4 @@
-"""One run, from scene to result: assemble, build in an engine, integrate, label."""
+"""Run of a pitch-plane scene in an engine, and its result."""
 
 import json
 import math
@@ -24,23 +24,25 @@ from models.vehicles.pitch_plane import STATES
 from models.vehicles.pitch_plane_equations import suspension_loads
 
 MEANINGS_OF_STATES = ("front wheel, down", "rear wheel, down", "chassis heave, down", "pitch, nose up")
-"""Of STATES."""
+"""Meanings of the coordinates in STATES."""
 TOLERANCE_FACTOR = 100.0
-"""Factor on the tolerance of an adaptive method that tells its error: 0.56 of the calls of a method of order 8."""
+"""Factor on the tolerance of an adaptive method in the further run that estimates its error; that run takes 0.56 of the
+calls of a method of order 8.
+"""
 
 
 def run(
     scene: Scene, engine: str, settings: Settings | None = None, assembly: Assembly | None = None, error: bool = False
 ) -> Result:
-    """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
+    """Run a pitch-plane scene in an engine; the result's detail is the trajectory at every step. Raises InputError,
+    Refused or RunFailed, never returns a partial run.
 
-    settings : replace the scene's own; assembly : replaces the one that the scene describes, where it is known already
-    or was changed by hand; error : whether the error of the steps is estimated, by further runs. The run's assumptions
-    are always judged. The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the
-    tree is compared with the reference; the result is in "beside reference".
+    settings : in place of the scene's; assembly : in place of the scene's, where it is known already or was changed by
+    hand; error : whether the error of the time steps is estimated, by further runs. Assumptions are always checked. A
+    run of an engine outside of this package is compared with the reference; the comparison is in "beside reference".
     """
     assembly, settings = assembly or assembly_of_scene(scene), settings or settings_of(scene, engine)
-    rows = slice(None, None, _keep_every(scene, settings))
+    rows = slice(None, None, _steps_per_saved_row(scene, settings))
     model = build(engine, assembly, settings)
     start = time.perf_counter()
     trajectory = model.run()
@@ -69,9 +71,9 @@ def run(
     return _with_error(labelled, assembly, settings, channels) if error else labelled
 
 
-def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
-    """``run`` for a vehicle that may drift off: a run whose error is as large as its motion is returned and not
-    refused.
+def run_with_drift(scene: Scene, engine: str, error: bool = False) -> Result:
+    """Run a scene of a vehicle that may drift off: a result whose error is as large as its motion is returned, and no
+    RunFailed is raised.
     """
     try:
         return run(scene, engine, error=error)
@@ -82,8 +84,8 @@ def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
 
 
 def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: Channels) -> Result:
-    """The result with the errors of its principal channels, estimated from all steps and not only from the saved
-    rows.
+    """Returns the result with the stated errors of its principal channels, estimated from all steps and not only from
+    the saved rows.
     """
     engine, names = run.data.attrs["engine"], principal_channels(assembly)
     fine, sizes = _series_of_run(run.detail.times, channels, names), _enforced_sizes(assembly, channels)
@@ -106,7 +108,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
 
 def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
-    """Rerun in which the engine's own longest step is doubled, too, where the input allows it: this step may dominate
+    """Repeats a run with the engine's longest step doubled as well, where the input allows it: this step may dominate
     the error.
     """
     try:
@@ -120,8 +122,8 @@ def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]
 
 
 def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
-    """Sizes by which errors of the enforced moment and force are divided, since these may themselves be zero: those of
-    the chassis' inertia term, and of the sum of the suspension forces.
+    """Sizes by which errors of the enforced moment and force are divided, as these may be zero: the chassis' inertia
+    term (N m), and the sum of the suspension forces (N).
     """
     sizes = {}
     if "enforced_moment" in channels:
@@ -132,8 +134,8 @@ def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
 
 
 def _pitch_error_growth(assembly: Assembly) -> dict[str, float]:
-    """Ratio of the rms pitch error over a whole run to that over its first part: a free vehicle under wheel forces
-    tilts ever faster.
+    """Ratio of the rms pitch error over a run to the rms pitch error over its first part, for vehicles under wheel
+    forces, whose pitch error grows; else empty.
     """
     if assembly.mode != "force" or assembly.vehicle.geometry == "linear" or assembly.vehicle.pitch_springs:
         return {}
@@ -147,14 +149,14 @@ def _pitch_error_growth(assembly: Assembly) -> dict[str, float]:
 
 
 def _settings_of_longer_step(settings: Settings, step_factor: float, share: float) -> Settings:
-    """Settings with a step ``step_factor`` times as long, over ``share`` of the run, rounded down to whole steps, at
-    least one."""
+    """Returns settings with a step ``step_factor`` times as long, over the first ``share`` of the run, rounded down to
+    whole steps, at least one."""
     step = step_factor * settings.step
     return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
 
 
-def _keep_every(scene: Scene, settings: Settings) -> int:
-    """Number of steps between two saved rows."""
+def _steps_per_saved_row(scene: Scene, settings: Settings) -> int:
+    """Number of time steps between saved rows; raises InputError if run.output_step is no multiple of the step."""
     wanted = scene.run.output_step
     if wanted is None:
         return 1
@@ -165,16 +167,16 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
 
 
 def output_channels(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
-    """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
+    """Returns all channels of a run as name -> (unit, meaning, values): states, forces, and channels of effects.
 
-    ``model`` is the model that made the run; effects that need accelerations compute them with it.
+    model : the model that made the run; effects that need accelerations compute them with it.
     """
     channels: Channels = {}
     for i, (name, meaning) in enumerate(zip(STATES, MEANINGS_OF_STATES, strict=True)):
         unit = "rad" if name == "pitch" else "m"
         channels[name] = (unit, meaning, run.states[:, i])
         channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", run.states[:, 4 + i])
-    channels |= _forces(assembly, run, _inputs_at_times(assembly, run.times))
+    channels |= _force_channels(assembly, run, _inputs_at_times(assembly, run.times))
     for output in assembly.outputs:
         channels |= output(assembly, run.times, run.states)
     for sensor in assembly.sensors:
@@ -184,7 +186,9 @@ def output_channels(assembly: Assembly, run: Trajectory, model: Model | None = N
 
 
 def _inputs_at_times(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
-    """The input at the saved times, sampled on a uniform grid or, for adaptive engines, time by time."""
+    """Values of the vehicle's input (road or wheel forces, prescribed motion) at times (n,) in s;
+    None for free motion.
+    """
     if assembly.input is None:
         return None
     step = times[1] - times[0]
@@ -193,8 +197,10 @@ def _inputs_at_times(assembly: Assembly, times: np.ndarray) -> np.ndarray | None
     return np.array([assembly.input.at(time) for time in times])
 
 
-def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> Channels:
-    """Wheel forces f1, f2, suspension forces f3, f4, inertia term and enforced moment (eqs 33, 35, 36)."""
+def _force_channels(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> Channels:
+    """Channels of wheel forces f1, f2, suspension forces f3, f4 and suspension moment; road heights, enforced force and
+    moment, and inertia term where the run has them (eqs 33, 35, 36).
+    """
     f1, f2 = _wheel_forces(assembly, run.states, inputs)
     f3, f4, moment = suspension_loads(run.states.T, assembly.parameters, assembly.vehicle.geometry)
     channels: Channels = {
@@ -229,7 +235,7 @@ def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) 
 
 
 def channel_summary(result: Result) -> dict[str, Any]:
-    """Largest magnitude and rms of every channel, with its unit."""
+    """Largest magnitude and root mean square of every channel of a result, with its unit."""
     return {
         str(name): {
             "unit": channel.attrs["units"],

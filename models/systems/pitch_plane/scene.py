@@ -1,4 +1,4 @@
-"""Scenes of the pitch-plane vehicle, and what a run of one computes: vehicle, input and effects, and nothing else."""
+"""Scenes of the pitch-plane vehicle, and their assembly: the vehicle with its input and the scene's effects."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -21,16 +21,16 @@ from models.vehicles.description import Geometry
 from models.vehicles.pitch_plane import STATE_NAMES
 
 PARAMETER_SET_FOLDER = Path(pitch_plane.__file__).with_name("parameters")
-"""Folder of the published parameter sets."""
+"""Folder of the published parameter sets of vehicles."""
 
 
 def parameter_sets() -> tuple[str, ...]:
-    """Names of the published parameter sets."""
+    """Names of the published parameter sets of vehicles."""
     return tuple(sorted(path.stem for path in PARAMETER_SET_FOLDER.glob("*.py") if path.stem != "__init__"))
 
 
 class VehicleTable(Strict):
-    """[vehicle]: a published parameter set or the user's own file, with overrides."""
+    """[vehicle]: a published parameter set or the user's parameter file, and values that replace some parameters."""
 
     parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
     geometry: Geometry = Field(default="exact", description="sin and cos of pitch, or linearised")
@@ -39,7 +39,7 @@ class VehicleTable(Strict):
 
 
 class RunTable(Strict):
-    """[run]: how long, and how finely."""
+    """[run]: duration, time step, and spacing of the saved rows."""
 
     duration: float = quantity("s", "length of the run")
     step: float = quantity("s", "step of fixed-step integrators", default=2.5e-4)
@@ -47,7 +47,7 @@ class RunTable(Strict):
 
 
 class EngineTable(Strict):
-    """[engines.NAME]: settings that differ from the recommended ones."""
+    """[engines.NAME]: time integration settings of an engine, where they differ from the recommended ones."""
 
     integrator: str | None = Field(default=None, description="name of an integrator of this engine")
     step: float | None = quantity("s", "step for this engine alone", default=None)
@@ -56,7 +56,9 @@ class EngineTable(Strict):
 
 
 class Scene(SceneFile):
-    """One scene file. ``effects`` are checked by the files that own them."""
+    """A scene of the pitch-plane vehicle: all tables of its scene file. The modules of the effects
+    check their tables.
+    """
 
     system: Literal["pitch-plane"] = "pitch-plane"
     study: str = Field(default="single_run", description="the study that runs the scene")
@@ -67,7 +69,9 @@ class Scene(SceneFile):
     engines: dict[str, EngineTable] = Field(default_factory=dict)
 
     def vehicle_parameters(self) -> pitch_plane.Parameters:
-        """The parameter set with the scene's overrides; an error names the file from which the value comes."""
+        """Returns the vehicle's parameters with the scene's overrides. An InputError names the file
+        of the wrong value.
+        """
         base = parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
         values = {**base.model_dump(), **self.vehicle.override}
         p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
@@ -75,7 +79,7 @@ class Scene(SceneFile):
         return p
 
     def table(self) -> dict[str, Any]:
-        """The scene as nested tables of plain values, defaults included: enough to run it again."""
+        """Returns the scene as nested tables of plain values, defaults included, from which it can be run again."""
         plain = self.model_dump(exclude={"effects", "engines"}, exclude_none=True)
         return plain | {
             "effects": {name: values.model_dump(exclude_none=True) for name, values in self.effects.items()},
@@ -83,7 +87,7 @@ class Scene(SceneFile):
         }
 
     def settings(self, engine: str) -> EngineTable:
-        """Settings of one engine, with recommended values where the scene says nothing."""
+        """Returns the time integration settings of an engine, with recommended values where the scene has none."""
         named = self.engines.get(engine, EngineTable())
         guided = not {"prescribed_pitch", "prescribed_heave_and_pitch"}.isdisjoint(self.effects)
         usual = "GeneralizedAlpha" if guided and engine == "exudyn" else RECOMMENDED[engine]
@@ -101,11 +105,13 @@ def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
 
 
 SMALLEST_PARAMETER = 1e-9
-"""No parameter of a vehicle is smaller in SI units, but for a gravity of 0."""
+"""Smallest positive value of a vehicle's parameter in SI units."""
 
 
 def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
-    """Refuse parameters without a static equilibrium, in which every run begins."""
+    """Raise InputError for parameters without a static equilibrium, in which every run begins, and for tiny
+    parameters.
+    """
     for name, value in parameters:
         if 0 < value < SMALLEST_PARAMETER:
             allowed = f"too small for a vehicle: at least {SMALLEST_PARAMETER:g}"
@@ -124,7 +130,9 @@ def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked pitch-plane scene from the nested tables of a scene file. Raises InputError for unknown keys and
+    for values outside their ranges.
+    """
     scene = checked(Scene, table, file, folder)
     effects = read_tables(scene.effects, DEFAULT_SYSTEM, file)
     for name in scene.engines:
@@ -134,14 +142,14 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
 
 
 def changed_scene(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
-    """The scene with some values changed; ``tables`` gives them by the names of the scene's tables."""
+    """Returns the scene with some keys changed; ``tables`` : new values of keys by the names of their tables."""
     table = scene.table()
     tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
     return build({**table, **tables_now}, scene.file, Path(scene.folder))
 
 
 def _check_engine(name: str, scene: Scene) -> None:
-    """Refuse unknown engines and integrators, and settings that the integrator does not read."""
+    """Raise InputError for unknown engines and integrators, and for settings that the integrator does not have."""
     if name not in CATALOGUE:
         raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
     engine_settings, key_path = scene.engines[name], f"engines.{name}"
@@ -166,7 +174,9 @@ def _check_engine(name: str, scene: Scene) -> None:
 
 
 def _check_times(scene: Scene) -> None:
-    """Refuse a duration, or a spacing of saved rows, that is not a whole number of steps in every engine."""
+    """Raise InputError for a duration, or a spacing of saved rows, that is not a whole number of
+    steps in every engine.
+    """
     for name in CATALOGUE:
         stated = name in scene.engines and scene.engines[name].step is not None
         _check_step(scene, f"engines.{name}.step" if stated else "run.step", float(scene.settings(name).step or 0))
@@ -196,7 +206,7 @@ def _check_step(scene: Scene, key_path: str, step: float) -> None:
 
 
 def settings_of(scene: Scene, engine: str) -> Settings:
-    """Settings of a scene for one engine."""
+    """Returns the time integration settings of a scene for an engine: integrator, step, duration, tolerance."""
     settings = scene.settings(engine)
     assert settings.integrator is not None and settings.step is not None
     return Settings(
@@ -205,7 +215,9 @@ def settings_of(scene: Scene, engine: str) -> Settings:
 
 
 def assembly_of_scene(scene: Scene) -> Assembly:
-    """Assemble the vehicle with the effects that the scene names; only the modules of these effects are imported."""
+    """Assemble the scene's vehicle with its input and the effects that the scene names. Only the modules of these
+    effects are imported.
+    """
     p = scene.vehicle_parameters()
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial_state(scene, p))
@@ -215,7 +227,7 @@ def assembly_of_scene(scene: Scene) -> Assembly:
 
 
 def _initial_state(scene: Scene, parameters: pitch_plane.Parameters) -> np.ndarray:
-    """Initial state: the static equilibrium, except for the coordinates that the scene sets."""
+    """Initial state (8,) of a scene: the static equilibrium, except for the states in [start]."""
     state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
     for name, value in scene.start.items():
         if name not in STATE_NAMES:
@@ -225,7 +237,9 @@ def _initial_state(scene: Scene, parameters: pitch_plane.Parameters) -> np.ndarr
 
 
 def effects_in_order(scene: Scene) -> list[str]:
-    """The scene's effects, each after those that it needs; refuses illegal combinations."""
+    """Returns the names of the scene's effects, each after the effects that it needs. Raises InputError for effects
+    that exclude one another.
+    """
     modules = {name: module_of(DEFAULT_SYSTEM, name) for name in scene.effects}
     check_combination(modules, scene)
     ordered_effects: list[str] = []

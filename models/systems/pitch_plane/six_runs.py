@@ -1,7 +1,7 @@
-"""The six runs of the paper, Section 4: scenes on the files of a virtual measurement, and what each run shows.
+"""The six runs of the paper, Section 4: scenes on the files of a virtual measurement, and figures of each run.
 
-The vehicle is driven by the measured wheel forces: undisturbed, with noise, with a perturbed model, with both; at last
-its pitch is prescribed, and the moment that this takes is the price.
+The vehicle is driven by the measured wheel forces: undisturbed, with noise, with a perturbed model, with both. Then the
+same is done with prescribed pitch, which takes an enforced moment.
 """
 
 from pathlib import Path
@@ -24,11 +24,11 @@ from models.systems.pitch_plane.virtual_measurement import (
 )
 
 DRIFT_OFF_PITCH = 0.05
-"""A run has drifted off when its pitch is this far (rad) from the measured one."""
+"""Difference (rad) from the measured pitch beyond which a run has drifted off."""
 
 
 class Options(Strict):
-    """[options] of the study of six runs."""
+    """[options] of the study of six runs: sampling rate, noise, perturbed models, seed."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
     noise_fraction: float = quantity(
@@ -40,8 +40,8 @@ class Options(Strict):
 
 
 def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
-    """The scene's options; refuses, before any file is written, options with which one of the study's runs is
-    impossible.
+    """Reads the scene's options. Raises InputError, before any file is written, for options with which a run of the
+    study is impossible.
     """
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
@@ -49,8 +49,10 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
 
 
 def measurement_and_runs(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, float, dict[str, Scene]]:
-    """The measurement, the standard deviation (N) of the forces' noise, and by name the scenes of runs on the measured
-    files. ``error`` requests the error of the measurement's steps.
+    """Makes the virtual measurement and writes its files. Returns the measurement, the standard deviation (N) of the
+    force noise, and the scenes of all runs on the measured files by name.
+
+    error : whether the error of the measurement's time steps is estimated.
     """
     options, measured = options_of(scene), measure(scene, error)
     deviation = options.noise_fraction * write_measurement(measured, folder, 1.0 / options.sampling_rate)
@@ -74,18 +76,22 @@ def measurement_and_runs(scene: Scene, folder: Path, error: bool = False) -> tup
     return measured, deviation, scenes
 
 
-def error(measured_run: Result, run: Result, channel: str) -> np.ndarray:
-    """A run's channel less the measured one, at the run's own times."""
+def channel_error(measured_run: Result, run: Result, channel: str) -> np.ndarray:
+    """A run's channel minus the measured channel, at the times of the run."""
     return run[channel] - np.interp(run.times, measured_run.times, measured_run[channel])
 
 
 def figures_of_run(engine: str, name: str, measured_run: Result, run: Result) -> dict[str, Any]:
-    """Drift-off time (s, None if never), heave error, and for a guided run the enforced moment and the inertia term."""
+    """Figures of a run for a JSON file: drift-off time (s, None if never) and largest heave error (m); with prescribed
+    pitch also enforced moment and inertia term (N m).
+    """
     figures: dict[str, Any] = {
         "engine": engine,
         "run": name,
-        "drift-off": GrowthCurve(run.times, np.abs(error(measured_run, run, "pitch"))).passing_time(DRIFT_OFF_PITCH),
-        "heave error": float(np.abs(error(measured_run, run, "z3")).max()),
+        "drift-off": GrowthCurve(run.times, np.abs(channel_error(measured_run, run, "pitch"))).passing_time(
+            DRIFT_OFF_PITCH
+        ),
+        "heave error": float(np.abs(channel_error(measured_run, run, "z3")).max()),
     }
     if "enforced_moment" in run.data:
         moment = run["enforced_moment"]

@@ -1,7 +1,9 @@
-"""Stabilisers on the same wrong model and noisy forces of a virtual measurement, scored by damage (models/drift/score).
+"""Comparison of stabilisers against drift, on the same wrong model and noisy forces, scored by damage
+(models/drift/score).
 
-A perturbed model is driven by the measured forces with noise: free, with its pitch prescribed, held by springs,
-high-pass filtered, drawn to the estimate of a Kalman filter; on the road as it is, and on the same road with a grade.
+A perturbed model is driven by measured forces with noise: free, with prescribed pitch, with springs to the ground, with
+a high-pass, or with a moment towards a Kalman filter's estimate; on the scene's road, and on the same road with a
+grade.
 """
 
 import math
@@ -52,11 +54,11 @@ Progress = Callable[[str, float], None]
 Row = dict[str, Any]
 
 DAMPING_RATIO = 0.7
-"""Damping ratio of springs and high-pass filters."""
+"""Damping ratio of stabilising springs and high-pass filters."""
 
 
 class Options(Strict):
-    """[options] of the study of stabilisers."""
+    """[options] of the study of stabilisers: measurement, perturbed model, stabilisers, limits of the score."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
     noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
@@ -79,8 +81,8 @@ class Options(Strict):
 
 
 def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
-    """The scene's options; refuses, before any file is written, options with which one of the study's runs is
-    impossible.
+    """Reads the scene's options. Raises InputError, before any file is written, for options with which a run of the
+    study is impossible.
     """
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
@@ -103,7 +105,7 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
 
 
 def roads(scene: Scene, options: Options) -> dict[str, Scene]:
-    """The scene's own road and, where options.grade is set, the same road on that grade."""
+    """Returns the scene on its road and, where options.grade is set, on the same road with that grade, by name."""
     if options.grade is None:
         return {"road": scene}
     road = scene.table()["effects"]["road"]
@@ -116,9 +118,10 @@ def roads(scene: Scene, options: Options) -> dict[str, Scene]:
 def compare(
     scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 ) -> tuple["list[Bench]", list[Row], dict[str, str]]:
-    """Benches of all roads, a row of figures for each run of a method, and reasons of failed runs by name.
+    """Run all stabilisers on all roads. Returns the benches, a row of figures for each run, and reasons of failed runs
+    by name.
 
-    The first engine runs all methods, the others, on the scene's own road, those that it accepts.
+    The first engine runs all stabilisers; the other engines run, on the scene's road, those that are accepted.
     """
     options, failed, rows = options_of(scene, engines), dict[str, str](), list[Row]()
     benches = [Bench(on_road, road, options, folder, scene.error) for road, on_road in roads(scene, options).items()]
@@ -132,11 +135,11 @@ def compare(
 
 
 class Bench:
-    """The measurement on one road, and runs of the perturbed model on the measured files.
+    """Virtual measurement on a road, and runs of the perturbed model with each stabiliser on the measured files.
 
-    Known before any run: ``trusted``, the time (s) until which a free run can be trusted; ``holding``, the stiffness (N
-    m/rad) of a spring that holds; ``error``: whether the measurement states the error of its steps, which all runs
-    share; ``results``: the measurement and all runs of methods, by name.
+    trusted : time (s) until which a free run can be trusted; holding : stiffness (N m/rad) of a spring that prevents
+    drift, both predicted before any run; error : whether the error of the measurement's time steps is estimated;
+    results : the measurement and all runs, by name.
     """
 
     def __init__(self, scene: Scene, road: str, options: Options, folder: Path, error: bool = False) -> None:
@@ -156,7 +159,7 @@ class Bench:
         self.holding = holding_stiffness(self.parameters, predicted.rate)
 
     def _write_sensors(self, stride: int, sample_period: float) -> None:
-        """Write files of the noisy pitch, and of the exact heave and pitch."""
+        """Write files of measured pitch with noise, and of exact heave and pitch, sampled every ``stride`` steps."""
         heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
         noise = normal_samples(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
@@ -166,15 +169,17 @@ class Bench:
 
     @property
     def pitch_inertia(self) -> float:
-        """Inertia I + J in kg m^2 that a moment on the pitch has to turn."""
+        """Pitch inertia of chassis and wheels together, I + J, in kg m^2."""
         return rigid_pitch(self.parameters).total_inertia
 
     def spring_settings(self, stiffness: float) -> dict[str, float]:
-        """Settings of a spring to the ground, with a damper of fixed damping ratio."""
+        """Stiffness (N m/rad) and damping (N m s/rad) of a pitch spring to the ground with the damping ratio
+        DAMPING_RATIO.
+        """
         return {"stiffness": stiffness, "damping": 2.0 * DAMPING_RATIO * math.sqrt(stiffness * self.pitch_inertia)}
 
     def _effects_of_methods(self) -> dict[str, dict[str, Any]]:
-        """Effects of each method by its name, in addition to forces and noise."""
+        """Effects of each stabiliser by name, in addition to wheel forces and noise."""
         options, noisy = self.options, "measured_pitch.csv"
         sure = {"file": noisy, "pitch_deviation": options.angle_deviation, "force_deviation": self.deviation}
         filtered = {**sure, "inertia_deviation": options.inertia_deviation}
@@ -202,8 +207,8 @@ class Bench:
     def score(
         self, engine: str, other_engines: tuple[str, ...], failed: dict[str, str], progress: Progress
     ) -> list[Row]:
-        """A row of figures per method in one engine, and in the other engines if it is accepted; failed runs go into
-        ``failed``.
+        """Run all stabilisers in an engine, and the accepted ones in the other engines. Returns a row of figures per
+        run; reasons of failed runs are added to ``failed``.
         """
         rows: list[Row] = []
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
@@ -220,7 +225,7 @@ class Bench:
         return rows
 
     def _rows_of_run(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
-        """One row of figures, or none if the run fails."""
+        """Run a stabiliser in an engine. Returns its row of figures, or nothing if the run fails."""
         start = time.perf_counter()
         try:
             result = self.simulate(engine, effects)
@@ -232,7 +237,7 @@ class Bench:
         return [{"engine": engine, "road": self.road, **self.row(name, effects, result), "seconds": seconds}]
 
     def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
-        """Result of a run of the perturbed model under the noisy forces, with these effects."""
+        """Run the perturbed model under the noisy forces with some effects in an engine."""
         return run(self._scene(effects), engine)
 
     def _scene(self, effects: dict[str, Any]) -> Scene:
@@ -240,7 +245,9 @@ class Bench:
         return self.follow(self.override, noise | effects)
 
     def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
-        """Figures and verdicts of a run; a run that tumbled gets no damage ratios, which would mislead."""
+        """Figures and verdicts of a run by name. A run whose vehicle tumbled has no damage ratios,
+        which would mislead.
+        """
         limits = self.options.limits
         figures, wrong = figures_of_run(result, self.parameters), errors_of_run(result, self.truth, self.options.slope)
         with_truth = verdict_on_run(figures, wrong, effects, limits)
@@ -276,8 +283,8 @@ class Bench:
         }
 
     def sweep(self) -> np.ndarray:
-        """Sweep (n, 4) over the spring's stiffness: the stiffness, the largest pitch error with the spring and with the
-        high-pass, and the worst damage ratio with the spring.
+        """Sweep over the stiffness of a pitch spring. Columns (n, 4): stiffness (N m/rad), largest pitch error (rad)
+        with the spring and with the equivalent high-pass, worst damage ratio with the spring.
         """
         rows = []
         for stiffness in self.options.sweep:

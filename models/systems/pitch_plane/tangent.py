@@ -1,4 +1,4 @@
-"""Small errors beside a force-excited run: its equations linearised along its own path, step by step.
+"""Propagation of small errors along a force-excited run, by the equations linearised about its path, step by step.
 
 An error x (8,) of the state obeys x' = A(t) x + g(t), where A is the Jacobian of eq. (37) at the path and g what
 wrong forces or wrong parameters add. The march below is the exact linearisation of the reference's Runge-Kutta
@@ -28,18 +28,18 @@ from models.vehicles.pitch_plane import STATES, Parameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension_forces
 
 LONGEST_STEP = 1e-3
-"""Longest step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs one below 4 ms."""
+"""Longest time step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs steps below 4 ms."""
 
 MODEL_DIFFERENCE_SHARE = 1e-6
-"""Part of a wrong model's difference that its derivative is taken over: errors of two parameters must not multiply,
-or a stiffness that is wrong together with the inertia would leave a moment that no run has."""
+"""Share of a wrong model's parameter differences over which derivatives are taken. With a large share the errors of two
+parameters would multiply, and a wrong stiffness with a wrong inertia would give a moment that no run has."""
 
 
 class StageForces(NamedTuple):
-    """Wheel forces on the path, and errors of these forces, at the start, the middle and the end of each step.
+    """Wheel forces and errors of wheel forces at the start, the middle and the end of each time step.
 
-    step : s. forces : (rows, 2) in N, of the wheels. errors : (rows, m, 2) in N, their errors by column. to_middle,
-    to_end, to_next : rows of ``forces`` from a step's start to its middle, its end and the next step.
+    step : time step (s). forces : (rows, 2) in N. errors : (rows, m, 2) in N, for m error columns. to_middle, to_end,
+    to_next : number of rows of ``forces`` from a step's start to its middle, its end and the next step.
     """
 
     step: float
@@ -52,8 +52,8 @@ class StageForces(NamedTuple):
 
 @register_jitable
 def jacobian_product(y, u, p, body, flat, x, dx):
-    """Compute dx = A x, where A is the Jacobian at the state y (8,) under the wheel forces u (2,); ``flat`` : linear
-    geometry.
+    """Compute dx = A x, where A is the Jacobian of the state's rates at the state y (8,) under wheel forces u (2,) in
+    N. body : forces turn with the chassis; flat : linear geometry; p : vehicle parameters.
     """
     pitch, rate = (0.0, 0.0) if flat else (y[3], y[7])
     sine, cosine = math.sin(pitch), math.cos(pitch)
@@ -74,7 +74,7 @@ def jacobian_product(y, u, p, body, flat, x, dx):
 
 @register_jitable
 def add_force_errors(y, p, body, du, dx):
-    """Add to the rates dx (8,) the effect of the errors du (2,) in N of the wheel forces."""
+    """Add the effect of errors du (2,) in N of the wheel forces to the rates dx (8,) of the state's error."""
     sine, cosine = (math.sin(y[3]), math.cos(y[3])) if body else (0.0, 1.0)
     dx[4] -= cosine * du[0] / p[2]
     dx[5] -= cosine * du[1] / p[3]
@@ -121,7 +121,7 @@ def _step_of(rhs, body, flat):
 
 
 def compile_carry(one_step, key):
-    """Compile a march that records the path and its error columns at every step."""
+    """Compile the time integration that records the path and its error columns at every step."""
 
     def carry(y, x, step_inputs, p, wrong_parameters, states, error_columns):
         states[0], error_columns[0] = y, x
@@ -134,7 +134,7 @@ def compile_carry(one_step, key):
 
 @cache
 def march_along(compile_march: Any, drive_mode: str, geometry: str) -> Any:
-    """A march along the path for one mode and geometry, compiled when it is first requested."""
+    """Returns a compiled time integration along the path, for a mode of excitation and a geometry."""
     one_step = _step_of(RIGHT_HAND_SIDES[drive_mode, geometry], drive_mode == "force-body", geometry == "linear")
     return compile_march(one_step, (drive_mode, geometry))
 
@@ -143,7 +143,7 @@ def march_along(compile_march: Any, drive_mode: str, geometry: str) -> Any:
 class TangentPath:
     """A force-excited run along which small errors are propagated, in fixed steps that divide the sampling period.
 
-    per_sample : steps from one sample of the forces to the next; samples : periods that the run covers.
+    per_sample : number of steps between force samples; samples : number of sampling periods of the run.
     """
 
     assembly: Assembly
@@ -153,33 +153,34 @@ class TangentPath:
 
     @property
     def step(self) -> float:
-        """Step of the march (s)."""
+        """Time step of the path (s)."""
         return self.forces.period / self.per_sample
 
     @property
     def steps(self) -> int:
-        """Number of steps of the march."""
+        """Number of time steps of the path."""
         return self.per_sample * self.samples
 
     @property
     def forces_at_stages(self) -> np.ndarray:
-        """The wheel forces (rows, 2) in N at the stages of all steps."""
+        """Wheel forces (rows, 2) in N at the Runge-Kutta stages of all steps."""
         if self.forces.held:
             return self.forces.sample(0.0, self.step, self.steps)
         return self.forces.sample(0.0, self.step / 2, 2 * self.steps + 1)
 
-    def given(self, errors: np.ndarray) -> StageForces:
-        """The wheel forces at the stages of all steps, together with their errors (rows, m, 2) in N."""
+    def stage_forces(self, errors: np.ndarray) -> StageForces:
+        """Returns the wheel forces at the stages of all steps, together with their errors (rows, m, 2) in N."""
         return StageForces(self.step, self.forces_at_stages, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
 
     def march(self, compile_march: Any):
-        """The compiled march for the mode and geometry of the assembly."""
+        """Returns the compiled time integration for the assembly's mode of excitation and geometry."""
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
-    def carry_errors(
+    def propagate_errors(
         self, columns: np.ndarray, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Path (n + 1, 8) and error columns (n + 1, m, 8) at all steps; the columns begin with ``columns`` (m, 8).
+        """Propagate errors along the path. Returns states (n + 1, 8) and error columns (n + 1, m, 8) at all steps; the
+        columns begin with ``columns`` (m, 8).
 
         errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step;
         wrong_parameters : the parameters of a wrong model, whose error forces every column.
@@ -191,7 +192,7 @@ class TangentPath:
         self.march(compile_carry)(
             self.assembly.initial.copy(),
             np.array(columns, dtype=float),
-            self.given(pushes),
+            self.stage_forces(pushes),
             p,
             wrong,
             states,
@@ -201,12 +202,14 @@ class TangentPath:
 
     @property
     def times(self) -> np.ndarray:
-        """Times (s) of the start and of the end of each step."""
+        """Times (n + 1,) of all steps in s, the start included."""
         return self.step * np.arange(self.steps + 1)
 
 
 def path_of(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> TangentPath:
-    """The path of a free force-excited run; raises ValueError for a run of another kind."""
+    """Returns the path of a free force-excited run, in steps of at most ``longest_duration`` (s). Raises ValueError for
+    a run of another kind.
+    """
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
     if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
@@ -216,10 +219,9 @@ def path_of(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> Tange
 
 
 def tilt_error_columns(assembly: Assembly) -> np.ndarray:
-    """Two initial error columns (2, 8): a tilt of 1 rad and a tilt rate of 1 rad/s of the rigid vehicle with its
-    wheels.
+    """Initial error columns (2, 8): a tilt of 1 rad, and a tilt rate of 1 rad/s, of the rigid vehicle with its wheels.
 
-    The struts keep their lengths, so that no fast motion is started that would have to die out first.
+    The struts keep their lengths, so that no fast motion is excited that would have to decay first.
     """
     p, pitch = assembly.parameters, assembly.initial[3]
     cosine = 1.0 if assembly.vehicle.geometry == "linear" else math.cos(pitch)
@@ -228,12 +230,12 @@ def tilt_error_columns(assembly: Assembly) -> np.ndarray:
 
 
 def tilt_map(path: TangentPath) -> np.ndarray:
-    """Matrix (2, 2) that maps tilt and tilt rate at the start of a path to tilt and tilt rate at its end.
+    """Matrix (2, 2) that maps errors of tilt and tilt rate at the start of a path to those at its end.
 
-    The slow error has no damping, so that the determinant of the exact map is 1. Its difference from 1 measures how
-    much of the fast motion is in the four numbers.
+    The slow error has no damping, so that the determinant of the exact map is 1. Its difference from 1 measures the
+    share of fast motion in the matrix.
     """
-    _, columns = path.carry_errors(tilt_error_columns(path.assembly))
+    _, columns = path.propagate_errors(tilt_error_columns(path.assembly))
     return columns[-1][:, [3, 7]].T
 
 
@@ -241,8 +243,8 @@ def measured_growth(path: TangentPath) -> tuple[float, float]:
     """Growth rate (1/s) of a tilt error along a path, and the uncertainty (1/s) of this rate, which falls with the
     path's length.
 
-    The rate is that of the larger eigenvalue of ``tilt_map``; both on the unit circle is no growth but a swing. Where
-    they meet, at 1, an error of the map moves them by its square root.
+    The rate is that of the larger eigenvalue of ``tilt_map``; with both eigenvalues on the unit circle the error swings
+    and does not grow. Where the eigenvalues meet, at 1, an error of the map changes them by its square root.
     """
     tilting, duration = tilt_map(path), path.forces.period * path.samples
     departure = abs(float(np.linalg.det(tilting)) - 1.0)
@@ -250,32 +252,32 @@ def measured_growth(path: TangentPath) -> tuple[float, float]:
 
 
 def slow_swing_frequency(path: TangentPath) -> float:
-    """Frequency (rad/s) of the slow swing of a tilt error along a path; 0 where it grows instead."""
+    """Angular frequency (rad/s) of the slow swing of a tilt error along a path; 0 where the error grows instead."""
     half = 0.5 * float(np.trace(tilt_map(path)))
     return math.acos(half) / (path.forces.period * path.samples) if abs(half) <= 1.0 else 0.0
 
 
 @dataclass(frozen=True)
 class CovarianceOverTime:
-    """Covariance of the state over time. times (n,) : s, those of the samples; matrices (n, 8, 8) : in products of the
-    states' units.
+    """Covariance of the vehicle's state over time. times (n,) : of the force samples (s); matrices (n, 8, 8) : in
+    products of the states' units.
     """
 
     times: np.ndarray
     matrices: np.ndarray
 
     def deviation(self, coordinate: str) -> np.ndarray:
-        """Standard deviation (n,) of a coordinate over time, by its name; m or rad."""
+        """Standard deviation (n,) over time of a coordinate (m or rad), by its name."""
         i = STATES.index(coordinate)
         return np.sqrt(self.matrices[:, i, i])
 
 
 def covariance(assembly: Assembly, deviation: float, longest_duration: float = LONGEST_STEP) -> CovarianceOverTime:
-    """Covariance of the state along a free force-excited run under white noise, given the noise's standard deviation
-    (N) per sample.
+    """Covariance of the state along a free force-excited run under white noise on the wheel forces, of standard
+    deviation ``deviation`` (N) per sample.
 
-    longest_duration : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
-    every sample of a spline reaches into all periods.
+    longest_duration : longest time step (s). Raises ValueError for any other run, and for spline interpolation of
+    samples, as every sample of a spline acts on all periods.
     """
     path = path_of(assembly, longest_duration)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
@@ -284,7 +286,9 @@ def covariance(assembly: Assembly, deviation: float, longest_duration: float = L
 
 
 def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:
-    """Covariances (samples + 1, 8, 8) at the samples of a path under noise of ``deviation`` (N); 0 at the start."""
+    """Covariances (samples + 1, 8, 8) of the state at the force samples of a path, under noise of standard deviation
+    ``deviation`` (N); 0 at the start.
+    """
     matrices = np.zeros((path.samples + 1, 8, 8))
     stages = np.arange(2 * path.per_sample + 1) / (2 * path.per_sample)
     weights = np.zeros((len(stages), 12, 2))  # force errors of 1 N in the sample at the start and in that at the end
@@ -294,7 +298,7 @@ def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:
     path.march(_compile_covariance)(
         path.assembly.initial.copy(),
         path.per_sample,
-        path.given(weights),
+        path.stage_forces(weights),
         path.assembly.parameters.array(),
         deviation**2,
         matrices,

@@ -1,9 +1,9 @@
-"""How long a force-excited run can be trusted, said before it starts.
+"""Time up to which the pitch of a force-excited run can be trusted, predicted before the run.
 
-Each source of error has its own time at which the pitch is ``angle`` off: half of all noise paths by the closed law
-along the wheel forces; the error between the samples, and that of a wrong model, carried along the run's own path;
-and rounding, which no integrator escapes. The earliest one counts. What samples do not show, motion faster than half
-their rate, nothing here can see.
+Each source of error has a time at which the pitch is wrong by ``angle``: noise by a closed law along the wheel forces
+(median of all noise paths); interpolation between samples and a wrong model by error propagation along the run's path;
+and rounding, which no integrator avoids. The earliest time counts. Motion faster than half the sampling rate is not in
+the samples and cannot be judged here.
 """
 
 import math
@@ -32,17 +32,19 @@ if TYPE_CHECKING:
     from models.measured.axle_forces import AxleForces
 
 UNTRUSTED_PITCH = 0.05
-"""A pitch error (rad) from which on a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
+"""Pitch error (rad) beyond which a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
 FEWEST_SAMPLES = 8
-"""Samples that a quintic spline needs, with two to spare."""
+"""Fewest samples for which the interpolation error is estimated: a quintic spline needs six."""
 
 
 SMALL_PITCH = 0.2
-"""rad: the laws are of small errors, and right to 5 % up to here (Monte Carlo)."""
+"""Largest pitch error (rad) for the laws of growth, which are right to 5 % up to here (Monte Carlo)."""
 
 
 def small_errors(angle: float) -> Assumption:
-    """Assumption that ``angle``, up to which a run is trusted, is small enough for the laws of growth."""
+    """Assumption that the pitch error ``angle`` (rad) up to which a run is trusted is small enough for the laws of
+    growth.
+    """
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
     return Assumption(
         "small errors", says, remedy, partial(_watched_allowed_error, angle), "rad", upper_limit=SMALL_PITCH
@@ -55,10 +57,10 @@ def _watched_allowed_error(angle: float, run: Result) -> Watched:
 
 @dataclass(frozen=True)
 class Growth:
-    """Growth that the wheel forces alone give a pitch error, computed before any run.
+    """Growth of a pitch error along the wheel forces of a run, computed before the run.
 
-    times (n,) in s, those of the samples; rate : mean growth rate, 1/s; sinh_rate (n,) : the rate in the sinh law at
-    each time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
+    times (n,) : of the samples (s); rate : mean growth rate (1/s); sinh_rate (n,) : the rate in the sinh law at each
+    time (1/s). All rates are 0 where the forces turn with the chassis or the geometry is linear.
     """
 
     times: np.ndarray
@@ -68,19 +70,21 @@ class Growth:
 
 @dataclass(frozen=True)
 class GrowthCurve:
-    """Size (rad) of the pitch error from one source at ``times`` (n,) in s, valid while it is small."""
+    """Magnitude (n,) of the pitch error (rad) from a source of error over ``times`` (n,) in s, valid while small."""
 
     times: np.ndarray
     size: np.ndarray
 
     def passing_time(self, angle: float = UNTRUSTED_PITCH) -> float | None:
-        """First time (s) at which the error exceeds ``angle`` (rad), None if it never does."""
+        """First time (s) at which the pitch error exceeds ``angle`` (rad); None if it never does."""
         beyond = ~(self.size <= angle)  # what is not a number any more has
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
 
 def pitch_error_growth(assembly: Assembly) -> Growth:
-    """Growth of a pitch error along a free force-excited run; raises ValueError for a run of another kind."""
+    """Computes the growth of a pitch error along a free force-excited run; raises ValueError for a
+    run of another kind.
+    """
     path = path_of(assembly)
     sample_times = path.forces.period * np.arange(path.samples + 1)
     if assembly.mode == "force-body" or assembly.vehicle.geometry == "linear":
@@ -92,13 +96,17 @@ def pitch_error_growth(assembly: Assembly) -> Growth:
 
 
 def _covering_samples(path: TangentPath) -> np.ndarray:
-    """Samples (n + 1, 2) of the run's wheel forces; if held samples end with the run, the last one is repeated."""
+    """Wheel force samples (n + 1, 2) in N that cover the run; if held samples end with the run, the
+    last is repeated.
+    """
     values = path.forces.values[: path.samples + 1]
     return values if len(values) > path.samples else np.vstack([values, values[-1:]])
 
 
-def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
-    """Pitch error from white noise of ``deviation`` (N) on each force sample: median of its size over noise paths."""
+def noise_error_curve(assembly: Assembly, deviation: float) -> GrowthCurve:
+    """Pitch error over time from white noise of ``deviation`` (N) on each force sample: median magnitude over noise
+    paths.
+    """
     growing, period = pitch_error_growth(assembly), path_of(assembly).forces.period
     intensity = rigid_pitch(assembly.parameters).noise_intensity(deviation, period)
     return GrowthCurve(
@@ -107,12 +115,11 @@ def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
 
 
 def interpolation_error(path: TangentPath) -> np.ndarray:
-    """Error (3 steps, 2) in N that the scene's interpolation of force samples has, compared with a quintic spline
-    through these samples.
+    """Error (3 steps, 2) in N of the scene's interpolation of force samples, compared with a quintic spline, at the
+    start, the middle and the end of each step.
 
-    At the start, the middle and the end of each step. Linear samples err by f'' t (T - t) / 2, on average by
-    f'' T^2 / 12. Held ones first of all delay the whole run by T / 2, which is no drift: they are judged by the
-    spline as late as that, and err by -f'' T^2 / 24 on average.
+    Linear samples err by f'' t (T - t) / 2, on average by f'' T^2 / 12. Held samples delay the run by T / 2, which is
+    no drift: they are compared with the spline at that delay, and err by -f'' T^2 / 24 on average.
     """
     spline = Smooth(_covering_samples(path), path.forces.period, degree=5)
     count, stage_forces = path.steps, path.forces_at_stages
@@ -122,8 +129,8 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> GrowthCurve:
-    """Pitch error from the interpolation between samples alone; 0 for a run with too few samples to estimate it."""
+def interpolation_error_curve(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> GrowthCurve:
+    """Pitch error over time from the interpolation between force samples alone; 0 for a run with too few samples."""
     path = path_of(assembly, longest_duration)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
@@ -131,7 +138,7 @@ def interpolation(assembly: Assembly, longest_duration: float = LONGEST_STEP) ->
 def model_error_curve(
     assembly: Assembly, wrong_parameters: Parameters, longest_duration: float = LONGEST_STEP
 ) -> GrowthCurve:
-    """Pitch error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
+    """Pitch error over time of a run with ``wrong_parameters`` instead of the assembly's parameters.
 
     The error that drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine
     alone. The difference is propagated along a run with the mean of both models, which leaves no error of second
@@ -150,12 +157,12 @@ def _growth_by_parameters(
     path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
 ) -> GrowthCurve:
     pushes = None if errors is None else errors[:, None, :]
-    _, columns = path.carry_errors(np.zeros((1, 8)), pushes, wrong_parameters)
+    _, columns = path.propagate_errors(np.zeros((1, 8)), pushes, wrong_parameters)
     return GrowthCurve(path.times, np.abs(columns[:, 0, 3]))
 
 
 def rounding_error_curve(assembly: Assembly) -> GrowthCurve:
-    """Pitch error from rounding alone, median of its size: each step rounds the pitch rate anew. No solver can do
+    """Pitch error over time from rounding alone, median magnitude: each step rounds the pitch rate. No solver can do
     better.
     """
     growing, path = pitch_error_growth(assembly), path_of(assembly)
@@ -169,10 +176,10 @@ def rounding_error_curve(assembly: Assembly) -> GrowthCurve:
 
 @dataclass(frozen=True)
 class Trust:
-    """Times (s) at which each source of error ends the trust in a run, None where it does not; ``rate`` in 1/s,
-    ``angle`` in rad.
+    """Prediction of how long a run can be trusted. times : time (s) at which each source of error exceeds ``angle``
+    (rad), None where it never does; rate : mean growth rate of a pitch error (1/s).
 
-    unchecked_text : what was not looked at, with what would show it.
+    unchecked_text : text on properties of the inputs that were not checked.
     """
 
     times: dict[str, float | None]
@@ -182,12 +189,12 @@ class Trust:
 
     @property
     def until(self) -> tuple[str, float] | None:
-        """The source of error that ends the trust first, and its time (s); None if nothing limits the run."""
+        """Source of error whose time comes first, and this time (s); None if nothing limits the run."""
         limits = [(time, name) for name, time in self.times.items() if time is not None]
         return min(limits)[::-1] if limits else None
 
     def __str__(self) -> str:
-        """The line that describes this trust in a plan."""
+        """Returns the line of text on this prediction in a plan."""
         grown, remarks = (
             f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s",
             self.unchecked_text and f"; {self.unchecked_text}",
@@ -199,8 +206,8 @@ class Trust:
 
 
 def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust | None:
-    """Time for which a scene's run can be trusted, and the reason. None for a run that is guided, held, or on a road:
-    its errors do not grow.
+    """Predict how long a scene's run can be trusted, up to a pitch error ``angle`` (rad). None for a run with
+    prescribed pitch, with a pitch spring or on a road, whose errors do not grow.
     """
     forces = assembly.input
     try:
@@ -208,19 +215,19 @@ def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust |
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
-    times_of_causes = {"interpolation between the samples": interpolation(assembly).passing_time(angle)}
+    times_of_causes = {"interpolation between the samples": interpolation_error_curve(assembly).passing_time(angle)}
     added = assembly.scene.effects.get("force_noise")
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
-        times_of_causes[named] = noise(assembly, added.deviation).passing_time(angle)
+        times_of_causes[named] = noise_error_curve(assembly, added.deviation).passing_time(angle)
     times_of_causes |= _steady_drift_time(assembly, angle)
     times_of_causes["rounding"] = rounding_error_curve(assembly).passing_time(angle)
     return Trust(times_of_causes, pitch_error_growth(assembly).rate, angle, _unchecked_sentence(assembly))
 
 
 def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
-    """Time (s) by which the mean accelerations of doubtful forces have turned the vehicle by the angle, or moved it
-    vertically as far as the angle moves one axle relative to the other.
+    """Times (s) after which mean accelerations of doubtful wheel forces have turned the vehicle by ``angle`` (rad), or
+    moved it vertically by ``angle`` times the wheelbase.
     """
     if not assembly.doubts:
         return {}
@@ -238,7 +245,7 @@ def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
 
 
 def _axles(assembly: Assembly) -> "AxleForces":
-    """The wheel forces of a run in the form that the checks of recordings read."""
+    """Returns the wheel forces of a run in the form that the checks of recordings take."""
     from models.measured.axle_forces import AxleForces
 
     path, turn = path_of(assembly), assembly.mode == "force-body"
@@ -247,7 +254,7 @@ def _axles(assembly: Assembly) -> "AxleForces":
 
 
 def _unchecked_sentence(assembly: Assembly) -> str:
-    """Sentence on the properties of wheel forces from a file that were not checked."""
+    """Sentence on properties of wheel forces from a file that were not checked; empty without such a file."""
     from models.measured.axle_forces import unchecked_delay_sentence
 
     return unchecked_delay_sentence(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""

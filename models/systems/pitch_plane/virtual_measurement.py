@@ -1,4 +1,6 @@
-"""A virtual measurement: a run on a road, the files that it leaves, and scenes that follow it on these files."""
+"""Virtual measurement: a run on a road, files of its wheel forces and pitch, and scenes that are
+driven by these files.
+"""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,34 +18,36 @@ from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
 from models.vehicles.pitch_plane import STATE_NAMES, Parameters
 
 PAPER_FACTORS = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
-"""The perturbed model of Appendix B, as factors on the parameters."""
+"""Perturbed model of the paper's Appendix B, as factors on the vehicle's parameters."""
 FEWEST_SAMPLES = 8
-"""Samples that a spline through the measured pitch needs."""
+"""Fewest samples of a measurement, as a spline through the measured pitch needs them."""
 
 MEASURING_EFFECTS = ("road", "lift_off")
-"""Effects that the measurement may have; the runs on its files have no tyres."""
+"""Effects that the run of the virtual measurement may have; the runs on its files have no tyres."""
 PRESCRIBED_STATES = {
     "prescribed_heave_and_pitch": ("z3", "z3_rate", "pitch", "pitch_rate"),
     "prescribed_pitch": ("pitch", "pitch_rate"),
 }
-"""States that an effect takes from its own file."""
+"""States that an effect prescribes from its file."""
 
 BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
-"""Builder of a force-excited scene from overrides of parameters and further effects."""
+"""Function that builds a force-excited scene from overrides of vehicle parameters and further effects."""
 
 
 def perturbed_parameters(parameters: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
-    """Changed parameters by name: each is the value in ``parameters`` times its factor."""
+    """Returns the changed parameters by name: each is the value in ``parameters`` times its factor."""
     return {name: getattr(parameters, name) * factor for name, factor in factors.items()}
 
 
 def measure(scene: Scene, error: bool = False) -> Result:
-    """Run the vehicle on the road in the reference, with Runge-Kutta steps; ``error`` as in ``run``."""
+    """Run the vehicle on the road in the reference, with Runge-Kutta 4; error : whether its error is estimated."""
     return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration), error=error)
 
 
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
-    """Refuse a scene that is no virtual measurement, or with which a run on its measured forces is impossible."""
+    """Raise InputError for a scene that is no virtual measurement, or for which a run on its measured forces is
+    impossible.
+    """
     for name in scene.effects:
         if name not in MEASURING_EFFECTS:
             allowed = "this study measures on a road and names the effects of the other runs itself: drop it"
@@ -65,7 +69,9 @@ def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> 
 
 
 def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
-    """Refuse an engine whose step differs from the measurement's, where runs are compared with it row by row."""
+    """Raise InputError for an engine whose time step differs from the measurement's, where runs are compared row by
+    row.
+    """
     for engine in engines:
         step = scene.settings(engine).step
         if step != scene.run.step:
@@ -77,7 +83,7 @@ def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
 
 
 def steps_per_sample(scene: Scene, sampling_rate: float) -> int:
-    """Number of steps of the measurement between samples."""
+    """Number of time steps of the measurement between samples; raises InputError if it is not whole."""
     ratio = 1.0 / (sampling_rate * scene.run.step)
     if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         allowed = f"the sampling period must be a multiple of run.step = {scene.run.step:g} s"
@@ -86,13 +92,15 @@ def steps_per_sample(scene: Scene, sampling_rate: float) -> int:
 
 
 def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, sample_period: float) -> None:
-    """Write ``wheel_forces.csv`` with forces (n,) in N, up on the wheels, every ``sample_period`` (s)."""
+    """Write ``wheel_forces.csv`` with front and rear wheel forces (n,) in N, positive up, every
+    ``sample_period`` (s).
+    """
     write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, sample_period)
 
 
 def write_measurement(measured_run: Result, folder: Path, sample_period: float) -> float:
-    """Write ``wheel_forces.csv`` and ``pitch.csv`` with a sample every ``sample_period`` (s); returns the largest force
-    (N).
+    """Write ``wheel_forces.csv`` and ``pitch.csv`` of a measurement with a sample every ``sample_period`` (s). Returns
+    the largest force (N).
     """
     stride = round(sample_period / float(measured_run.times[1] - measured_run.times[0]))
     front, rear, pitch = (measured_run[name][::stride] for name in ("f1", "f2", "pitch"))
@@ -102,8 +110,8 @@ def write_measurement(measured_run: Result, folder: Path, sample_period: float) 
 
 
 def follower_builder(scene: Scene, folder: Path) -> BuildFollower:
-    """Return a function that builds scenes on the files in ``folder``; their runs start in the state of the
-    measurement.
+    """Returns a function that builds scenes driven by the measured files in ``folder``; their runs start in the state
+    in which the measurement started.
     """
     initial = dict(zip(STATE_NAMES, assembly_of_scene(scene).initial.tolist(), strict=True))
     parameters = scene.vehicle_parameters().model_dump()

@@ -1,5 +1,5 @@
-"""A vehicle on random roads: exact variances, and runs in time."""
+"""Ride of a vehicle on random roads: exact variances of its outputs, or runs in time where it is nonlinear."""
 
 ENGINES = ("reference", "exudyn", "mujoco")
 NO_PRICE = "answers by covariances, which have no step; what its effects cost is told by `show SCENE --price`"
-"""Why `twinrig price` has nothing to choose, and what there is instead."""
+"""Reason why `twinrig price` does not apply to scenes of ride, and what to use instead."""

@@ -1,7 +1,8 @@
-"""Assumptions of a ride. Where no values over time are known they are Gaussian, and judged by three deviations.
+"""Assumptions of a ride. Where no values over time are known they are Gaussian, and checked at three standard
+deviations.
 
-Linear vehicles have tyres that would pull, springs without stops, angles without an end; spectra of roads are known for
-waves of some lengths; curves are known as far as their tables go.
+Linear vehicles have tyres that could pull, springs without stops and unlimited angles. Spectra of roads are known for a
+range of wavelengths, and force curves within their tables.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,36 +20,39 @@ from models.vehicles.spatial import NO_LIMITS, Curve, SpatialVehicle, SpringDamp
 from models.vehicles.spatial_linear import linearise
 
 SMALL_ANGLE = 0.3
-"""rad: where sines are taken for angles they may be so large: 1.5 % of the sine."""
+"""Largest angle (rad) of a body in linear equations: it differs from its sine by 1.5 %."""
 LARGEST_TRAVEL = 0.1
-"""m: suspensions of road vehicles meet a stop at about so much travel."""
+"""Usual travel (m) at which suspensions of road vehicles meet a stop."""
 LARGEST_SLIP_ANGLE = 0.07
-"""rad (4 degrees): side forces of tyres grow in proportion to slip angles up to about so much."""
+"""Largest slip angle (rad, 4 degrees) up to which side forces of tyres grow in proportion to it."""
 PULL_LIMIT = 1.0
-"""N: a tyre that pulls by less is at its edge."""
+"""Largest pull (N) of a tyre at the road that does not count as leaving the road."""
 SHORTEST_WAVE, LONGEST_WAVE = 0.1, 100.0
-"""m: waves of the road's standard spectra (ISO 8608: 0.01 to 10 cycles/m); a contact patch swallows shorter ones."""
+"""Shortest and longest wave (m) of standard road spectra (ISO 8608: 0.01 to 10 cycles/m); a contact patch averages out
+shorter waves.
+"""
 LEFT_OUT_SHARE = 0.1
-"""Share of an output's variance that gains may leave out: beyond, its distribution is no Gaussian one any more."""
-IN_TIME = "use the study ride_nonlinear"
+"""Largest share of an output's variance that gains may neglect: beyond, its distribution is not Gaussian any more."""
+RUN_IN_TIME_TEXT = "use the study ride_nonlinear"
 LEAST_UPRIGHT_COSINE = 0.7
-"""Cosine of a spring's direction with the vertical from which it is a suspension."""
+"""Least cosine between a spring's direction and the vertical at which the spring counts as a suspension."""
 
 
 def assumptions(
     scene: RideScene, vehicle: SpatialVehicle, motion: WatchedMotion | None = None, replaced: bool = False
 ) -> list[Assumption]:
-    """Assumptions of a vehicle in a scene of ride; ``motion`` : of a run, by which they are judged.
+    """Assumptions of the vehicle and road of a ride scene; ``motion`` : of a run, on which they are checked, None to
+    list them only.
 
     replaced : whether statistical linearisation replaces nonlinear springs by gains.
     """
 
     def values_of(name: str) -> np.ndarray | Gaussian:
         assert motion is not None
-        return motion.of(name)
+        return motion.motion_of_part(name)
 
     assumptions_of_vehicle = [
-        *_tyres(vehicle, values_of),
+        *_tyre_assumptions(vehicle, values_of),
         *_angle_assumptions(vehicle, values_of),
         *_slip_assumptions(vehicle, values_of),
     ]
@@ -65,19 +69,19 @@ def assumptions(
 ValuesByName = Callable[[str], np.ndarray | Gaussian]
 
 
-def _tyres(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
+def _tyre_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
     loads = static_loads(vehicle)
     if not loads or vehicle.lifts:
         return
 
     def watched(run: Result) -> Watched:
-        return {f"tyre {name}": _raised_by(values_of(f"load {name}"), load) for name, load in loads.items()}
+        return {f"tyre {name}": _with_static_load(values_of(f"load {name}"), load) for name, load in loads.items()}
 
-    remedy = f'{IN_TIME} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
+    remedy = f'{RUN_IN_TIME_TEXT} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
     yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _raised_by(values: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+def _with_static_load(values: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
     return replace(values, mean=values.mean + static_load) if isinstance(values, Gaussian) else values + static_load
 
 
@@ -112,7 +116,7 @@ def _slip_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Itera
 def _travel_assumptions(
     scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, values_of: ValuesByName
 ) -> Iterator[Assumption]:
-    """Assumption that the linear spring between a wheel and the body that it carries stays within its free travel."""
+    """Assumption that the linear spring between a wheel and the body above stays within its free travel."""
     wheels = {tyre.body for tyre in vehicle.tyres}
     ends = {spring.first_body, spring.second_body}
     if abs(spring.axis[2]) < LEAST_UPRIGHT_COSINE or None in ends or not ends & wheels:
@@ -121,7 +125,7 @@ def _travel_assumptions(
     yield Assumption(
         f"free travel of {spring.name}",
         f"the suspension {spring.name} meets no stop",
-        f"give its spring in the vehicle file a travel_force with stops, and {IN_TIME}",
+        f"give its spring in the vehicle file a travel_force with stops, and {RUN_IN_TIME_TEXT}",
         lambda run: {spring.name: values_of(f"travel {spring.name}")},
         "m",
         -free,
@@ -130,8 +134,8 @@ def _travel_assumptions(
 
 
 def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of: ValuesByName) -> Iterator[Assumption]:
-    """Assumption on a nonlinear spring: its motion stays within the straight piece about rest if slopes at rest are
-    used, else within its tables.
+    """Assumptions that travel and rate of a nonlinear spring stay within its curves' tables, or within their linear
+    range about rest where slopes at rest are used.
     """
     for kind, curve, unit in (("travel", spring.travel_force, "m"), ("rate", spring.rate_force, "m/s")):
         friction = spring.friction and kind == "rate" and scene.vehicle.small_motion
@@ -142,7 +146,7 @@ def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of: Values
             low, high = max(low, -spring.friction_rate), min(high, spring.friction_rate)
         straight = (
             f"{kind}s of {spring.name} stay where its slopes at rest stand for its curves",
-            f"leave out vehicle.small_motion and {IN_TIME}",
+            f"leave out vehicle.small_motion and {RUN_IN_TIME_TEXT}",
         )
         table = (
             f"{kind}s of {spring.name} stay within the table of its curve",
@@ -161,7 +165,7 @@ def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of: Values
 
 
 def _curve_range(curve: Curve | None, small_motion: bool) -> tuple[float, float]:
-    """Ends of a curve's table or, for small motion, of the straight piece about rest."""
+    """Lowest and highest argument of a curve's table or, for small motion, of its linear range about rest."""
     if curve is None:
         return -np.inf, np.inf
     curve_arguments = np.array(curve.arguments)
@@ -175,8 +179,8 @@ def _curve_range(curve: Curve | None, small_motion: bool) -> tuple[float, float]
 
 
 def _wave_assumptions(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
-    """Assumptions that, at constant speeds, the road waves that excite wheels and body have wavelengths for which
-    spectra of roads are known. A drive is slow only at its start.
+    """Assumptions that the road waves that excite wheels and body have wavelengths for which spectra of roads are
+    known. Slow speeds count at constant speeds only, as a drive is slow only at its start.
     """
     if scene.road.file is not None or vehicle.limits:
         return
@@ -203,8 +207,8 @@ def _wave_assumptions(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Ass
 
 
 def tyre_mode_frequencies(vehicle: SpatialVehicle) -> tuple[float, float]:
-    """Highest frequency (Hz) of motions that deform mostly the tyres, 0 if there are none, and lowest frequency of all
-    oscillations, infinite if there are none.
+    """Highest natural frequency (Hz) of motions that deform mostly the tyres, 0 if there are none, and lowest natural
+    frequency (Hz) of all motions, infinite if there are none.
     """
     still = replace(vehicle, side_forces=(), drags=(), limits=NO_LIMITS, gravity=0.0)
     linear, motion = linearise(still), Kinematics(still)
@@ -218,7 +222,9 @@ def tyre_mode_frequencies(vehicle: SpatialVehicle) -> tuple[float, float]:
 
 
 def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
-    """Assumption that people stay on their seats, for outputs that are weighted for people along the vertical."""
+    """Assumption that people stay on their seats, for vertical accelerations weighted by ISO 2631-1 (Wk): they stay
+    above -g.
+    """
     people = [name for name, weighting_name in scene.weighting.items() if weighting_name == "Wk"]
     if not people:
         return

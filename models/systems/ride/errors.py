@@ -1,8 +1,8 @@
 """Rounding errors of the standard deviations of linear rides at constant speeds.
 
-A covariance has no steps. Its error is what rounding makes of it, told by a second solution at some points: by the
-Lyapunov equation itself, refined in extended precision, of a vehicle whose matrices differ by their last digits.
-Shares are of an output's standard deviation.
+A covariance has no time steps. Its error is that of rounding, estimated by a second solution at some speeds: the
+Lyapunov equation, refined in extended precision, for a vehicle whose matrices differ in their last digits. Relative
+errors refer to an output's standard deviation.
 """
 
 from collections.abc import Mapping
@@ -18,21 +18,28 @@ from models.ride.excited import vehicle_with_road
 from models.ride.sweep import Sweep
 from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
-from models.systems.ride.of_scene import Linear
+from models.systems.ride.of_scene import LinearVehicleAtSpeed
 from models.vehicles.linear_vehicle import LinearVehicle
 
 CHECKED_SPEEDS = 3
-"""Speeds of a sweep that are solved again."""
+"""Number of speeds of a sweep at which the solution is repeated with changed matrices."""
 MATRIX_ACCURACY, CORNERED_LAW_ACCURACY = 4.0 * float(np.finfo(float).eps), 1e-11
-"""Relative accuracy of matrices: of formulas and of an engine's smooth laws, and of an engine's curves with corners."""
-STILL = 1e-9
-"""Share of the largest deviation of the same unit below which an output stands still, as roll does on equal tracks."""
+"""Relative accuracy of the vehicle's matrices: from formulas or an engine's smooth force laws, and from an engine's
+force curves with corners.
+"""
+STANDSTILL_SHARE = 1e-9
+"""Standard deviation of an output, divided by the largest of the same unit, below which the output does not move, as
+roll on equal tracks.
+"""
 SAFETY_FACTOR = 2.0
-"""One draw of last digits may change little by chance."""
+"""Factor on the observed change, as a single change of last digits may have little effect by chance."""
 
 
 def with_changed_last_digits(vehicle: LinearVehicle, accuracy: float, draw: int = 0) -> LinearVehicle:
-    """The vehicle with every entry of its matrices changed by a relative error of up to ``accuracy``."""
+    """Returns the vehicle with every entry of its matrices changed by a relative error of up to ``accuracy``.
+
+    draw : offset in the sequence of errors, which selects another set of changes.
+    """
 
     def changed(matrix: np.ndarray) -> np.ndarray:
         return matrix * (1.0 + accuracy * np.cos(np.arange(1 + draw, 1 + draw + matrix.size)).reshape(matrix.shape))
@@ -51,39 +58,52 @@ def _symmetrised(matrix: np.ndarray) -> np.ndarray:
 
 
 def with_error_of_sweep(
-    run: Result, swept: Sweep, linear: Linear, roads: Mapping[str, Excitation], filters: Mapping[str, str], digit: float
+    run: Result,
+    sweep: Sweep,
+    linear: LinearVehicleAtSpeed,
+    roads: Mapping[str, Excitation],
+    weightings: Mapping[str, str],
+    matrix_accuracy: float,
 ) -> Result:
-    """The result with the rounding errors of its standard deviations, estimated at some speeds on all roads."""
-    checked_speeds = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
+    """Returns the result with the rounding errors of its standard deviations, estimated at some speeds on all roads.
+
+    matrix_accuracy : relative accuracy of the entries of the vehicle's matrices.
+    """
+    checked_speeds = np.unique(np.linspace(0, len(sweep.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
     recomputed = np.array(
         [
-            [_deviations_of_changed(linear, road, filters, float(swept.speeds[i]), digit) for i in checked_speeds]
+            [
+                _deviations_of_changed(linear, road, weightings, float(sweep.speeds[i]), matrix_accuracy)
+                for i in checked_speeds
+            ]
             for road in roads.values()
         ]
     )
-    deviation = swept.deviation[:, checked_speeds]
+    deviation = sweep.deviation[:, checked_speeds]
     known = np.isfinite(deviation) & np.isfinite(recomputed)
-    sizes, estimates = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
+    sizes, estimates = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(sweep.outputs))], {}
     largest = {
-        unit: max(size for size, unit_of_output in zip(sizes, swept.units, strict=True) if unit_of_output == unit)
-        for unit in swept.units
+        unit: max(size for size, unit_of_output in zip(sizes, sweep.units, strict=True) if unit_of_output == unit)
+        for unit in sweep.units
     }
-    for i, (name, unit, size) in enumerate(zip(swept.outputs, swept.units, sizes, strict=True)):
+    for i, (name, unit, size) in enumerate(zip(sweep.outputs, sweep.units, sizes, strict=True)):
         if size > 0.0:
             is_known = known[..., i]
             changes = recomputed[..., i][is_known] - deviation[..., i][is_known]
             error = max(SAFETY_FACTOR * root_mean_square(changes), MATRIX_ACCURACY / 4.0 * size)
-            estimates[name] = Estimate(error, unit, error / max(size, STILL * largest[unit]), 1.0, 0.0)
-    points = f"{len(checked_speeds)} of {len(swept.speeds)} speeds"
+            estimates[name] = Estimate(error, unit, error / max(size, STANDSTILL_SHARE * largest[unit]), 1.0, 0.0)
+    points = f"{len(checked_speeds)} of {len(sweep.speeds)} speeds"
     return with_stated_errors(run, estimates, f"the Lyapunov equation of nudged matrices at {points}", "")
 
 
 def _deviations_of_changed(
-    linear: Linear, road: Excitation, filters: Mapping[str, str], speed: float, digit: float
+    linear: LinearVehicleAtSpeed, road: Excitation, weightings: Mapping[str, str], speed: float, matrix_accuracy: float
 ) -> np.ndarray:
-    """Standard deviations (outputs,) of the vehicle with changed last digits; nan where it has none."""
+    """Standard deviations (outputs,) at a speed (m/s) of the vehicle with changed last digits; NaN where the solution
+    fails.
+    """
     system = system_with_weightings(
-        vehicle_with_road(with_changed_last_digits(linear(speed), digit), road, speed), filters
+        vehicle_with_road(with_changed_last_digits(linear(speed), matrix_accuracy), road, speed), weightings
     )
     try:
         return stationary_covariance(system).deviation

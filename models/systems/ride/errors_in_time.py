@@ -1,4 +1,6 @@
-"""Errors of rides in time by their step length and their finite number of copies: drives, copies, gains."""
+"""Stated errors of drives at varying speed, of Monte Carlo copies and of statistical linearisation, by step length and
+number of copies.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -27,14 +29,20 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
 DRIVE_ORDER = 10
-"""Of a drive's points in path."""
+"""Order of convergence of the covariance along a drive, in the length of its steps."""
 SPEED_BY_SPEED = ", each speed by itself"
+"""Ending of the names of quasi-stationary channels."""
 COPIES_ORDER = 4
-LEAST_LEFT = 0.25
-"""Error of a deviation, at least, by the share of its variance that gains leave out."""
+"""Order of convergence of the copies' standard deviations, in the time step."""
+LEAST_ERROR_OF_NEGLECTED_SHARE = 0.25
+"""Least error of a standard deviation by statistical linearisation, divided by the share of its variance that gains
+neglect.
+"""
 
 DeviationsAtConstantSpeed = Callable[[int], np.ndarray]
-"""Deviations (time, outputs) as if each speed had always been driven, by every so many of the speeds that are known."""
+"""Function from a stride n to quasi-stationary standard deviations (time, outputs) along a drive, interpolated between
+every n-th of the solved speeds.
+"""
 
 
 def with_error_of_drive(
@@ -44,9 +52,11 @@ def with_error_of_drive(
     road: Excitation,
     quasi_stationary_of: DeviationsAtConstantSpeed,
 ) -> Result:
-    """The result with the errors of its deviations. They are estimated by the same drive in longer steps that end with
-    its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly. Shares are of the
-    deviations themselves, which along an even drive do not change. A drive of one step has no estimate.
+    """Returns the result of a drive with the errors of its standard deviations. They are estimated by the same drive in
+    longer steps, and by fewer speeds between which quasi-stationary deviations are interpolated.
+
+    Longer steps end at ends of the drive's steps. Relative errors refer to the deviations, not to their change, which
+    is 0 along a drive of constant speed. A drive of one step has no estimate.
     """
     assert scene.drive is not None
     drive: VaryingSpeed = run.detail
@@ -98,7 +108,7 @@ def with_error_of_drive(
 
 
 def _drive_until(profile: SpeedProfile, end_time: float) -> SpeedProfile:
-    """The drive cut off at a time (s)."""
+    """Returns the drive up to a time (s)."""
     is_before = profile.times < end_time - 1e-9
     kept_times = [*profile.times[is_before], end_time]
     return SpeedProfile(kept_times, [*profile.speeds[is_before], float(profile.speed(end_time))])
@@ -112,26 +122,27 @@ def with_error_of_copies(
     copies: Mapping[float, Copies],
     seed: int,
 ) -> Result:
-    """The result with the errors of its standard deviations, one for each output.
+    """Returns the result with the errors of its standard deviations by copies and by statistical linearisation, for
+    each output.
 
-    Copies: the error of their steps, from longer steps for some of them on the same roads, and the statistical error.
-    Statistical linearisation: the difference from the copies at the same speeds, less the statistical error of this
-    difference, or what the gains leave out where that is more.
+    Copies: the error of their time steps, from longer steps of some copies on the same roads, and the statistical
+    error. Statistical linearisation: the difference from the copies at the same speeds, less the statistical error of
+    this difference, or a share of the variance that gains neglect where that is more.
     """
     first = next(iter(copies.values()))
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
-    size = _over_speeds([copies_at_speed.deviation for copies_at_speed in copies.values()])
-    chance = _over_speeds(
+    size = _rms_over_speeds([copies_at_speed.deviation for copies_at_speed in copies.values()])
+    chance = _rms_over_speeds(
         [copies_at_speed.error / (2.0 * copies_at_speed.deviation) for copies_at_speed in copies.values()]
     )
-    steps = [_of_steps(vehicle, road, speed, copies_at_speed, seed) for speed, copies_at_speed in copies.items()]
+    steps = [_step_errors(vehicle, road, speed, copies_at_speed, seed) for speed, copies_at_speed in copies.items()]
     estimates = {}
     for i, name in enumerate(first.names):
         if size[i] > 0.0:
             error, order = max(((row[i], orders[i]) for row, orders in steps), key=lambda pair: pair[0])
             estimates[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
     if equivalents:
-        estimates |= _of_gains(equivalents, copies, units)
+        estimates |= _linearisation_errors(equivalents, copies, units)
     with_stated_errors(run, estimates, "the copies in longer steps, and gains beside copies")
     scatter = {
         f"{name}, copies": sampling_error(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
@@ -141,15 +152,17 @@ def with_error_of_copies(
     return with_sampling_error(run, scatter, len(first.moments[0]))
 
 
-def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
+def _rms_over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         return np.nan_to_num(np.sqrt(np.mean(np.square(rows), axis=0)))
 
 
-def _of_steps(
+def _step_errors(
     vehicle: SpatialVehicle, road: Excitation, speed: float, fine_copies: Copies, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (p,) that the steps cause in the copies' standard deviations at a speed, and observed orders (p,)."""
+    """Errors that the time steps cause in the copies' standard deviations at a speed (m/s), and observed orders of
+    convergence, each (outputs,).
+    """
     twice, fourfold = (
         coarser_variances(vehicle, road, speed, fine_copies, step_factor, seed) for step_factor in (2, 4)
     )
@@ -161,18 +174,18 @@ def _of_steps(
     return abs(deviation - coarse) / (2.0**order - 1.0), order
 
 
-def _of_gains(
+def _linearisation_errors(
     equivalents: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
 ) -> dict[str, Estimate]:
-    """Errors of the standard deviations by statistical linearisation, from their difference to those of the copies at
-    the copies' speeds.
+    """Errors of the standard deviations by statistical linearisation, from their difference to the copies' standard
+    deviations at the same speeds.
     """
     pairs = [(equivalents[speed], copies_at_speed) for speed, copies_at_speed in copies.items()]
     gains = np.array([copies_at_speed.covariance.deviation for copies_at_speed, _ in pairs])
     true = np.array([copies_at_speed.deviation for _, copies_at_speed in pairs])
     scatter = np.array([copies_at_speed.error / (2.0 * copies_at_speed.deviation) for _, copies_at_speed in pairs])
     left = np.array([copies_at_speed.left_out for copies_at_speed, _ in pairs])
-    errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_LEFT * left * gains) ** 2))
+    errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_ERROR_OF_NEGLECTED_SHARE * left * gains) ** 2))
     estimates = {}
     for i, name in enumerate(pairs[0][1].names):
         known = np.isfinite(errors[:, i]) & (gains[:, i] > 0.0) & np.isfinite(gains[:, i])

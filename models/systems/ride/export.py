@@ -1,4 +1,4 @@
-"""The vehicle of a scene of ride as a file of its engine."""
+"""Export of the vehicle of a ride scene as a model file of an engine."""
 
 from dataclasses import replace
 
@@ -23,8 +23,8 @@ AXES = "x forward, y left, z up from the ground; the frame moves with the vehicl
 
 
 def exported(scene: RideScene, engine: str) -> Exported:
-    """Export the vehicle to "mujoco" (bodies and joints) or to "exudyn" (with linear springs and tyres); Refused for
-    reduced vehicles.
+    """Export the vehicle as a model file of "mujoco" (bodies and joints) or "exudyn" (with linear springs and tyres).
+    Raises Refused for reduced vehicles.
     """
     vehicle = vehicle_of(scene)
     check_buildable(engine, vehicle)

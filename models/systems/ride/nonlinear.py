@@ -1,7 +1,7 @@
-"""Rides that no linear vehicle stands for: statistical linearisation with copies in time beside, and engines in time.
+"""Rides of nonlinear vehicles: statistical linearisation, Monte Carlo copies in time, and runs in an engine.
 
-Everything nonlinear is there, and gravity where the vehicle has it. Where tyres may lift, the answer is that of the
-copies and the engines: what stands for the vehicle over speed keeps them on the road.
+All nonlinear laws are included, and gravity where the vehicle has it. Where tyres may lift, the results of copies and
+engines hold: the statistically linearised vehicle keeps its tyres on the road.
 """
 
 import time
@@ -33,18 +33,18 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import MotionInRun, Spectral, few_speeds, watched_vehicle
+from models.systems.ride.watched import MotionInRun, Spectral, checked_speeds, watched_vehicle
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 
 LONGEST_STEP = 2e-3
-"""Longest step (s) of the engines' runs; steep springs want a shorter one."""
+"""Longest time step (s) of runs in engines; stiff springs need a shorter step."""
 Progress = Callable[[str, float], None]
 
 
 class Sampling(Strict):
-    """Settings of the runs in time: copies, lengths, steps and speeds."""
+    """Settings of runs in time: number and length of copies, time step, speeds and seed."""
 
     beside: list[float] = Field(default_factory=list, description="speeds in m/s for Monte Carlo; the middle if none")
     copies: int = Field(default=200, ge=2, le=100_000, description="of the vehicle, each on a road of its own")
@@ -56,17 +56,17 @@ class Sampling(Strict):
     seed: int = Field(default=1, ge=0, lt=2**64, description="of all roads in time")
 
     def shown(self, speeds: np.ndarray) -> float:
-        """Speed (m/s) of the engines' runs: the one requested, else the middle one of ``speeds``."""
+        """Speed (m/s) of runs in engines: the requested speed, else the middle one of ``speeds``."""
         return self.speed or float(speeds[len(speeds) // 2])
 
 
 @dataclass(frozen=True)
 class Nonlinear:
-    """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
-    Monte Carlo copies if the scene requests them.
+    """Results of a nonlinear ride. small_motion (speeds, outputs) : standard deviations with slopes at rest;
+    linearised_vehicles : by statistical linearisation, one per speed; copies : Monte Carlo copies by speed (m/s).
 
-    shown : the statistically linearised vehicle at the speed of the engines' runs; tyres_may_lift : whether tyres may
-    lift, which they do in Monte Carlo alone.
+    shown : the statistically linearised vehicle at the speed of runs in engines; tyres_may_lift : whether tyres may
+    lift, which only Monte Carlo copies do here.
     """
 
     speeds: np.ndarray
@@ -76,23 +76,23 @@ class Nonlinear:
     shown: StatisticallyLinear
     tyres_may_lift: bool = False
 
-    def of(self, name: str) -> np.ndarray:
-        """One quantity (N, p) of the statistically linearised vehicles, by its name."""
+    def quantity_by_speed(self, name: str) -> np.ndarray:
+        """Returns a quantity of the statistically linearised vehicles, by its name, shape (speeds, outputs)."""
         return np.array([getattr(linearised, name) for linearised in self.linearised_vehicles])
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (N, p) by statistical linearisation."""
+        """Standard deviations (speeds, outputs) by statistical linearisation."""
         return np.array([linearised.covariance.deviation for linearised in self.linearised_vehicles])
 
 
 def linearised_result(
     scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress, error: bool = False
 ) -> Result:
-    """Small motion and statistical linearisation at all speeds, and Monte Carlo at some; the result's detail is
-    ``Nonlinear``.
+    """Compute standard deviations by small motion and by statistical linearisation at all speeds, and by Monte Carlo
+    copies at some; the result's detail is ``Nonlinear``.
 
-    error : whether errors are estimated, by more copies in longer steps.
+    error : whether errors are estimated, by further copies in longer steps.
     """
     assert scene.speeds is not None
     speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
@@ -108,7 +108,7 @@ def linearised_result(
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
-    by_speed |= {field_name: linear_runs.of(field_name) for field_name in ("mean", "left_out")}
+    by_speed |= {field_name: linear_runs.quantity_by_speed(field_name) for field_name in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
     channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
     channels |= {
@@ -132,17 +132,23 @@ def linearised_result(
         detail=linear_runs,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
-    motion = _motions_of_parts(vehicle, road, speeds, replaced)
+    motion = _motion_of_equivalents(vehicle, road, speeds, replaced)
     with_assumptions(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
     if not error:
         return labelled
-    known = {} if vehicle.lifts else {speed: _replaced_at(on_road, road, speed, speeds, replaced) for speed in copies}
+    known = (
+        {}
+        if vehicle.lifts
+        else {speed: _equivalent_at_speed(on_road, road, speed, speeds, replaced) for speed in copies}
+    )
     return with_error_of_copies(labelled, vehicle, road, known, copies, sampling.seed)
 
 
 @dataclass(frozen=True)
 class CopiesBySpeed:
-    """Job (see ``models.ensemble.runner``) in which path i means all Monte Carlo copies at the i-th speed (m/s)."""
+    """Job for worker processes (see ``models.ensemble.runner``) whose path i is all Monte Carlo copies at the i-th
+    speed (m/s).
+    """
 
     vehicle: SpatialVehicle
     road: Excitation
@@ -150,7 +156,7 @@ class CopiesBySpeed:
     sampling: Sampling
 
     def __call__(self, paths: range) -> Arrays:
-        """Arrays of ``Copies``; the first axis of each is the speed."""
+        """Returns the fields of ``Copies`` as arrays, with the speed as their first axis."""
         copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in paths]
         return {
             name: np.array([getattr(copies_at_speed, name) for copies_at_speed in copies_of_speeds])
@@ -162,18 +168,18 @@ class CopiesBySpeed:
         return copies_in_time(self.vehicle, self.road, speed, s.lasting, copies=s.copies, seed=s.seed)
 
     def facts(self) -> dict[str, Any]:
-        """Empty: no facts are needed, as the blocks are not stored."""
+        """Returns no facts, as the blocks of this job are not stored."""
         return {}
 
 
 def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
-    """Monte Carlo copies by their speed (m/s), computed by the scene's worker processes."""
+    """Compute Monte Carlo copies by the scene's worker processes; returns them by speed (m/s)."""
 
-    def tell(state: Done) -> None:
+    def report_progress(state: Done) -> None:
         progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
 
     with Crew.of(scene, default_workers=1).at_work(len(job.speeds)) as pool:
-        arrays = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
+        arrays = run_paths(job, len(job.speeds), None, pool, Blocks(1), report_progress)
     return {
         speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
         for speed, names, moments, step, duration, settling in zip(
@@ -182,20 +188,24 @@ def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -
     }
 
 
-def _replaced_at(
+def _equivalent_at_speed(
     vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> StatisticallyLinear:
-    """The statistically linearised vehicle at a speed (m/s), from ``equivalents`` if it is one of ``speeds``."""
+    """Returns the statistically linearised vehicle at a speed (m/s), from ``equivalents`` if it is
+    one of ``speeds``.
+    """
     matching = np.flatnonzero(np.isclose(speeds, speed))
     return equivalents[matching[0]] if len(matching) else statistically_linear(vehicle, road, speed)
 
 
-def _motions_of_parts(
+def _motion_of_equivalents(
     vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> Spectral:
-    """Motions of the parts of statistically linearised vehicles; springs move about their own means."""
+    """Returns the Gaussian motion of the parts of statistically linearised vehicles; springs move about their mean
+    travels.
+    """
     known = dict(zip(speeds.tolist(), equivalents, strict=True))
-    chosen = few_speeds(speeds)
+    chosen = checked_speeds(speeds)
     means = {
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
         for name in equivalents[0].springs
@@ -203,7 +213,7 @@ def _motions_of_parts(
     return Spectral(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
 
 
-def in_engine(
+def engine_result(
     scene: RideScene,
     engine: str,
     vehicle: SpatialVehicle,
@@ -211,10 +221,10 @@ def in_engine(
     error: bool = False,
     table: np.ndarray | None = None,
 ) -> Result:
-    """Run the vehicle in an engine over one random path of the road, at the speed that is shown; the detail is
+    """Run the vehicle in an engine over a random road, at the speed of ``Sampling.shown``; the result's detail is
     ``Ride``.
 
-    error : whether the error of the steps is estimated, by runs in longer ones on the same road; table : a road in
+    error : whether the error of the steps is estimated, by runs in longer steps on the same road; table : a road in
     place of the drawn one, as ``RoadPath.wheel_heights_and_rates`` has it.
     """
     assert scene.speeds is not None
@@ -227,7 +237,7 @@ def in_engine(
     )
     if table is None:
         table = path.wheel_heights_and_rates(int(np.ceil(sampling.driven / path.step)), sampling.seed)
-    ride = ride_over(engine, vehicle, path, table, skipped=skipped, every=row_interval)
+    ride = ride_over(engine, vehicle, path, table, skipped=skipped, stride=row_interval)
     labelled = result(
         scene,
         {"output_value": Channel(("time", "output"), ride.outputs)},
@@ -251,19 +261,19 @@ def in_engine(
     return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
 
 
-RUNGE_KUTTA_ORDER, ROWS_APART = 4, 16
-"""Order of the classical Runge-Kutta method; steps from one row to the next by which errors are told."""
+RUNGE_KUTTA_ORDER, STEPS_BETWEEN_ROWS = 4, 16
+"""Order of the classical Runge-Kutta method; number of steps between the rows by which its errors are estimated."""
 REPEATED_SHARE, FIRST_ROW_SHARE = 0.9, 0.1
-"""Shares of a run that longer steps repeat, for rows are read beside, and before which the first row lies."""
+"""Share of a run that is repeated in longer steps, and latest beginning of its compared rows as a share of the run."""
 
 
 def _with_error_of_steps(
     run: Result, engine: str, vehicle: SpatialVehicle, path: RoadPath, table: np.ndarray, skipped: float
 ) -> Result:
-    """The result with the errors of its outputs, by runs in steps twice and four times as long on the same road."""
+    """Returns the result with the errors of its outputs, estimated by runs in longer time steps on the same road."""
     names, units = [str(name) for name in run["output"]], run["unit"].tolist()
     steps = len(table) // 2
-    first = ROWS_APART * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / ROWS_APART)
+    first = STEPS_BETWEEN_ROWS * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / STEPS_BETWEEN_ROWS)
 
     def series(ride: Ride, begin_time: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
@@ -272,21 +282,23 @@ def _with_error_of_steps(
     def rerun(step_factor: float, share: float) -> Series:
         longer, stride = (
             replace(path, half_step=step_factor * path.half_step),
-            max(1, round(ROWS_APART / step_factor) if step_factor <= 2.0 else 8),
+            max(1, round(STEPS_BETWEEN_ROWS / step_factor) if step_factor <= 2.0 else 8),
         )
         count = int(REPEATED_SHARE * share * steps / step_factor)
         read = table[:: round(step_factor)] if step_factor >= 1.0 else _road_at_half_spacing(table)
         begin = first * path.step
-        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=stride)
+        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, stride=stride)
         return series(ride, begin)
 
-    outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, ROWS_APART))
+    outputs = outputs_at_other_steps(
+        engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, STEPS_BETWEEN_ROWS)
+    )
     fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
     return with_estimated_errors(run, fine, rerun, RUNGE_KUTTA_ORDER, path.step)
 
 
 def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
-    """A road with half the spacing of its heights: linear interpolation between the known ones."""
+    """Returns road heights at half the spacing, interpolated linearly."""
     halved = np.repeat(table, 2, axis=0)[:-1]
     halved[1::2] = (table[:-1] + table[1:]) / 2.0
     return halved
@@ -294,12 +306,12 @@ def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Ride:
-    """A run in an engine: states at every step, and outputs (m, p) at ``times`` (m,) in s, counted from the first of
-    these.
+    """A ride in an engine: states at every time step (``run``), and outputs (m, p) at ``times`` (m,) in s from the
+    first output on.
 
-    Outputs are read by the rows of ``spatial_linear`` from the engine's own positions, rates and accelerations; those
-    of small motion, which a ride is. The force of a bent spring is no linear function of them: it is left nan.
-    ``rows`` (m,): the steps at which they are read.
+    Outputs are linear functions (of ``spatial_linear``) of the engine's positions, rates and accelerations, as is right
+    for small motion. The force of a nonlinear spring is not linear in these: it is NaN. ``rows`` (m,) : numbers of the
+    steps at which outputs are computed.
     """
 
     names: tuple[str, ...]
@@ -308,19 +320,19 @@ class Ride:
     outputs: np.ndarray
     rows: np.ndarray
 
-    def of(self, name: str) -> np.ndarray:
-        """The values (m,) of one output, by its name."""
+    def output_values(self, name: str) -> np.ndarray:
+        """Returns the values (m,) of an output, by its name."""
         return self.outputs[:, self.names.index(name)]
 
     @property
     def interval(self) -> float:
-        """Time (s) from one row of outputs to the next."""
+        """Time (s) between rows of outputs."""
         return float(self.times[1] - self.times[0])
 
     def densities(self, highest: float) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (f,) in Hz, and one-sided power spectral densities (f, p) of the outputs by Welch's method.
 
-        They end at ``highest`` (Hz), and begin where windows no longer leak.
+        They end at ``highest`` (Hz), and begin where windows of 4 s no longer leak.
         """
         from scipy.signal import welch
 
@@ -339,24 +351,24 @@ def drive_over_road(
     skipped: float = 0.0,
     stride: int = 1,
 ) -> Ride:
-    """Drive over a road from rest for about ``duration`` (s). Outputs begin after ``skipped`` (s) and are ``stride``
-    steps apart.
+    """Simulate a ride in an engine over a random road, from rest for about ``duration`` (s). Outputs begin after
+    ``skipped`` (s) and are ``stride`` steps apart.
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     table = road.wheel_heights_and_rates(int(np.ceil(duration / road.step)), seed)
-    return ride_over(engine, vehicle, road, table, skipped=skipped, every=stride)
+    return ride_over(engine, vehicle, road, table, skipped=skipped, stride=stride)
 
 
 def ride_over(
-    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, every: int = 1
+    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, stride: int = 1
 ) -> Ride:
-    """Drive over the road whose heights are in ``table``; otherwise as ``drive_over_road``."""
+    """Simulate a ride in an engine over the road heights in ``table``, otherwise as ``drive_over_road``."""
     check_rates(vehicle, road.excitation)
     steps = len(table) // 2
     model = _engine_model(engine, vehicle, road, table)
     run = model.run()
-    recorded_steps = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, every)
+    recorded_steps = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, stride)
     return _outputs_at_steps(model, vehicle, road, table, run, recorded_steps)
 
 
@@ -365,10 +377,10 @@ def _engine_model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: n
     return build(engine, vehicle, settings, road.speed, table)
 
 
-def read_outputs(
+def outputs_at_other_steps(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, step_numbers: np.ndarray
 ) -> Ride:
-    """Outputs of a run at steps (m,) other than those at which they were read."""
+    """Computes the outputs of an engine's run at other steps, ``step_numbers`` (m,)."""
     return _outputs_at_steps(_engine_model(engine, vehicle, road, table), vehicle, road, table, run, step_numbers)
 
 
@@ -380,7 +392,7 @@ def _outputs_at_steps(
     run: Trajectory,
     step_numbers: np.ndarray,
 ) -> Ride:
-    """Outputs of a run at the steps ``step_numbers`` (m,)."""
+    """Computes the outputs of a run at the steps ``step_numbers`` (m,) with a built model."""
     linear = linearise(vehicle, road.speed)
     accelerations = np.array(
         [model.acceleration(i * road.step, run.positions[i], run.rates[i], table[2 * i]) for i in step_numbers]
@@ -388,14 +400,14 @@ def _outputs_at_steps(
     rows = np.column_stack(
         [accelerations, run.rates[step_numbers], run.positions[step_numbers], table[2 * step_numbers]]
     )
-    outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
+    outputs = rows @ np.array([factors_of_output(output) for output in linear.outputs]).T
     bent = {spring.name for spring in vehicle.springs if spring.is_nonlinear}
     pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
     for spec, output, values in zip(vehicle.outputs, linear.outputs, outputs.T, strict=True):
         if spec.kind == "force" and spec.part in bent:
             values[:] = np.nan
         elif spec.kind == "tyre force" and spec.tyre in pushing:
-            elastic = rows @ row_of(
+            elastic = rows @ factors_of_output(
                 replace(
                     output, rate_factors=0.0 * output.rate_factors, road_rate_factors=0.0 * output.road_rate_factors
                 )
@@ -405,9 +417,9 @@ def _outputs_at_steps(
     return Ride(linear.names, run, step_numbers * road.step - step_numbers[0] * road.step, outputs, step_numbers)
 
 
-def row_of(output: Output) -> np.ndarray:
-    """Factors (3 n + 2 w,) of an output: of accelerations, rates, positions, road heights and their rates, in this
-    order.
+def factors_of_output(output: Output) -> np.ndarray:
+    """Returns the factors (3 n + 2 w,) of an output: of accelerations, rates, positions, road heights and their rates,
+    in this order.
     """
     return np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""From a scene of ride to its vehicle, its road and the system that both make at a speed."""
+"""Vehicle, road and linear vehicle at a speed of a ride scene."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,21 +22,22 @@ if TYPE_CHECKING:
     from models.road.fitted import FittedRoad
 
 GRAVITY = 9.81
-"""m/s^2, where a scene's operating point is the loaded one."""
-Linear = Callable[[float], LinearVehicle]
-"""A linear vehicle at a speed (m/s)."""
+"""Gravity (m/s^2) where a scene's operating point is loaded."""
+LinearVehicleAtSpeed = Callable[[float], LinearVehicle]
+"""Function that returns the linear vehicle at a speed (m/s)."""
 CLOSED_FORM_STUDY = "ride"
-"""The study that reads reduced vehicles, by their closed form."""
+"""Name of the study that takes vehicle files of reduced vehicles, with massless or rigid parts."""
 ONE_TRACK_OFFSET = 1.0
-"""Where (m) the one track of a vehicle without a width lies: its level is the same wherever that is."""
+"""Distance (m) from the centre line of the track of a vehicle without a width; its level is the same at any distance.
+"""
 
 
 @dataclass(frozen=True)
 class Built:
-    """Vehicle and road that effects extend. Each function in ``road`` changes the road under the wheels, one after
-    another.
+    """Vehicle and road of a scene, which effects change. ``road`` : functions that change the road under the wheels,
+    applied in turn.
 
-    A change keeps the noise; states that it adds to those of the road's own filters come last.
+    A change keeps the noise; states that it adds come after the states of the road's filters.
     """
 
     vehicle: SpatialVehicle
@@ -44,11 +45,11 @@ class Built:
 
 
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
-    """The scene's vehicle with its effects; it has gravity if its operating point is the loaded one.
+    """Returns the scene's vehicle with its effects; it has gravity if its operating point is loaded.
 
-    InputError for a loaded vehicle that may yaw, since its preloaded springs keep their directions in space and not in
-    the vehicle, so that their moments about z would turn it back or further. InputError also for a tyre that may lift
-    where small motion is requested.
+    Raises InputError for a loaded vehicle that may yaw, since its preloaded springs keep their directions in space and
+    not in the vehicle, so that their moments about z would turn it back or further. Raises InputError also for a tyre
+    that may lift where small motion is requested.
     """
     vehicle = _built_vehicle(scene).vehicle
     if vehicle.lifts and scene.vehicle.small_motion:
@@ -68,8 +69,8 @@ def _built_vehicle(scene: RideScene) -> Built:
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
-    """Refuse springs with curves or friction unless the scene asks for small motion, which uses their slopes at rest,
-    and tyres that may lift.
+    """Raise InputError for springs with curves or friction, unless the scene asks for small motion, which uses their
+    slopes at rest, and for tyres that may lift.
     """
     if vehicle.lifts:
         raise InputError(
@@ -89,20 +90,20 @@ def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
         )
 
 
-def goes_in_time(scene: RideScene) -> bool:
-    """Whether the scene needs runs in time: a spring of its vehicle is nonlinear, without small motion being asked for,
-    or tyres may lift.
+def needs_run_in_time(scene: RideScene) -> bool:
+    """Whether a scene needs runs in time: springs of its vehicle are nonlinear or tyres may lift, and small motion is
+    not requested.
     """
-    return not scene.vehicle.small_motion and in_time_only(vehicle_of(scene))
+    return not scene.vehicle.small_motion and has_no_linear_equivalent(vehicle_of(scene))
 
 
-def in_time_only(vehicle: SpatialVehicle) -> bool:
-    """Whether springs are nonlinear or tyres may lift, so that no linear vehicle is equivalent."""
+def has_no_linear_equivalent(vehicle: SpatialVehicle) -> bool:
+    """Whether a vehicle has no linear equivalent: its springs are nonlinear or its tyres may lift."""
     return vehicle.lifts or any(spring.is_nonlinear for spring in vehicle.springs)
 
 
-def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
-    """Function that gives the vehicle at a speed (m/s), linearised by an engine or from its equations."""
+def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> LinearVehicleAtSpeed:
+    """Returns a function from speed (m/s) to the linear vehicle, linearised by an engine or from its equations."""
     if engine != "reference":
         from models.engines.spatial_protocol import linear_vehicle_at_speeds
 
@@ -114,7 +115,9 @@ def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear
 
 
 def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad:
-    """The scene's road. Where the scene does not say where its level holds, it holds at half the front track."""
+    """Returns the scene's road of two tracks. The level holds at half_track of [road], by default half the front
+    track.
+    """
     road = scene.road
     if road.file is not None:
         fitted = fitted_road(scene).road
@@ -131,7 +134,7 @@ def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad
 
 
 def fitted_road(scene: RideScene) -> "FittedRoad":
-    """The measured road of a scene and the spectra fitted to it; InputError where none can be fitted."""
+    """Reads the measured road of a scene and fits spectra to it; raises InputError where none can be fitted."""
     from models.road.fitted import fit_road
     from models.road.measured_tracks import read_tracks
 
@@ -151,8 +154,8 @@ def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
 def excitation_of(
     scene: RideScene, wheels: tuple[WheelPosition, ...], case: tuple[str, str] | None = None
 ) -> Excitation:
-    """The road under the wheels with the scene's effects; ``case`` : correlation left to right and front to rear, by
-    default the scene's.
+    """Returns the road's excitation of the wheels with the scene's effects; ``case`` : correlations left to right and
+    front to rear, by default the scene's.
     """
     left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
     placed = placed_wheels(scene, wheels)
@@ -169,7 +172,7 @@ def excitation_of(
 
 @contextmanager
 def scene_errors(scene: RideScene) -> Iterator[None]:
-    """Context that turns an error without a file into an error of the scene's key that caused it."""
+    """Context that adds the scene's file and key to an InputError of functions that know no scene."""
     try:
         yield
     except InputError as error:
@@ -182,10 +185,10 @@ def scene_errors(scene: RideScene) -> Iterator[None]:
 
 
 def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
-    """The wheels at the places where they meet the road: at their own y, or all in the tracks of the first axle's
-    wheels.
+    """Returns the wheels with the lateral positions at which they meet the road: at their own y, or in the tracks of
+    the first axle's wheels.
 
-    A vehicle without a width runs on one of the tracks where the road is given by their level.
+    A vehicle without a width runs on one of the tracks where the road is given by the level of a track.
     """
     if not any(wheel.y for wheel in wheels):
         return wheels_on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
@@ -193,11 +196,11 @@ def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[
         return wheels
     if half_track(wheels) == 0.0:
         raise InputError(scene.file, "road.wheels", "tracks", "the first axle has no two tracks in which to run")
-    return in_tracks(wheels)
+    return wheels_in_tracks(wheels)
 
 
-def in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
-    """The wheels of every axle moved into the track that the first axle's outermost wheel makes on their side."""
+def wheels_in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
+    """Returns the wheels moved laterally into the track of the first axle's outermost wheel on the same side."""
     first = [wheel.y for wheel in wheels if wheel.axle == 0]
     tracks = {1.0: max(first), -1.0: min(first)}
     return tuple(replace(wheel, y=tracks[copysign(1.0, wheel.y)] if wheel.y else 0.0) for wheel in wheels)

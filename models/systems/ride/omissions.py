@@ -1,4 +1,4 @@
-"""Everything that may be left out of a ride scene, found in its vehicle, its road and its own tables, sort by sort."""
+"""Effects that can be left out of a ride scene, listed from its vehicle, its road and its tables [effects.NAME]."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -12,29 +12,32 @@ from models.vehicles.spatial import Freedom, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import slopes_at_rest
 
 LIGHT_BODY_SHARE = 0.2
-"""A body that is not a wheel counts as light up to this share of the whole mass."""
+"""Largest mass of a light body, divided by the vehicle's mass; the mass of a light body can be left out."""
 SIMILAR_STIFFNESS_FACTOR = 2.0
-"""Stiffnesses apart by no more than this factor are of one sort of bushing."""
+"""Largest ratio of two stiffnesses in a group of bushings that are made rigid together."""
 ALL_WHEELS = "mass of all wheels"
 TYRE_DAMPING = "tyre damping"
+"""Names of effects to which other effects refer."""
 LAW_TEXTS = {"travel_force": "curves over travel", "rate_force": "curves over rate", "friction": "friction"}
-"""Laws of springs, and what leaving out those of all springs is called: stops, bent dampers, dry friction."""
-less, on_road = ReducedScene.reduced_further, ReducedScene.on_road
+"""Nonlinear laws of springs, and the name of the effect that replaces them in all springs: stops, curved dampers, dry
+friction.
+"""
+reduced_further, on_road = ReducedScene.reduced_further, ReducedScene.on_road
 
 
 def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
-    """Every effect of the scene's vehicle, road and own tables that can be left out, in the order of their sorts'
-    names.
+    """Returns all effects of a scene that can be left out, from vehicle, road and tables [effects.NAME], sorted by kind
+    of effect.
     """
     system = scene.ride.system
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
-    effects = {name: find(scene) for name, find in SORTS.items()}
+    effects = {name: find(scene) for name, find in EFFECTS_BY_KIND.items()}
     effects |= {
         name: [Effect(name, partial(_without_table, name=name), table.COST, is_singular=True, has_table=True)]
         for name, table in tables.items()
     }
     return tuple(
-        _with_needy(effect, tuple(dependent for dependent, table in tables.items() if name in table.NEEDS))
+        _with_dependents(effect, tuple(dependent for dependent, table in tables.items() if name in table.NEEDS))
         for name in sorted(effects)
         for effect in effects[name]
     )
@@ -44,18 +47,24 @@ def _without_table(scene: ReducedScene, name: str) -> ReducedScene:
     return scene.without_tables(name)
 
 
-def _with_needy(effect: Effect, needy: tuple[str, ...]) -> Effect:
-    """The effect, which now requires that the scene's own tables ``needy``, which need it, are left out as well."""
-    return replace(effect, needs=(*effect.needs, *needy), why=effect.why or "for it needs it") if needy else effect
+def _with_dependents(effect: Effect, dependents: tuple[str, ...]) -> Effect:
+    """Returns the effect with the requirement that the tables [effects.NAME] in ``dependents``, which need it, are left
+    out as well.
+    """
+    return (
+        replace(effect, needs=(*effect.needs, *dependents), why=effect.why or "for it needs it")
+        if dependents
+        else effect
+    )
 
 
-def has_omissions(scene: RideScene, sort: str) -> bool:
-    """Whether a scene's vehicle and road have effects of this sort, which can be left out."""
-    return bool(SORTS[sort](ReducedScene.complete(scene)))
+def has_omissions(scene: RideScene, kind: str) -> bool:
+    """Whether a scene's vehicle or road has effects of a kind (a key of EFFECTS_BY_KIND) that can be left out."""
+    return bool(EFFECTS_BY_KIND[kind](ReducedScene.complete(scene)))
 
 
 def anti_roll_bars(scene: ReducedScene) -> list[Effect]:
-    """Leaving out an anti-roll bar: one effect per bar."""
+    """Returns the effects that leave out an anti-roll bar each."""
     return [
         Effect(f"bar {bar.name}", partial(_without_bar, bar=bar.name), f"no {bar.name}") for bar in scene.vehicle.bars
     ]
@@ -72,7 +81,7 @@ def wheels_of(vehicle: SpatialVehicle) -> set[str]:
 
 
 def body_mass(scene: ReducedScene) -> list[Effect]:
-    """Leaving out masses: of the wheels of each axle, of all wheels together, then of light bodies one by one.
+    """Returns the effects that leave out mass: of all wheels, of the wheels of each axle, of each light body.
 
     White noise that comes through tyre damping would move a wheel without mass at an infinite rate.
     """
@@ -85,7 +94,7 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
         needs = (TYRE_DAMPING,) if white else ()
         why = "for the road's white noise would reach a body without mass" if white else "one names the other's bodies"
         says = f"{', '.join(bodies)} without mass"
-        return Effect(name, partial(less, massless=bodies), says, needs, excludes, why, is_singular=True)
+        return Effect(name, partial(reduced_further, massless=bodies), says, needs, excludes, why, is_singular=True)
 
     effects = [effect(ALL_WHEELS, sorted(wheels), tuple(groups))]
     effects += [effect(name, bodies, (ALL_WHEELS,)) for name, bodies in groups.items() if len(axles) > 1]
@@ -96,8 +105,8 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
 
 
 def rigid_bushing_effects(scene: ReducedScene) -> list[Effect]:
-    """Making bushings at wheels rigid: one effect per group of similar stiffness, for springs that are stiffer than the
-    softest one between the same two bodies.
+    """Returns the effects that make bushings at wheels rigid, one per group of similar stiffness. Bushings are springs
+    that are stiffer than the softest spring between the same two bodies.
     """
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str | None], list[SpringDamper]](list)
     for spring in scene.vehicle.springs:
@@ -128,7 +137,7 @@ def _rigid_bushings(springs: list[SpringDamper]) -> Effect:
     bodies = {body for spring in springs for body in (spring.first_body, spring.second_body)}
     return Effect(
         f"bushings: {names_text}",
-        partial(less, rigid=names),
+        partial(reduced_further, rigid=names),
         f"rigid: {', '.join(names)}",
         excludes=tuple(f"{body} {freedom}" for body in bodies for freedom in ("x", "y")),
         why="a rigid bushing and a freedom that is locked would hold the same motion twice",
@@ -136,26 +145,31 @@ def _rigid_bushings(springs: list[SpringDamper]) -> Effect:
 
 
 def linear_law_effects(scene: ReducedScene) -> list[Effect]:
-    """Replacing nonlinear laws by gains: one effect per law that any spring has, unless small motion replaces the laws
-    anyway.
+    """Returns the effects that replace nonlinear spring laws by gains, one per law that any spring has; none where
+    small motion replaces the laws anyway.
     """
     return [
-        Effect(name, partial(less, straight=[law]), f"{name}: the gains of statistical linearisation", is_singular=True)
+        Effect(
+            name,
+            partial(reduced_further, linearised_laws=[law]),
+            f"{name}: the gains of statistical linearisation",
+            is_singular=True,
+        )
         for law, name in LAW_TEXTS.items()
         if not scene.ride.vehicle.small_motion and any(getattr(spring, law) for spring in scene.vehicle.springs)
     ]
 
 
 def delay_effects(scene: ReducedScene) -> list[Effect]:
-    """Leaving out the delay from front to rear: one effect, where axles follow one another."""
+    """Returns the effect that leaves out the delay from front to rear axle; none where no axle follows another."""
     follows = len(scene.vehicle.axles) > 1 and scene.ride.road.front_rear == "delayed"
     equal = Effect("delay front to rear", partial(on_road, front_rear="equal"), "all axles meet the same at once")
     return [equal] if follows else []
 
 
 def locked_freedom_effects(scene: ReducedScene) -> list[Effect]:
-    """Locking degrees of freedom: one effect per freedom of a body without tyres, and one per sort of freedom of the
-    bodies with tyres.
+    """Returns the effects that lock degrees of freedom: one per freedom of a body without tyres, and one per direction
+    for the freedoms of all wheels, except vertical.
     """
     wheels, groups = wheels_of(scene.vehicle), defaultdict[str, list[tuple[str, Freedom]]](list)
     shared = defaultdict[str, list[tuple[str, Freedom]]](list)
@@ -165,13 +179,17 @@ def locked_freedom_effects(scene: ReducedScene) -> list[Effect]:
         elif freedom != "z":
             shared[f"wheels {freedom}"].append((body, freedom))
     return [
-        Effect(name, partial(less, locked=group), f"locked: {', '.join(map(' '.join, group))}", is_singular=True)
+        Effect(
+            name, partial(reduced_further, locked=group), f"locked: {', '.join(map(' '.join, group))}", is_singular=True
+        )
         for name, group in (*groups.items(), *shared.items())
     ]
 
 
 def rigid_mount_effects(scene: ReducedScene) -> list[Effect]:
-    """Making mounts rigid: one effect per pair of bodies that springs connect, if neither carries a tyre."""
+    """Returns the effects that make mounts rigid, one per pair of bodies that springs connect, if neither carries a
+    tyre.
+    """
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str], list[str]](list)
     for spring in scene.vehicle.springs:
         if spring.second_body is not None and not {spring.first_body, spring.second_body} & wheels:
@@ -179,7 +197,7 @@ def rigid_mount_effects(scene: ReducedScene) -> list[Effect]:
     return [
         Effect(
             f"springs of {body} on {other_body}",
-            partial(less, rigid=springs),
+            partial(reduced_further, rigid=springs),
             f"{body} sits rigidly on {other_body}",
             excludes=(*(f"{body} {freedom}" for freedom in scene.vehicle.body(body).freedoms), f"mass of {body}"),
             why="a body that sits rigidly on another has no motion of its own left",
@@ -189,7 +207,9 @@ def rigid_mount_effects(scene: ReducedScene) -> list[Effect]:
 
 
 def second_corner(scene: ReducedScene) -> list[Effect]:
-    """Leaving out the road's second corner: one effect, where it has one. A damped tyre would then meet white noise."""
+    """Returns the effect that leaves out the road spectrum's second corner; none where it has none. White noise would
+    then reach damped tyres, so that tyre damping must be left out, too.
+    """
     if scene.ride.road.cutoff is None:
         return []
     needs = (TYRE_DAMPING,) if any(tyre.damping for tyre in scene.vehicle.tyres) else ()
@@ -198,8 +218,8 @@ def second_corner(scene: ReducedScene) -> list[Effect]:
 
 
 def second_track(scene: ReducedScene) -> list[Effect]:
-    """Leaving out the second track: one effect, where wheels are off the centre line of a road with two tracks as
-    modelled.
+    """Returns the effect that leaves out the second track of the road; none where all wheels are in one line or the
+    tracks are not correlated as modelled.
     """
     wide = len({tyre.point[1] for tyre in scene.vehicle.tyres}) > 1
     if not wide or scene.ride.road.left_right != "modelled":
@@ -209,7 +229,7 @@ def second_track(scene: ReducedScene) -> list[Effect]:
 
 
 def tyre_damping(scene: ReducedScene) -> list[Effect]:
-    """Leaving out the damping of tyres: one effect, where any tyre is damped."""
+    """Returns the effect that leaves out the damping of tyres; none where no tyre is damped."""
     damped = any(tyre.damping for tyre in scene.vehicle.tyres)
     return [Effect(TYRE_DAMPING, _without_damping, "tyres are springs without damping")] if damped else []
 
@@ -219,7 +239,7 @@ def _without_damping(scene: ReducedScene) -> ReducedScene:
     return replace(scene, vehicle=replace(scene.vehicle, tyres=tyres))
 
 
-SORTS: dict[str, Callable[[ReducedScene], list[Effect]]] = {
+EFFECTS_BY_KIND: dict[str, Callable[[ReducedScene], list[Effect]]] = {
     "anti_roll_bars": anti_roll_bars,
     "body_mass": body_mass,
     "bushings": rigid_bushing_effects,
@@ -231,4 +251,4 @@ SORTS: dict[str, Callable[[ReducedScene], list[Effect]]] = {
     "second_track": second_track,
     "tyre_damping": tyre_damping,
 }
-"""Sorts of effects by the name of their line in the table of effects."""
+"""Functions that list the effects of each kind, by the kind's name in the table of effects."""

@@ -17,7 +17,9 @@ from models.vehicles.spatial_linear import linearise, wheels
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Everything that can be refused before a run is refused here, before any file is written."""
+    """Raise InputError, before any file is written, for a wrong vehicle or road, and for quantities or weightings that
+    are not outputs of the vehicle.
+    """
     vehicle = vehicle_of(scene)
     excitation_of(scene, wheels(vehicle))
     kinds = {output.name: output.kind for output in vehicle.outputs}
@@ -34,22 +36,22 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: RideScene) -> tuple[Finding, ...]:
-    """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
+    """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
     return plausible(vehicle_of(scene), scene.vehicle.accept)
 
 
 def describe(scene: RideScene) -> str:
-    """The scene's plan as text: vehicle, freedoms, road, cases, outputs and what is not computed."""
+    """Returns the plan of a ride scene as text: vehicle, freedoms, road, speeds, outputs, effects, assumptions."""
     vehicle = vehicle_of(scene)
     wheel_positions = wheels(vehicle)
     lines = [
         ("scene", f"{scene.file}, study {scene.study}"),
         ("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}"),
         *(("read", note) for note in vehicle.notes),
-        *_bodies(vehicle),
+        *_vehicle_lines(vehicle),
         ("road", road_of(scene, wheel_positions).label(half_track_of(scene, wheel_positions))),
         *(("", text) for text in noise_sharing_text(scene, wheel_positions)),
-        ("speed", _speed(scene)),
+        ("speed", _speed_text(scene)),
         ("outputs", ", ".join(output.name for output in vehicle.outputs)),
         (
             "weighting",
@@ -63,12 +65,12 @@ def describe(scene: RideScene) -> str:
     return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in lines), *effect_lines(scene), *assumed])
 
 
-LEFT_RIGHT = {
+LEFT_RIGHT_TEXTS = {
     "modelled": "every wheel meets z_M + y theta, one mean and one roll process for all",
     "uncorrelated": "the left wheels meet z_M + y theta, the right ones the same of a second, independent pair",
     "equal": "every wheel meets z_M + |y| theta, so that tracks of one distance do not roll it",
 }
-FRONT_REAR = {
+FRONT_REAR_TEXTS = {
     "delayed": "every axle meets what the first one met, its distance later",
     "uncorrelated": "every axle meets a road of its own",
     "equal": "every axle meets what the first one meets, at once",
@@ -76,20 +78,20 @@ FRONT_REAR = {
 
 
 def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[str, str]:
-    """Text on how the wheels of an axle, and the axles, share the road's noise."""
+    """Texts on the correlation of the road under left and right wheels, and under the axles."""
     road, placed = scene.road, placed_wheels(scene, wheels)
     y_text = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
     if len({wheel.y for wheel in placed}) == 1:
         y_text = f"{placed[0].y:g} m for all: one track"
     return (
-        f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {y_text}",
-        f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}",
+        f"left and right {road.left_right}: {LEFT_RIGHT_TEXTS[road.left_right]}; y is {y_text}",
+        f"axles {road.front_rear}: {FRONT_REAR_TEXTS[road.front_rear]}",
     )
 
 
-def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
-    """Lines on each body, then on the number of freedoms and their natural frequencies where these do not depend on the
-    speed.
+def _vehicle_lines(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
+    """Yields lines (heading, text) on each body, on the elements, on the degrees of freedom and, unless they depend on
+    the speed, on their natural frequencies.
     """
     for body in vehicle.bodies:
         on = f" on {body.parent}" if body.parent else ""
@@ -104,8 +106,8 @@ def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
 
 
 def undamped_frequencies(vehicle: SpatialVehicle) -> list[float]:
-    """Natural frequencies (Hz) of the vehicle without damping, side forces and drag; 0 for motions without a restoring
-    force.
+    """Natural frequencies (Hz) of the vehicle without damping, side forces and drag, rising; 0 for motions without a
+    restoring force.
     """
     import numpy as np
     from scipy.linalg import eigvalsh
@@ -116,14 +118,14 @@ def undamped_frequencies(vehicle: SpatialVehicle) -> list[float]:
 
 
 USUAL_FREQUENCIES = (0.2, 500.0)
-"""Hz: frequencies of road vehicles, from a soft body to the stiffest mount."""
+"""Lowest and highest natural frequency (Hz) of road vehicles, from a soft body to the stiffest mount."""
 FREE_FREQUENCY = 1e-4
-"""Hz: what is slower is nothing but a motion that is free."""
+"""Frequency (Hz) below which a motion counts as free of restoring forces."""
 
 
 def frequency_doubts(vehicle: SpatialVehicle) -> list[str]:
-    """A question where the vehicle has natural frequencies that no road vehicle has, as happens with values that are
-    not in SI units.
+    """Returns a question as text where the vehicle has natural frequencies that no road vehicle has, as with values
+    that are not in SI units.
     """
     odd = [
         f
@@ -139,7 +141,7 @@ def frequency_doubts(vehicle: SpatialVehicle) -> list[str]:
     ]
 
 
-def _speed(scene: RideScene) -> str:
+def _speed_text(scene: RideScene) -> str:
     if scene.drive is not None:
         points = zip(scene.drive.time, scene.drive.speed, strict=True)
         return ", ".join(f"{speed:g} m/s at {time:g} s" for time, speed in points) + ", straight between"

@@ -1,4 +1,4 @@
-"""Figures derived from a ride's results: loads beside deviations, errors of simpler roads, vehicles and methods."""
+"""Numbers derived from the results of a ride: static loads, errors of simpler roads, vehicles and methods."""
 
 from dataclasses import replace
 from functools import partial
@@ -13,11 +13,13 @@ from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
 
 LOWEST_WAVENUMBER_SHARE, HIGHEST_WAVENUMBER = 1e-2, 500.0
-"""Band of the comparison with the isotropic road: a share of the smallest corner, and rad/m."""
+"""Wavenumbers between which a road is compared with an isotropic one: lowest as a share of the smallest corner
+wavenumber, highest in rad/m.
+"""
 
 
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
-    """Static load (N) of the tyre that each output of the kind tyre force belongs to."""
+    """Static load (N) of the tyre of every output of kind "tyre force", by output name."""
     loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
     forces = (
         tyre_output
@@ -28,10 +30,11 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
 
 
 def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:
-    """Relative change of every output's deviation if the road is replaced by an isotropic one with the same track
-    spectrum, both up to HIGHEST_WAVENUMBER.
+    """Relative change of every output's standard deviation if the road is replaced by an isotropic road with the same
+    track spectrum, both up to HIGHEST_WAVENUMBER.
 
-    Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
+    Empty where no isotropic road corresponds: for a vehicle without a width, a road of second order, or correlations of
+    axles or tracks other than modelled.
     """
     from models.ride.frequency import variances_over_wavenumbers
     from models.road.isotropic import isotropic_road_like, spectral_matrix
@@ -56,8 +59,8 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
 
 
 def largest_gap(sweep: Sweep, reference: Sweep) -> float:
-    """Largest difference of standard deviations where both are finite, divided by the output's largest value on any of
-    the roads.
+    """Largest difference of standard deviations between two sweeps, where both are finite, divided by the output's
+    largest standard deviation on any road.
     """
     finite = np.isfinite(reference.deviation) & np.isfinite(sweep.deviation)
     known, compared_deviations = (
@@ -68,10 +71,10 @@ def largest_gap(sweep: Sweep, reference: Sweep) -> float:
 
 
 def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str]) -> np.ndarray:
-    """Relative errors (outputs,) of a case of the sweep compared with true deviations (speeds, outputs), each the
-    largest over the speeds.
+    """Largest relative error (outputs,) over the speeds of the standard deviations in a case of a sweep, compared with
+    true standard deviations (speeds, outputs).
 
-    nan for an output that the sweep's vehicle does not have.
+    NaN for an output that the sweep's vehicle does not have.
     """
     errors = np.full(len(names), np.nan)
     for i, name in enumerate(names):
@@ -84,8 +87,8 @@ def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str])
 
 
 def quasi_stationary_gaps(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> np.ndarray:
-    """Error (N, p) of the quasi-stationary standard deviations, divided by each output's largest standard deviation in
-    the drive; 0 where that is 0.
+    """Errors (instants, outputs) of quasi-stationary standard deviations along a drive, divided by each output's
+    largest standard deviation in the drive; 0 where an output does not move.
     """
     are_known = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
     known = np.where(are_known, drive.deviation, 0.0)

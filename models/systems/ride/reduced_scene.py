@@ -1,4 +1,4 @@
-"""A linear stationary scene without some of its effects, and the effects that may be left out."""
+"""Ride scenes from which some effects are left out, and the effects that can be left out."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -13,8 +13,8 @@ from models.vehicles.spatial_linear import wheels
 
 @dataclass(frozen=True)
 class ReducedScene:
-    """A ride and its vehicle without what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, and
-    ``straight`` laws of nonlinear springs, which gains replace.
+    """A ride scene and its vehicle with some effects left out: ``massless`` bodies, ``rigid`` springs, ``locked``
+    degrees of freedom, and nonlinear spring laws that are replaced by gains (``linearised_laws``).
     """
 
     ride: RideScene
@@ -22,34 +22,36 @@ class ReducedScene:
     massless: frozenset[str] = frozenset()
     rigid: frozenset[str] = frozenset()
     locked: frozenset[tuple[str, Freedom]] = frozenset()
-    straight: frozenset[str] = frozenset()
+    linearised_laws: frozenset[str] = frozenset()
 
     @classmethod
     def complete(cls, ride: RideScene) -> "ReducedScene":
-        """The ride with its complete vehicle, nothing left out."""
+        """Returns a ride scene with its complete vehicle, from which nothing is left out."""
         return cls(ride, vehicle_of(ride))
 
     @property
     def limits(self) -> Limits:
-        """Limits by which the vehicle is reduced: massless, rigid and locked parts."""
+        """Massless bodies, rigid springs and locked degrees of freedom by which the vehicle is reduced."""
         return Limits(self.massless, self.rigid, self.locked)
 
     def reduced_further(self, **names: Iterable[object]) -> "ReducedScene":
-        """The scene reduced further: names are added to its sets, for example massless = ["wheel"]."""
+        """Returns the scene with names added to its sets of left-out effects, for example massless = ["wheel"]."""
         return replace(self, **{key: getattr(self, key) | set(added_names) for key, added_names in names.items()})
 
     def on_road(self, **changes: object) -> "ReducedScene":
-        """The reduced scene with other values in [road]."""
+        """Returns the reduced scene with other values of keys of [road]."""
         road = self.ride.road.model_copy(update=changes)
         return replace(self, ride=self.ride.model_copy(update={"road": road}))
 
     def without_tables(self, *names: str) -> "ReducedScene":
-        """The reduced scene without some of its tables [effects.NAME]."""
+        """Returns the reduced scene without some of its tables [effects.NAME]."""
         ride = without_own(self.ride, *names)
         return replace(self, ride=ride, vehicle=vehicle_of(ride))
 
     def excitation(self) -> Excitation:
-        """The road under the wheels; axles that meet the same heights at the same time share one filter."""
+        """Returns the road's excitation of the wheels; axles that meet the same heights at the same time share one
+        filter.
+        """
         road = excitation_of(self.ride, wheels(self.vehicle))
         if road.independent or any(road.lengths):
             return road
@@ -58,12 +60,13 @@ class ReducedScene:
 
 @dataclass(frozen=True)
 class Effect:
-    """Something that may be left out: its name, what leaving it out means, and its relation to other effects.
+    """An effect of a ride scene that can be left out. without : function that leaves it out; says : text on what
+    leaving it out means.
 
     needs : effects that must be left out as well; excludes : effects that may not be left out together with this one;
-    ``why`` : the reason for both. is_singular : leaving it out is no small change in any respect, so that it is solved
-    and not screened. has_table : it is a table [effects.NAME], which is removed before all other effects, since it
-    changes the vehicle.
+    ``why`` : the reason for both. is_singular : leaving it out is no small perturbation, so that the reduced scene is
+    solved and not estimated. has_table : it is a table [effects.NAME], which is removed before all other effects, since
+    it changes the vehicle.
     """
 
     name: str
@@ -77,7 +80,7 @@ class Effect:
 
 
 def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
-    """Reason why these effects may not be left out together, with the remedy; empty where they may."""
+    """Returns the reason why some effects may not be left out together, with the remedy; empty where they may."""
     omitted_effects = tuple(omitted_effects)
     names = {effect.name for effect in omitted_effects}
     for effect in omitted_effects:
@@ -91,7 +94,7 @@ def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
 
 
 def reduced_without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
-    """The scene without these effects; effects that are tables [effects.NAME] are removed first, all at once."""
+    """Returns the scene without some effects. Effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:
         scene = scene.without_tables(*tables)

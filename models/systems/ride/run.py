@@ -1,7 +1,7 @@
-"""A scene of ride, run: the only place where one is.
+"""Runs of a ride scene: covariances of a linear vehicle, or runs in time of a nonlinear one.
 
-What a scene calls for decides how. At constant speeds a linear vehicle has exact variances, in several correlations of
-the road at once; along a drive it has them at every instant; vehicles that nothing linear stands for go in time.
+The scene decides which. At constant speeds a linear vehicle has exact variances, for several correlations of the road
+at once. Along a drive it has them at every instant. Vehicles without a linear equivalent are run in time.
 """
 
 import time
@@ -15,9 +15,9 @@ from models.core.assumptions import with_assumptions
 from models.core.result import Channel, Result, result
 from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED_LAW_ACCURACY, MATRIX_ACCURACY, with_error_of_sweep
-from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, scene_errors, vehicle_of
+from models.systems.ride.of_scene import excitation_of, linear_vehicle, needs_run_in_time, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, few_speeds, own_deviations
+from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, checked_speeds, watched_deviations
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -25,18 +25,21 @@ if TYPE_CHECKING:
     from models.systems.ride.nonlinear import Progress, Sampling
 
 AS_WRITTEN = "as in the scene"
+"""Name of the scene's correlation of the road in a result."""
 ANY_SPEED = 1.0
-"""m/s: the matrices of vehicles that are driven at a varying speed are the same at every one."""
-QUASI_STATIONARY = 90
-"""Speeds at which each is taken by itself beside a drive, from standstill on; straight between them."""
+"""Speed (m/s) at which a vehicle of a drive at varying speed is linearised: its matrices do not depend on the speed."""
+QUASI_STATIONARY_SPEEDS = 90
+"""Number of constant speeds, from standstill on, between which quasi-stationary deviations of a drive are
+interpolated.
+"""
 
 
 @dataclass(frozen=True)
 class SweepPoints:
-    """Speeds and correlations at which a linear vehicle is solved; they replace the scene's own.
+    """Speeds and correlations of the road at which a linear vehicle is solved, in place of the scene's.
 
-    speeds : m/s, those of the scene if None. correlations : of the road, left to right and front to rear, by name; None
-    is the scene's own.
+    speeds : m/s, the scene's if None. correlations : of the road, left to right and front to rear, by name; None is the
+    scene's correlation.
     """
 
     speeds: Sequence[float] | None = None
@@ -53,12 +56,13 @@ def run(
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
 ) -> Result:
-    """Run a scene with the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
+    """Run a ride scene by covariances of the linear vehicle of an engine, or in time. Raises InputError, Refused or
+    RunFailed.
 
-    vehicle, points : replace the scene's own. sampling : requests a run in time, which nonlinear springs and tyres that
-    may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one path of the
-    road. progress : called during such a run. error : whether errors are estimated, by further solutions or runs. The
-    assumptions of a run are always judged.
+    vehicle, points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and tyres that
+    may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one random road.
+    progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
+    are always checked.
 
     The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, for an engine in time, a ``Ride``.
     """
@@ -66,21 +70,21 @@ def run(
     with scene_errors(scene):
         if scene.drive is not None:
             return _drive_deviations(scene, engine, vehicle or vehicle_of(scene), error)
-        if vehicle is not None or not (sampling or goes_in_time(scene)):
+        if vehicle is not None or not (sampling or needs_run_in_time(scene)):
             return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
         if engine == "reference":
             return nonlinear.linearised_result(scene, vehicle, sampling, progress, error)
-        return nonlinear.in_engine(scene, engine, vehicle, sampling, error)
+        return nonlinear.engine_result(scene, engine, vehicle, sampling, error)
 
 
 def _deviations_by_speed(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
 ) -> Result:
-    """Standard deviations (correlation, speed, output). Assumptions are judged on the scene's own road, or on the last
-    one.
+    """Result with standard deviations (correlation, speed, output) at constant speeds. Assumptions are checked on the
+    scene's road, or on the last road if the scene's is not among them.
     """
     from models.ride.sweep import variance_sweep
 
@@ -104,7 +108,7 @@ def _deviations_by_speed(
     )
     road = roads.get(AS_WRITTEN, [*roads.values()][-1])
     with_assumptions(
-        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, few_speeds(swept.speeds), {}))
+        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, checked_speeds(swept.speeds), {}))
     )
     if not error:
         return labelled
@@ -117,8 +121,8 @@ def _deviations_by_speed(
 
 
 def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
-    """Standard deviations (time, output) along a drive, and the quasi-stationary ones, as if each speed had always been
-    driven.
+    """Result with standard deviations (time, output) along a drive, and with the quasi-stationary deviations that
+    constant driving at each speed would give.
     """
     from models.ride.varying_speed import quasi_stationary, varying_speed
     from models.systems.ride.errors_in_time import with_error_of_drive
@@ -127,7 +131,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
     start_time, weightings = time.process_time(), scene.weighting
     linear, road = linear_vehicle(vehicle, engine)(ANY_SPEED), excitation_of(scene, wheels(vehicle))
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
-    speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY)
+    speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY_SPEEDS)
     quasi_stationary_deviations = quasi_stationary(linear, road, speeds, weightings=weightings)
 
     def deviations_along(stride: int) -> np.ndarray:
@@ -158,9 +162,9 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
         detail=drive,
     )
     spectral = Spectral(
-        vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
+        vehicle, lambda _: linear, road, checked_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
     )
     with_assumptions(
-        labelled, assumptions(scene, vehicle, MotionAlongDrive(own_deviations(vehicle, drive.deviation), spectral))
+        labelled, assumptions(scene, vehicle, MotionAlongDrive(watched_deviations(vehicle, drive.deviation), spectral))
     )
     return with_error_of_drive(labelled, scene, linear, road, deviations_along) if error else labelled

@@ -1,4 +1,4 @@
-"""Scenes of ride: a vehicle, the road under its tracks, speeds, and the outputs that are weighted for people."""
+"""Scenes of ride: a vehicle, a random road of two tracks, speeds, and frequency weightings of outputs by ISO 2631-1."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,13 +15,13 @@ from models.ride.speed_profile import SpeedProfile
 from models.road import TRACK_WIDTH
 from models.road.two_track import MEAN_CORNER, ROLL_CORNER, TRACK_DENSITY_LEVEL
 
-LeftRight = Literal["modelled", "uncorrelated", "equal"]
-FrontRear = Literal["delayed", "uncorrelated", "equal"]
-Places = Literal["own", "tracks"]
+LeftRightCorrelation = Literal["modelled", "uncorrelated", "equal"]
+FrontRearCorrelation = Literal["delayed", "uncorrelated", "equal"]
+WheelTracks = Literal["own", "tracks"]
 
 
 class RideVehicle(Strict):
-    """[vehicle]: a vehicle file, and the point about which it is linear."""
+    """[vehicle]: a vehicle file, and the operating point about which the vehicle is linearised."""
 
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
     small_motion: bool = Field(default=False, description="curves and friction of springs by their slopes at rest")
@@ -30,7 +30,9 @@ class RideVehicle(Strict):
 
 
 class Road(Strict):
-    """[road]: two tracks from a mean and a roll process, with the paper's values or fitted to a measured road."""
+    """[road]: random road of two tracks, made of a mean and a roll process, with published values or fitted to a
+    measured road.
+    """
 
     file: str | None = Field(default=None, description="OpenCRG, or CSV of two tracks, to which both are fitted")
     track_width: float = quantity("m", "between the measured tracks", default=TRACK_WIDTH)
@@ -47,24 +49,24 @@ class Road(Strict):
     corner_roll: float = quantity("rad/m", "corner of the roll process", default=ROLL_CORNER)
     cutoff: float | None = quantity("rad/m", "second corner, where outputs see the road's rate", default=None)
     half_track: float | None = quantity("m", "where the tracks have the level: half the front track", default=None)
-    left_right: LeftRight = Field(default="modelled", description="how the tracks go together")
-    front_rear: FrontRear = Field(default="delayed", description="how the axles' roads go together")
-    wheels: Places = Field(default="own", description="each at its own y, or in the front wheels' tracks")
+    left_right: LeftRightCorrelation = Field(default="modelled", description="how the tracks go together")
+    front_rear: FrontRearCorrelation = Field(default="delayed", description="how the axles' roads go together")
+    wheels: WheelTracks = Field(default="own", description="each at its own y, or in the front wheels' tracks")
 
 
 class Drive(Strict):
-    """[drive]: a speed that varies, from point to point along straight lines."""
+    """[drive]: a speed that varies over time, linear between points."""
 
     time: list[float] = Field(description="times in s, rising")
     speed: list[float] = Field(description="speeds in m/s at these times, 0 for standstill")
 
     def profile(self, file: str = "") -> SpeedProfile:
-        """The drive's speed over time; raises InputError for values that are no drive."""
+        """Returns the speed over time of the drive. Raises InputError for times that do not rise or negative speeds."""
         return SpeedProfile(self.time, self.speed, file)
 
 
 class RideScene(SceneFile):
-    """One scene of ride; it has either [speeds] or a [drive]."""
+    """A scene of ride: all tables of its scene file, among them either [speeds] or [drive]."""
 
     CHOOSING: ClassVar[str] = "ride_choice"
 
@@ -78,14 +80,18 @@ class RideScene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def check_choice(self) -> None:
-        """Check that a choice of effects has quantities, a tolerance and constant speeds; raises InputError."""
+        """Raise InputError unless a scene that asks for a choice of effects has quantities, a tolerance and constant
+        speeds.
+        """
         super().check_choice()
         if self.study == self.CHOOSING and self.speeds is None:
             raise InputError(self.file, "drive", None, "effects are chosen at constant speeds: give [speeds]")
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> RideScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked ride scene from the nested tables of a scene file. Raises InputError for unknown keys and for
+    values outside their ranges.
+    """
     scene = checked(RideScene, table, file, folder)
     if (scene.speeds is None) == (scene.drive is None):
         raise InputError(file, "speeds", None, "give either the table speeds or the table drive, and not both")
@@ -97,14 +103,14 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ri
     return with_effect_tables(scene)
 
 
-OF_FILE = ("track_width", "first", "last")
-"""Keys of [road] that belong to its file."""
-OF_FORMULA = ("level", "iso8608", "q_mean", "q_roll", "corner_mean", "corner_roll", "half_track")
-"""Keys of [road] that a file answers."""
+KEYS_OF_ROAD_FILE = ("track_width", "first", "last")
+"""Keys of [road] that have a meaning only with a measured road file."""
+KEYS_REPLACED_BY_FILE = ("level", "iso8608", "q_mean", "q_roll", "corner_mean", "corner_roll", "half_track")
+"""Keys of [road] whose values are fitted where a measured road file is given."""
 
 
 def _check_road(file: str, road: Road) -> None:
-    foreign = OF_FILE if road.file is None else OF_FORMULA
+    foreign = KEYS_OF_ROAD_FILE if road.file is None else KEYS_REPLACED_BY_FILE
     for name in foreign:
         if name in road.model_fields_set:
             allowed = "has no meaning without road.file" if road.file is None else "is fitted to road.file: drop it"

@@ -1,5 +1,4 @@
-"""Motions of a riding vehicle's parts by which its assumptions are judged: wheel loads, travels, angles and slip
-angles."""
+"""Motions of the parts of a vehicle on which its assumptions are checked: wheel loads, travels, angles, slip angles."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -13,28 +12,29 @@ from models.core.assumptions import Gaussian
 from models.core.errors import InputError
 from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
-from models.systems.ride.of_scene import GRAVITY, Linear
+from models.systems.ride.of_scene import GRAVITY, LinearVehicleAtSpeed
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, Output
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, SpatialVehicle, TurnOutput, TyreOutput
 from models.vehicles.spatial_linear import linearise, outputs, preloads
 
 AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
+"""Axis of each rotational degree of freedom."""
 JUDGED_SPEEDS = 5
-"""Speeds at which a sweep is judged, its ends among them."""
+"""Number of speeds of a sweep at which assumptions are checked, the slowest and the fastest among them."""
 
 
 class WatchedMotion(Protocol):
-    """Motion of a vehicle's parts in a run; the parts have the names of ``watched``."""
+    """Protocol of the motion of a vehicle's parts in a run; motions have the names of ``watched_outputs``."""
 
-    def of(self, name: str) -> np.ndarray | Gaussian:
-        """Values of a motion at every row of the run, or its Gaussian statistics."""
+    def motion_of_part(self, name: str) -> np.ndarray | Gaussian:
+        """Returns the values of a part's motion at every row of the run, or its Gaussian statistics."""
         ...
 
 
 def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
-    """Outputs that describe how every part moves: tyre forces without the static load, travels and their rates, angles
-    of bodies that may turn and, where tyres have side forces, the components of their slip.
+    """Returns the outputs of a vehicle on which assumptions are checked: tyre forces without the static load, travels
+    of springs and their rates, angles of bodies and, where tyres have side forces, the components of their slip.
     """
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
     watched_list: list[SpatialOutput] = [
@@ -53,7 +53,9 @@ def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
 
 
 def watched_vehicle(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
-    """A linear vehicle, of any engine, with the outputs of ``watched`` and the slip angles (rad)."""
+    """Returns a linear vehicle, of any engine, with the outputs of ``watched_outputs`` and the slip angles (rad) at a
+    speed (m/s).
+    """
     watched = replace(vehicle, outputs=watched_outputs(vehicle))
     rows = linearise(watched, speed).outputs if vehicle.limits else outputs(watched, Kinematics(watched))
     return replace(linear, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
@@ -70,38 +72,38 @@ def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: floa
 
 
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
-    """Static load (N) of every tyre; empty where the springs carry no weight."""
+    """Static load (N) of every tyre by name; empty where the springs carry no weight."""
     with suppress(InputError):
         return preloads(replace(vehicle, gravity=GRAVITY)).tyres
     return {}
 
 
-def few_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
-    """A few of the speeds (m/s), with the slowest and the fastest among them."""
+def checked_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
+    """Returns at most JUDGED_SPEEDS of the speeds (m/s), evenly chosen, with the slowest and the fastest."""
     rising = np.unique(np.asarray(speeds, float))
     return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, JUDGED_SPEEDS).round().astype(int))]
 
 
 @dataclass(frozen=True)
 class Spectral:
-    """Motion by covariances at constant speeds (m/s); ``means`` (speeds,) : of motions whose mean is not the rest
-    position.
+    """Gaussian motion of a vehicle's parts from covariances at constant speeds (m/s). ``means`` (speeds,) : of motions
+    whose mean is not the rest position, by name.
     """
 
     vehicle: SpatialVehicle
-    linear: Linear
+    linear: LinearVehicleAtSpeed
     road: Excitation
     speeds: Sequence[float]
     means: Mapping[str, np.ndarray]
 
-    def of(self, name: str) -> Gaussian:
-        """Gaussian statistics of a part's motion at every speed."""
+    def motion_of_part(self, name: str) -> Gaussian:
+        """Returns the Gaussian statistics of a part's motion at every speed."""
         mean = self.means.get(name, np.zeros(len(self.speeds)))
         return Gaussian(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
 
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
-        """Standard deviations (speeds,) by name, not finite where a speed has none."""
+        """Standard deviations (speeds,) of all motions by name; NaN at speeds without a stationary motion."""
         rows, names = [], [output.name for output in self._watched_at_speed(self.speeds[0]).outputs]
         for speed in self.speeds:
             try:
@@ -116,23 +118,25 @@ class Spectral:
 
 @dataclass(frozen=True)
 class MotionAlongDrive:
-    """Motion along a drive. deviations : of the run's own outputs (time, ...); speed_by_speed : of other outputs, as if
-    each speed had always been driven.
+    """Gaussian motion of a vehicle's parts along a drive of varying speed. deviations (time,) : of motions that are
+    outputs of the run, by name; speed_by_speed : of other motions, stationary at some speeds.
     """
 
     deviations: Mapping[str, np.ndarray]
     speed_by_speed: Spectral
 
-    def of(self, name: str) -> Gaussian:
-        """Gaussian statistics of the motion of a part, by name: at every instant of a drive, or at some speeds."""
+    def motion_of_part(self, name: str) -> Gaussian:
+        """Returns the Gaussian statistics of a part's motion at every instant of the drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)
-        return self.speed_by_speed.of(name)
+        return self.speed_by_speed.motion_of_part(name)
 
 
-def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
-    """Standard deviations (rows, outputs) of a vehicle's own outputs, under the names of ``watched``."""
+def watched_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
+    """Returns those columns of the standard deviations (rows, outputs) of a vehicle's outputs that are motions of
+    ``watched_outputs``, by name.
+    """
     names_of_outputs = {replace(output, name=""): output.name for output in watched_outputs(vehicle)}
     pairs = zip(vehicle.outputs, deviation.T, strict=False)  # weighted ones come last
     return {
@@ -144,8 +148,8 @@ def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, 
 
 @dataclass(frozen=True)
 class MotionInRun:
-    """Motion in a run: positions and rates (rows, n) of the coordinates, heights of the road and their rates (rows, 2
-    w).
+    """Motion of a vehicle's parts in a run in time. positions, rates (rows, n) : of the coordinates; heights (rows,
+    2 w) : of the road under the wheels, and their rates.
     """
 
     watched_vehicle: LinearVehicle
@@ -153,8 +157,8 @@ class MotionInRun:
     rates: np.ndarray
     heights: np.ndarray
 
-    def of(self, name: str) -> np.ndarray:
-        """Values of a motion at every row of the run."""
+    def motion_of_part(self, name: str) -> np.ndarray:
+        """Returns the values of a part's motion at every row of the run."""
         row = {output.name: output for output in self.watched_vehicle.outputs}[name]
         road = np.concatenate([row.road_factors, row.road_rate_factors])
         return self.positions @ row.displacement_factors + self.rates @ row.rate_factors + self.heights @ road

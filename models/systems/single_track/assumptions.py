@@ -1,15 +1,15 @@
-"""What the car of two axles takes for granted, and whether a drive keeps to it."""
+"""Assumptions of the single-track car, with the limits that decide whether a drive breaks them."""
 
 from models.core.assumptions import Assumption
 from models.systems.single_track.equations import LEAST_LOAD
 from models.systems.single_track.scene import SingleTrackScene
 
 SMALL_ANGLE = 0.35
-"""rad: angles whose sine is the angle within 2 %."""
+"""Largest slip angle (rad) that counts as small: its sine is within 2 % of the angle."""
 
 
 def assumptions(scene: SingleTrackScene) -> list[Assumption]:
-    """Assumptions that slip angles are small and that both axles keep on the ground."""
+    """Assumptions of a drive: slip angles are small, and both axles stay on the ground."""
     weight = scene.vehicle.mass
     return [
         Assumption(

@@ -20,15 +20,18 @@ from models.machine.compiled import compiled
 
 GRAVITY = 9.81
 LEAST_LOAD, LEAST_SHARE = 0.05, 0.1
-"""Shares: of its static load that an axle keeps, and of its squared friction that is left to the side."""
+"""Lower bounds: of an axle's load divided by its static load, and of the share of its squared friction force that
+remains for the side force.
+"""
 TURNING_SLIP_WIDTH = 0.02
-"""rad of slip angle over which friction goes from that of right turns to that of left ones."""
+"""Range of slip angle (rad) over which friction changes from its value in right turns to its value in left turns."""
 
 
 class Axle(NamedTuple):
-    """Tyres of an axle. stiffness : cornering stiffness by load (1/rad); friction; bend_sharpness : n; side : friction
-    in left turns is larger by this share, in right turns smaller; downforce_coefficient : N s^2/m^2; rise : e, share of
-    the stiffness beyond the bend.
+    """Tyres of an axle. stiffness : cornering stiffness divided by load (1/rad); friction : largest side force divided
+    by load, mu; bend_sharpness : exponent n of the bend; side : share by which friction is larger in left turns and
+    smaller in right turns; downforce_coefficient : upward air force divided by speed squared (N s^2/m^2), above 0 it
+    lifts; rise : share e of the stiffness that remains beyond the bend.
     """
 
     stiffness: float
@@ -40,9 +43,10 @@ class Axle(NamedTuple):
 
 
 class Car(NamedTuple):
-    """Parameters of a car in SI units. mass; front_arm, rear_arm : from the centre of mass to the axles; inertia :
-    about the upright; height : of the centre of mass; drag : N s^2/m^2; front_braking_share, front_driving_share :
-    shares of the front axle in forward forces below and above 0.
+    """Parameters of a car in the plane. mass (kg); front_arm, rear_arm : distances from the centre of mass to the axles
+    (m); inertia : yaw inertia about the centre of mass (kg m^2); height : of the centre of mass (m); drag : air drag
+    divided by speed squared (N s^2/m^2); front_braking_share, front_driving_share : shares of the front axle in
+    braking and in driving forces.
     """
 
     mass: float
@@ -57,7 +61,7 @@ class Car(NamedTuple):
 
 @compiled
 def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> float:
-    """Side force (N, left positive) of an axle under a load (N) and a forward force (N), at a slip angle (rad)."""
+    """Side force (N, left positive) of an axle at a slip angle (rad), under a load (N) and a forward force (N)."""
     grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNING_SLIP_WIDTH))
     across = grip * np.sqrt(max(1.0 - (forward / grip) ** 2, LEAST_SHARE))
     x = axle.stiffness * load * slip_angle / across
@@ -67,7 +71,8 @@ def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> fl
 
 @compiled
 def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
-    """Side force of all tyres (N), yaw moment (N m), and load, side force and slip angle of the front and rear axle.
+    """Returns side force of all tyres (N), yaw moment (N m), then loads (N), side forces (N) and slip angles (rad) of
+    the axles, front before rear.
 
     motion : lateral velocity (m/s) and yaw rate (rad/s); drive : steer angle (rad), speed (m/s), its rate (m/s^2).
     """
@@ -100,20 +105,23 @@ def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive
 def motion_rates(
     car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]
 ) -> tuple:
-    """Rates of lateral velocity (m/s^2) and of yaw rate (rad/s^2)."""
-    answer = forces(car, front, rear, motion, drive)
-    return answer[0] / car.mass - drive[1] * motion[1], answer[1] / car.inertia
+    """Rates of the lateral velocity (m/s^2) and of the yaw rate (rad/s^2) of the single-track car."""
+    loads = forces(car, front, rear, motion, drive)
+    return loads[0] / car.mass - drive[1] * motion[1], loads[1] / car.inertia
 
 
 @compiled
-def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
-    """Motion (n, 2) at every sample, by Heun's method from sample to sample: lateral velocity (m/s) and yaw rate
-    (rad/s).
+def march(
+    car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, initial_motion: tuple[float, float]
+) -> np.ndarray:
+    """Integrate by Heun's method from sample to sample. Returns lateral velocity (m/s) and yaw rate (rad/s) at every
+    sample, shape (n, 2).
 
-    given (n, 3) : steer angle, speed, its rate at samples ``step`` (s) apart; first : motion at the first of them.
+    inputs (n, 3) : steer angle (rad), speed (m/s) and its rate (m/s^2) at samples ``step`` (s) apart; initial_motion :
+    lateral velocity and yaw rate at the first sample.
     """
     motion = np.empty((len(inputs), 2))
-    w, r = first
+    w, r = initial_motion
     motion[0] = w, r
     for i in range(len(inputs) - 1):
         inputs_now = inputs[i, 0], inputs[i, 1], inputs[i, 2]
@@ -128,12 +136,12 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
 
 @compiled
 def motion_reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Channels (n, 7) of a motion: lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad),
-    front first.
+    """Lateral acceleration (m/s^2), loads (N), side forces (N) and slip angles (rad) of a motion, shape (n, 7); of each
+    pair the front axle stands first.
     """
     table = np.empty((len(inputs), 7))
     for i in range(len(inputs)):
-        answer = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (inputs[i, 0], inputs[i, 1], inputs[i, 2]))
-        table[i, 0] = answer[0] / car.mass
-        table[i, 1:] = answer[2:]
+        loads = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (inputs[i, 0], inputs[i, 1], inputs[i, 2]))
+        table[i, 0] = loads[0] / car.mass
+        table[i, 1:] = loads[2:]
     return table

@@ -8,18 +8,18 @@ from models.systems.single_track.scene import SingleTrackScene
 
 
 def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, a measured file that contains no drive."""
+    """Raise InputError, before any file is written, for a measured file that contains no drive."""
     equation_inputs(read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch)), scene)
 
 
 def describe(scene: SingleTrackScene) -> str:
-    """The scene's plan as text."""
+    """Returns the plan of a single-track scene as text: vehicle, axles, measured drive, assumptions."""
     car, drive = scene.vehicle, read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch))
     left_out = ", ".join(f"{count} of {name}" for name, count in drive.left_out.items())
     lines = {
         "scene": f"{scene.file}, study {scene.study}",
         "vehicle": f"{car.mass:g} kg, axles {car.front:g} m ahead of its centre and {car.rear:g} m behind it",
-        **{name: _axle(getattr(scene, name)) for name in ("front", "rear")},
+        **{name: _axle_text(getattr(scene, name)) for name in ("front", "rear")},
         "drive": f"{scene.drive.file}, {drive.times[0]:g} to {drive.times[-1]:g} s, "
         f"{drive.speed.min():.3g} to {drive.speed.max():.3g} m/s",
         "left out": f"{left_out} (spikes and samples that were not measured)",
@@ -29,6 +29,7 @@ def describe(scene: SingleTrackScene) -> str:
     return "\n".join([scene.title, *lines_of_text, *assumption_lines(assumptions(scene))])
 
 
-def _axle(axle: object) -> str:
+def _axle_text(axle: object) -> str:
+    """Text on the tyres of an axle: cornering stiffness, friction, sharpness of the bend between them."""
     stiffness, friction, sharpness = (getattr(axle, name) for name in ("stiffness", "friction", "sharpness"))
     return f"cornering stiffness {stiffness:.4g} of the load per rad, friction {friction:.4g}, bend {sharpness:.3g}"

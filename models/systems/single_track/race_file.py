@@ -1,4 +1,4 @@
-"""The file of a measured race car as a table that scenes take, and what is published of the car."""
+"""Conversion of the measurement of a race car to a table that scenes read, and the car's published parameters."""
 
 import csv
 import gzip
@@ -19,16 +19,17 @@ RACE_COLUMNS = {
     "lateral acceleration": ("ayCG", "m/s^2"),
     "side slip": ("beta_true", "rad"),
 }
-"""Name here -> column and unit of the race's file."""
-KEPT_SAMPLE_INTERVAL = 2
-"""Samples of the race's file of which one is kept, after a low-pass at a quarter of its rate."""
+"""Channel name in scenes -> column and unit in the file of the race car's measurement."""
+DECIMATION_FACTOR = 2
+"""Decimation factor of the race car's measurement, which is low-passed at a quarter of its sampling rate first."""
 RACE_CAR = {
     "vehicle": {"mass": 982.0, "front": 1.33, "rear": 1.07, "yaw_inertia": 1250.0},
     "front": {"stiffness": 15.0, "friction": 1.3, "rise": 0.03},
     "rear": {"stiffness": 19.0, "friction": 1.3, "sharpness": 3.0, "rise": 0.03},
 }
-"""Published: mass and lengths. The rest is where the search begins, but for the rise: 3 % of the stiffness stay beyond
-the bend, so that a car that is driven at the limit does not spin for a small error of its tyres."""
+"""Parameters of the race car, as scene tables. Mass and lengths are published. The others are start values of the
+identification, except the rise: 3 % of the stiffness remain beyond the bend, so that a car at its limit does not spin
+for a small error of its tyres."""
 
 
 IDENTIFIED_PARAMETERS = (
@@ -48,30 +49,32 @@ IDENTIFIED_PARAMETERS = (
     "sensors.side_slip_offset=-0.02:0.02",
     "sensors.acceleration_offset=-1:1",
 )
-"""What is identified of it."""
+"""Parameters of the race car that are identified from the measurement, each as "scene key=lower:upper bound"."""
 
 
 def write_plain_table(source_path: Path, target_path: Path) -> Path:
-    """Write the race's file as a table that scenes can read: one of KEPT_SAMPLE_INTERVAL samples, low-passed so that
-    frequencies which these cannot resolve are removed.
+    """Write the race car's measurement as a table that scenes can read. Outliers are removed, columns are low-passed
+    against aliasing, and one of DECIMATION_FACTOR samples is written.
     """
     raw = _raw_columns(source_path)
     period = float(np.median(np.diff(raw["t"])))
-    columns = {name: (unit, raw[column][::KEPT_SAMPLE_INTERVAL]) for name, (column, unit) in RACE_COLUMNS.items()}
+    columns = {name: (unit, raw[column][::DECIMATION_FACTOR]) for name, (column, unit) in RACE_COLUMNS.items()}
     for name, (column, unit) in list(RACE_COLUMNS.items())[1:]:
         cleaned = without_outliers(raw[column])
         known = np.isfinite(cleaned)
         filled = np.interp(raw["t"], raw["t"][known], cleaned[known])
         columns[name] = (
             unit,
-            low_passed(filled[:, None], period, 0.25 / period, str(source_path), column)[::KEPT_SAMPLE_INTERVAL, 0],
+            low_passed(filled[:, None], period, 0.25 / period, str(source_path), column)[::DECIMATION_FACTOR, 0],
         )
     write_table(target_path, columns)
     return target_path
 
 
 def _raw_columns(source_path: Path) -> dict[str, np.ndarray]:
-    """Columns of the race's file, gzipped or not; InputError where one is missing, or times do not rise."""
+    """Read the columns of the race car's measurement, gzipped or not. Raises InputError where a column is missing or
+    times do not rise.
+    """
     with gzip.open(source_path, "rt") if source_path.suffix == ".gz" else source_path.open() as file:
         head, *rows = list(csv.reader(file))
     for column, _ in RACE_COLUMNS.values():

@@ -1,4 +1,4 @@
-"""A measured drive of a car of two axles: its yaw rate, lateral acceleration and side slip."""
+"""Run of the single-track car over a measured drive: yaw rate, lateral acceleration, side slip, forces of the axles."""
 
 import time
 
@@ -22,30 +22,41 @@ from models.systems.single_track.equations import march, motion_reports
 from models.systems.single_track.scene import SensorTable, SingleTrackScene
 
 SETTLING_DURATION = 1.0
-"""s of the first input, held, before the drive begins: the car begins in the steady turn of its first sample."""
+"""Time (s) for which the first sample's steer angle and speed act before the drive, so that the drive begins in a
+steady turn.
+"""
 LARGEST_YAW_RATE = 20.0
-"""rad/s: a car that yaws faster has no tyres of this kind."""
-REPORT_NAMES = ("load front", "side force front", "slip angle front", "load rear", "side force rear", "slip angle rear")
-REPORT_COLUMNS = (1, 3, 5, 2, 4, 6)
-REPORT_UNITS = ("N", "N", "rad") * 2
+"""Yaw rate (rad/s) beyond which a run fails: no car turns so fast."""
+AXLE_CHANNELS = (
+    "load front",
+    "side force front",
+    "slip angle front",
+    "load rear",
+    "side force rear",
+    "slip angle rear",
+)
+AXLE_CHANNEL_COLUMNS = (1, 3, 5, 2, 4, 6)
+AXLE_CHANNEL_UNITS = ("N", "N", "rad") * 2
+"""Channels of the axles, their columns in ``motion_reports`` and their units."""
 ESTIMATED_CHANNELS, HEUN_ORDER = ("yaw rate", "lateral acceleration", "side slip"), 2.0
-"""Channels whose error is told, and the order of Heun's method."""
+"""Channels whose discretisation error is stated, and the order of Heun's method."""
 
 
 def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Result:
-    """Run the whole measured drive. Channels over time are what sensors would show, and loads, side forces and slip
-    angles.
+    """Run the car over the whole measured drive. Channels over time are the readings of the sensors, and loads, side
+    forces and slip angles of both axles.
 
-    Raises InputError for a file that is no drive, RunFailed where the motion is not finite.
+    error : whether the error of the time steps is estimated. Raises InputError for a file that is no drive, RunFailed
+    where the motion is not finite.
     """
     drive = read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch))
     start_time = time.process_time()
     inputs_of_samples = equation_inputs(drive, scene)
-    motion, table = motion_of(scene, inputs_of_samples, float(drive.times[1] - drive.times[0]))
+    motion, table = simulated_motion(scene, inputs_of_samples, float(drive.times[1] - drive.times[0]))
     channels = sensor_channels(scene.sensors, inputs_of_samples, motion, table[:, 0])
     channels |= {
         name: Channel("time", table[:, column], unit)
-        for name, column, unit in zip(REPORT_NAMES, REPORT_COLUMNS, REPORT_UNITS, strict=True)
+        for name, column, unit in zip(AXLE_CHANNELS, AXLE_CHANNEL_COLUMNS, AXLE_CHANNEL_UNITS, strict=True)
     }
     counts = {"steps": len(inputs_of_samples) - 1} | {
         f"samples of {name} left out": n for name, n in drive.left_out.items()
@@ -66,14 +77,14 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
 def _with_step_error(
     run: Result, scene: SingleTrackScene, inputs_of_samples: np.ndarray, drive: MeasuredDrive
 ) -> Result:
-    """The result with the error of Heun's steps, which go from sample to sample, estimated by steps of a half and of a
-    quarter of their length, with inputs (n, 3) straight between the samples.
+    """Returns the result with the error of Heun's steps from sample to sample. It is estimated by steps of a half and
+    of a quarter of that length, with inputs (n, 3) interpolated linearly between samples.
 
-    Raises RunFailed, whose ``partial`` is the result, where steps are too long for the tyres, as stiff ones and a slow
-    drive make them.
+    Raises RunFailed, whose ``partial`` is the result, where steps are too long for the tyres, as with stiff tyres in a
+    slow drive.
     """
     period = float(drive.times[1] - drive.times[0])
-    half, quarter = (_sensed_in_parts(scene, inputs_of_samples, period, parts) for parts in (2, 4))
+    half, quarter = (_sensed_in_finer_steps(scene, inputs_of_samples, period, parts) for parts in (2, 4))
     estimates = {}
     for name, finer in quarter.items():
         fine, values = half[name], np.asarray(run[name])
@@ -87,22 +98,22 @@ def _with_step_error(
     )
 
 
-def _sensed_in_parts(
+def _sensed_in_finer_steps(
     scene: SingleTrackScene, inputs_of_samples: np.ndarray, sample_period: float, parts_per_sample: int
 ) -> dict[str, np.ndarray]:
-    """The channels TOLD at the samples (n,), from a march of so many steps between two samples."""
+    """ESTIMATED_CHANNELS at the samples (n,), computed with ``parts_per_sample`` time steps between two samples."""
     row_positions = np.linspace(0.0, len(inputs_of_samples) - 1.0, parts_per_sample * (len(inputs_of_samples) - 1) + 1)
     between = np.column_stack(
         [np.interp(row_positions, np.arange(len(inputs_of_samples)), column) for column in inputs_of_samples.T]
     )
-    motion, table = motion_of(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
+    motion, table = simulated_motion(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
     sensed = sensor_channels(scene.sensors, inputs_of_samples, motion[::parts_per_sample], table[::parts_per_sample, 0])
     return {name: np.asarray(sensed[name].values) for name in ESTIMATED_CHANNELS}
 
 
 def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
-    """Inputs (n, 3) of the equations: steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2), low-passed and
-    corrected for the sensors' errors.
+    """Steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2) of a measured drive, shape (n, 3): low-passed,
+    with the steer angle corrected for the sensor's errors.
     """
     period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
     steer, speed = drive.steer, drive.speed
@@ -117,9 +128,11 @@ def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray
     return np.ascontiguousarray(np.column_stack([steer, speed, np.gradient(speed, period)]))
 
 
-def motion_of(scene: SingleTrackScene, inputs: np.ndarray, sample_period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lateral velocity and yaw rate (n, 2), and reports (n, 7). The motion begins with the steady turn of the first
-    sample.
+def simulated_motion(
+    scene: SingleTrackScene, inputs: np.ndarray, sample_period: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral velocity (m/s) and yaw rate (rad/s), shape (n, 2), and ``motion_reports`` (n, 7), for inputs
+    ``sample_period`` (s) apart. The motion begins in the steady turn of the first sample.
     """
     parts = scene.car(), scene.front.axle(), scene.rear.axle()
     settling = np.repeat(inputs[:1], max(2, round(SETTLING_DURATION / sample_period)), axis=0)
@@ -134,11 +147,15 @@ def motion_of(scene: SingleTrackScene, inputs: np.ndarray, sample_period: float)
 
 
 def sensor_channels(
-    sensors: SensorTable, inputs: np.ndarray, motion: np.ndarray, lateral: np.ndarray
+    sensors: SensorTable, inputs: np.ndarray, motion: np.ndarray, lateral_acceleration: np.ndarray
 ) -> dict[str, Channel]:
-    """Readings of sensors in the motion, by the names of the channels of a measurement."""
+    """Readings of the car's sensors, offsets included, by the channel names of a measurement.
+
+    inputs (n, 3) : see ``equation_inputs``; motion (n, 2) : lateral velocity (m/s), yaw rate (rad/s);
+    lateral_acceleration (n,) : of the centre of mass (m/s^2).
+    """
     slip = np.arctan2(motion[:, 0], inputs[:, 1]) + sensors.side_slip_offset
-    acceleration = sensors.acceleration_ratio * lateral + sensors.acceleration_offset
+    acceleration = sensors.acceleration_ratio * lateral_acceleration + sensors.acceleration_offset
     return {
         "yaw rate": Channel("time", motion[:, 1] + sensors.yaw_rate_offset, "rad/s", "left positive"),
         "lateral acceleration": Channel("time", acceleration, "m/s^2", "of the centre of mass, left positive"),

@@ -1,4 +1,4 @@
-"""Scenes of a car of two axles that is driven by a measured steer angle and a measured speed."""
+"""Scenes of a single-track car that is driven by a measured steer angle and a measured speed."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,10 +11,11 @@ from models.core.strict import Strict, quantity
 from models.systems.single_track.equations import Axle, Car
 
 LARGEST_SHARPNESS = 20.0
+"""Largest exponent of the bend between cornering stiffness and friction."""
 
 
 class CarTable(Strict):
-    """[vehicle]: a rigid car in the plane."""
+    """[vehicle]: parameters of a rigid car in the plane."""
 
     mass: float = quantity("kg", "of the whole car")
     front: float = quantity("m", "from the centre of mass to the front axle")
@@ -41,12 +42,12 @@ class AxleTable(Strict):
     rise: float = Field(default=0.0, ge=0.0, le=0.5, description="share of the stiffness that is left beyond the bend")
 
     def axle(self) -> Axle:
-        """The axle in the form that the equations use."""
+        """Returns the axle's parameters in the form that the compiled equations use."""
         return Axle(self.stiffness, self.friction, self.sharpness, self.side, self.lift, self.rise)
 
 
 class DriveTable(Strict):
-    """[drive]: what was measured of the driver."""
+    """[drive]: the measured steer angle and speed that drive the car."""
 
     file: str = Field(description="CSV with time, steer (of the front wheels, left positive) and speed, with units")
     low_pass: float = quantity("Hz", "of steer and speed, without phase; 0 for none", default=0.0, zero=True)
@@ -56,7 +57,7 @@ class DriveTable(Strict):
 
 
 class SensorTable(Strict):
-    """[sensors]: how what was measured differs from what the car does."""
+    """[sensors]: errors of the sensors, by which readings differ from the motion of the car."""
 
     steer_ratio: float = quantity("", "steer angle of the wheels by the measured one", default=1.0)
     steer_offset: float = quantity("rad", "added to the measured steer angle", default=0.0, signed=True)
@@ -68,7 +69,7 @@ class SensorTable(Strict):
 
 
 class SingleTrackScene(SceneFile):
-    """One scene of a car of two axles."""
+    """A scene of a single-track car: all tables of its scene file."""
 
     system: Literal["single-track"] = "single-track"
     study: str = Field(default="single_track", description="the study that runs the scene")
@@ -79,10 +80,12 @@ class SingleTrackScene(SceneFile):
     sensors: SensorTable = SensorTable()
 
     def car(self) -> Car:
-        """The car in the form that the equations use."""
+        """Returns the car's parameters in the form that the compiled equations use."""
         return Car(*self.vehicle.model_dump().values())
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> SingleTrackScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked single-track scene from the nested tables of a scene file. Raises InputError for unknown keys and
+    for values outside their ranges.
+    """
     return checked(SingleTrackScene, table, file, folder)

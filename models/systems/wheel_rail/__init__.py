@@ -1,3 +1,3 @@
-"""A wheelset held on its rails at lateral displacements."""
+"""Static contact of a wheelset on its rails, at prescribed lateral displacements."""
 
 ENGINES: tuple[str, ...] = ()

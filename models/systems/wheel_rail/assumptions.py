@@ -1,4 +1,6 @@
-"""Assumptions of the contact of a wheelset at given lateral shifts, by every patch at every position."""
+"""Assumptions of the contact of a wheelset at prescribed lateral displacements, checked in every contact patch at every
+displacement.
+"""
 
 from collections.abc import Callable
 
@@ -14,22 +16,22 @@ WHEEL_NAMES = ("right", "left")
 
 
 def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
-    """Assumptions of a case with this coefficient of friction. They are judged by ``Contacts``, the detail of a
-    result.
+    """Assumptions about the contacts of a case with a coefficient of friction. They are checked on ``ContactsOfCase``,
+    the detail of a result.
     """
-    listed = [_half_space(), _within_profiles(scene)]
+    listed = [_half_space_assumption(), _profile_bounds_assumption(scene)]
     if yield_is_known(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic_assumption())
     if friction > 0.0:
-        listed += [_small_creepage(), _slow_slip(scene.wheelset.speed)]
+        listed += [_small_creepage_assumption(), _slow_slip_assumption(scene.wheelset.speed)]
     return listed
 
 
 def _extreme_of_patches(
     patch_value: Callable[[PatchReport], float], largest: bool = True
 ) -> Callable[[Result], Watched]:
-    """Return the watch function of a value: its largest or least among the patches of each wheel, over the
-    positions.
+    """Returns the function that computes, for each wheel, the largest (or least) of a patch's values at every position
+    of a result.
     """
     worst = max if largest else min
 
@@ -43,7 +45,7 @@ def _extreme_of_patches(
     return watched
 
 
-def _half_space() -> Assumption:
+def _half_space_assumption() -> Assumption:
     def share(patch: PatchReport) -> float:
         return max(0.5 * patch.length * patch.curvature_x, 0.5 * patch.width * patch.curvature_y)
 
@@ -57,9 +59,9 @@ def _half_space() -> Assumption:
     )
 
 
-def _within_profiles(scene: WheelRailScene) -> Assumption:
-    """Assumption on the distance (mm) from a patch to the nearer end of the rail's profile or to the wheel's outer
-    face.
+def _profile_bounds_assumption(scene: WheelRailScene) -> Assumption:
+    """Assumption that contact patches lie within the profiles: the distance (mm) from a patch to the nearest end of the
+    rail's profile or to the wheel's outer face is above 0.
     """
     side = scene.profiles.wheel_on_rail(scene.wheelset.radius)
 
@@ -88,7 +90,7 @@ def _elastic_assumption() -> Assumption:
     )
 
 
-def _small_creepage() -> Assumption:
+def _small_creepage_assumption() -> Assumption:
     def largest(patch: PatchReport) -> float:
         return max(abs(patch.xi_x), abs(patch.xi_y), 0.5 * max(patch.length, patch.width) * abs(patch.spin))
 
@@ -102,7 +104,7 @@ def _small_creepage() -> Assumption:
     )
 
 
-def _slow_slip(speed: float) -> Assumption:
+def _slow_slip_assumption(speed: float) -> Assumption:
     return Assumption(
         "constant friction",
         "friction is the same however fast the wheels slip",

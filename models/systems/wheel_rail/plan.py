@@ -1,4 +1,6 @@
-"""The plan of a scene of a wheelset at given lateral shifts: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of a wheelset at prescribed lateral displacements: printed by ``twinrig show``, checked before
+any run.
+"""
 
 from models.core.assumptions import assumption_lines
 from models.systems.wheel_rail.assumptions import assumptions
@@ -6,13 +8,15 @@ from models.systems.wheel_rail.scene import WheelRailScene
 
 
 def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, files that hold no profiles, which reading the scene does not find."""
+    """Raise InputError, before any file is written, for profile files that contain no profile and for materials that
+    differ too much.
+    """
     for case in scene.cases.values():
         _ = scene.contact(case).material_pair.G
 
 
 def describe(scene: WheelRailScene) -> str:
-    """Text that describes the scene before a run: profiles, track, wheelset, positions, cases."""
+    """Returns the plan of the scene as text: profiles, track, wheelset, positions, cases, assumptions."""
     p, w, positions = scene.profiles, scene.wheelset, scene.positions
     lines = {
         "scene": f"{scene.file}, study {scene.study}",
@@ -30,6 +34,9 @@ def describe(scene: WheelRailScene) -> str:
 
 
 def case_text(yaw: float, friction: float) -> str:
-    """Text on a case: its yaw, and whether it rolls with friction or is only pressed."""
+    """Text on a case: its yaw, and whether the wheelset rolls with friction or is only pressed on the rails.
+
+    yaw : mrad per mm of lateral displacement; friction : coefficient.
+    """
     yaw_text = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
     return f"{yaw_text}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")

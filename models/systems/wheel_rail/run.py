@@ -17,15 +17,16 @@ from models.rail.contact_table import PatchReport, WheelsetContact, WheelsetPlac
 from models.systems.wheel_rail.assumptions import WHEEL_NAMES, assumptions
 from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
 
-TOO_DEEP = ("distance", "load")
-"""What the theories complain of where the contact grows out of its surroundings."""
+INPUTS_OF_DEEP_CONTACT = ("distance", "load")
+"""Inputs that the contact theories refuse where the contact grows beyond the computed surroundings of the profiles."""
 POSITION_UNITS = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
-"""Quantities of a position, with their units."""
+"""Channels of the wheelset at a position, with their units."""
 OUTWARD_DEGREES_PER_RADIAN = -180.0 / np.pi
+"""Factor from a contact angle in rad to degrees, with the sign turned."""
 WHEEL_QUANTITIES = {"normal": "N", "area": "m^2", "fx": "N", "fy": "N", "peak": "Pa"}
-"""Quantities of a wheel whose error is told, with their units."""
-POSITIONS_PER_ERROR = 2
-"""Of so many positions one tells the error."""
+"""Quantities of a wheel whose error is stated, with their units."""
+ERROR_POSITION_STRIDE = 2
+"""The error of the cells is estimated at every n-th position of the wheelset; this is n."""
 PATCH_QUANTITIES: dict[str, tuple[str, float, str]] = {
     "on_rail": ("mm", 1e3, "on_rail"),
     "in_track": ("mm", 1e3, "y"),
@@ -51,13 +52,13 @@ PATCH_QUANTITIES: dict[str, tuple[str, float, str]] = {
     "spin": ("1/m", 1.0, "spin"),
     "approach": ("um", 1e6, "approach"),
 }
-"""Quantities of a patch: unit, factor to it and attribute of ``PatchReport``."""
+"""Channels of a contact patch: unit, factor from SI to this unit, and attribute of ``PatchReport``."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactsOfCase:
-    """Contacts of a case. placed : the contact at each position that has one; failures : reasons for the others, by
-    position (mm); seconds : processor time of each.
+    """Contacts of a case. placed : contacts of the wheelset at each position where they were computed; failures :
+    reasons for the positions that failed, by lateral displacement (mm); seconds : processor time of each position.
     """
 
     placed: list[WheelsetPlacement] = field(default_factory=list)
@@ -88,7 +89,7 @@ def run(
         try:
             contacts.placed.append(contact.at(shift, yaw * shift))
         except (InputError, RunFailed) as failure:
-            deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
+            deep = isinstance(failure, InputError) and failure.place in INPUTS_OF_DEEP_CONTACT
             contacts.failures[1e3 * shift] = (
                 f"a load of {contact.load:g} N presses wheel and rail more than "
                 f"{1e3 * SURROUNDINGS_DISTANCE:g} mm into "
@@ -102,14 +103,14 @@ def run(
 
 
 def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) -> Result:
-    """The result with the error that the finite cells cause, as the root mean square over both wheels and every other
-    position.
+    """Returns the result with the error that the finite cells cause, as the root mean square over both wheels and every
+    other position.
 
     The error of the cells is of first order, so that it is as large as the change on half the cells. Relative errors
     refer to the root mean square.
     """
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
-    for placed in run.detail.placed[::POSITIONS_PER_ERROR]:
+    for placed in run.detail.placed[::ERROR_POSITION_STRIDE]:
         with suppress(InputError, RunFailed):
             coarse.append(replace(contact, cell_factor=2.0 * contact.cell_factor).at(placed.shift, placed.yaw))
             fine.append(placed)
@@ -125,8 +126,8 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
 
 
 def wheel_sums(placement: WheelsetPlacement) -> np.ndarray:
-    """Quantities ``WHEEL_QUANTITIES`` (2, 5) of the right and of the left wheel: sums over the wheel's patches, then
-    the largest pressure.
+    """Normal force (N), area (m^2), creep forces fx and fy (N), each summed over a wheel's patches, and its largest
+    pressure (Pa). Shape (2, 5): right wheel, left wheel.
     """
     return np.array(
         [
@@ -164,12 +165,14 @@ def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase)
 
 
 def patches_by_force(placement: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
-    """The patches of one wheel, in the order of their normal force, largest first."""
+    """Contact patches of one wheel ("right" or "left"), sorted by normal force, largest first."""
     return tuple(sorted(getattr(placement, wheel), key=lambda patch: -patch.normal))
 
 
 def position_quantities(placement: WheelsetPlacement) -> dict[str, Any]:
-    """Quantities of the wheelset at a position and of every patch of both wheels, by name."""
+    """Channels of the wheelset at a position (POSITION_UNITS) and of every patch of both wheels (PATCH_QUANTITIES), by
+    name.
+    """
     return {
         "shift": 1e3 * placement.shift,
         "yaw": 1e3 * placement.yaw,

@@ -1,4 +1,4 @@
-"""Scenes of a wheelset held on its rails at lateral displacements, as the Manchester contact benchmark holds it."""
+"""Scenes of a wheelset on its rails at prescribed lateral displacements, as in the Manchester contact benchmark."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,10 +16,10 @@ from models.rail.laid_profiles import Profiles
 from models.systems.contact.scene import Bodies
 
 MOST_CELLS = 300
-"""Of creep forces along each axis."""
+"""Most cells along each axis of a patch in the computation of creep forces."""
 
 
-class HeldWheelset(Strict):
+class WheelsetOnRails(Strict):
     """[wheelset]: two wheels on one axle, each with the same load."""
 
     radius: float = quantity("m", "of the wheels at the taping line", default=0.46)
@@ -28,19 +28,19 @@ class HeldWheelset(Strict):
 
 
 class Positions(Strict):
-    """[positions]: lateral displacements of the wheelset to the right, evenly spaced."""
+    """[positions]: lateral displacements of the wheelset, evenly spaced, positive to the right."""
 
     start: float = quantity("m", "first displacement", default=0.0, signed=True)
     stop: float = quantity("m", "last displacement", default=0.010, signed=True)
     count: int = Field(default=21, ge=1, le=1000, description="number of displacements")
 
     def values(self) -> np.ndarray:
-        """All lateral displacements (m) of the wheelset."""
+        """Lateral displacements (count,) of the wheelset in m."""
         return np.linspace(self.start, self.stop, self.count)
 
 
 class Case(Strict):
-    """[cases.NAME]: position of the wheelset, and whether it rolls."""
+    """[cases.NAME]: yaw of the wheelset, and friction if it rolls."""
 
     yaw: float = quantity("rad/m", "yaw for each metre of displacement", default=0.0, signed=True)
     friction: float = quantity(
@@ -49,7 +49,7 @@ class Case(Strict):
 
 
 class Method(Strict):
-    """[method]: how finely contacts are computed."""
+    """[method]: number of cells with which contacts are computed."""
 
     cells: int = Field(
         default=CELLS_PER_STRIP, ge=9, le=MOST_CELLS, description="along each axis of a patch, more on normal pressures"
@@ -57,19 +57,21 @@ class Method(Strict):
 
 
 class WheelRailScene(SceneFile):
-    """One scene of a held wheelset: every case at every position."""
+    """A scene of a wheelset at prescribed lateral displacements: every case is computed at every position."""
 
     system: Literal["wheel-rail"] = "wheel-rail"
     study: str = Field(default="manchester", description="the study that runs the scene")
     bodies: Bodies = Bodies()
     profiles: Profiles = Profiles()
-    wheelset: HeldWheelset = HeldWheelset()
+    wheelset: WheelsetOnRails = WheelsetOnRails()
     positions: Positions = Positions()
     method: Method = Method()
     cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
     def contact(self, case: Case) -> WheelsetContact:
-        """Contact of the wheelset with the track in a case; raises InputError for files that are no profiles."""
+        """Returns the contact problem of the wheelset on the track in a case; raises InputError for files that are no
+        profiles.
+        """
         side = self.profiles.wheel_on_rail(self.wheelset.radius)
         return WheelsetContact(
             side,
@@ -93,13 +95,15 @@ PLAUSIBLE_RANGES = {
     "positions.start": (-0.03, 0.03, "m"),
     "positions.stop": (-0.03, 0.03, "m"),
 }
-"""Smallest and largest values that are no slip of a unit."""
+"""Smallest and largest values that are taken: values beyond them are likely to be in a wrong unit."""
 LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
-"""rad; coefficient."""
+"""Largest yaw of the wheelset (rad) and largest coefficient of friction that a scene may have."""
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelRailScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked wheel-rail scene from the nested tables of a scene file. Raises InputError for unknown keys and
+    for values outside their ranges.
+    """
     scene = checked(WheelRailScene, table, file, folder)
     for key_path, (least, most_allowed, unit) in PLAUSIBLE_RANGES.items():
         owner, key = key_path.split(".")

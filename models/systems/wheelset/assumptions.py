@@ -14,39 +14,41 @@ from models.rail.flange_climbing import bound_shares, nadal_limit
 from models.rail.wheelset import Wheelset
 
 LEAST_LOAD = 0.05
-"""Of its load at rest, that a wheel must carry: below, it is about to leave its rail."""
-FLANGE_WAY = 5e-3
-"""m beyond the clearance that a rail gives way under a flange; a spring without end stands for it."""
+"""Least wheel load divided by the load at rest: below, the wheel is about to leave its rail."""
+LARGEST_FLANGE_DEFLECTION = 5e-3
+"""Largest deflection (m) of a rail under a flange, beyond the clearance. The flange of a cone is modelled by a spring
+without end.
+"""
 LARGEST_TRAVEL = 0.02
-"""m of the axle's ends in their suspension, whose springs are lines: guides and stops leave no more."""
+"""Largest travel (m) of the axle's ends in their linear suspension: guides and stops allow no more."""
 LARGEST_YAW = 0.05
-"""rad: the curvatures of a contact are those without yaw."""
+"""Largest yaw (rad) at which a contact's curvatures may be taken as without yaw."""
 CLIMBING_DISTANCE = 2e-3
-"""m from the flange's tip at which a wheel has climbed, as in the table of contacts."""
+"""Distance (m) of a contact from the flange's tip at which a wheel has climbed, as in the table of contacts."""
 LEAST_FRICTION = 0.02
-"""Coefficient below which nothing creeps as a wheel on a rail does."""
+"""Coefficient of friction below which creep forces are too small for eigenvalues to mean anything."""
 
 
 def assumptions(equations: Equations) -> list[Assumption]:
-    """Assumptions of a path of the wheelset at its speed. They are judged by the path, the detail of a result."""
+    """Assumptions of the equations of a wheelset at a speed. They are checked on the path, the detail of a result."""
     wheelset = equations.wheelset
     listed = [
-        _wheels_press(wheelset),
-        _small_yaw(),
+        _wheel_load_assumption(wheelset),
+        _small_yaw_assumption(),
         _rolling_assumption(equations),
-        _half_space(),
-        _slow_slip(equations),
+        _half_space_assumption(),
+        _slow_slip_assumption(equations),
     ]
     listed += [_elastic_assumption()] if yield_is_known(wheelset.material) else []
     listed += [_no_slip_assumption(wheelset)] if equations.law == "linear" else []
     listed += [_travel_assumption(wheelset)] if equations.body.has_suspension else []
     if wheelset.profiles is not None:
-        return [*listed, _within_profiles(wheelset)]
-    return [*listed, _climbing_assumption(wheelset), _flange_way(wheelset)]
+        return [*listed, _profile_bounds_assumption(wheelset)]
+    return [*listed, _climbing_assumption(wheelset), _flange_deflection_assumption(wheelset)]
 
 
-def of_linear(wheelset: Wheelset) -> list[Assumption]:
-    """Assumption of the eigenvalues, in addition to small motions: there is friction, so that creep forces act."""
+def linear_motion_assumptions(wheelset: Wheelset) -> list[Assumption]:
+    """Assumption of the eigenvalues that there is friction, so that creep forces act on small motions."""
     return [
         Assumption(
             "friction",
@@ -59,13 +61,17 @@ def of_linear(wheelset: Wheelset) -> list[Assumption]:
     ]
 
 
-def of_branch(wheelset: Wheelset) -> list[Assumption]:
-    """Assumptions of a branch of limit cycles, on their amplitudes; the flange of a cone acts as a spring."""
-    return [] if wheelset.profiles else [_flange_way(wheelset, lambda run: {"cycle": run["amplitude"]})]
+def branch_assumptions(wheelset: Wheelset) -> list[Assumption]:
+    """Assumption of a branch of limit cycles that amplitudes stay small enough for the flange spring of a cone; none
+    for profiles.
+    """
+    return (
+        [] if wheelset.profiles else [_flange_deflection_assumption(wheelset, lambda run: {"cycle": run["amplitude"]})]
+    )
 
 
 def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
-    """Values (n, patches) summed over the patches of each wheel."""
+    """Sums a quantity of contact patches, shape (n, patches), over the patches of each wheel; (n,) by wheel."""
     patches_per_wheel = contacts.shape[1] // 2
     return {
         "right wheel": values[:, :patches_per_wheel].sum(axis=1),
@@ -74,7 +80,9 @@ def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
 
 
 def _watch_of_path(watch: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
-    """Return the watch function for a result whose detail is a path, or a periodic motion that has one."""
+    """Returns a function of a result that applies ``watch`` to its path; the result's detail is a path or a limit
+    cycle.
+    """
 
     def of_result(run: Result) -> Watched:
         return watch(run.detail if isinstance(run.detail, WheelsetPath) else run.detail.path())
@@ -83,7 +91,9 @@ def _watch_of_path(watch: Callable[[WheelsetPath], Watched]) -> Callable[[Result
 
 
 def _watch_of_patches(watch: Callable[[Array], Array]) -> Callable[[Result], Watched]:
-    """Return the watch function of a value's maximum among the loaded patches of each wheel, 0 where none is loaded."""
+    """Returns a function of a result that gives, for each wheel and time, the largest magnitude of ``watch`` among its
+    loaded patches, 0 where no patch is loaded.
+    """
 
     def of_path(path: WheelsetPath) -> Watched:
         patches_per_wheel, load = path.contacts.shape[1] // 2, path.contacts["load"]
@@ -96,7 +106,7 @@ def _watch_of_patches(watch: Callable[[Array], Array]) -> Callable[[Result], Wat
     return _watch_of_path(of_path)
 
 
-def _wheels_press(wheelset: Wheelset) -> Assumption:
+def _wheel_load_assumption(wheelset: Wheelset) -> Assumption:
     return Assumption(
         "wheels press",
         "both wheels stay on their rails",
@@ -109,7 +119,7 @@ def _wheels_press(wheelset: Wheelset) -> Assumption:
     )
 
 
-def _small_yaw() -> Assumption:
+def _small_yaw_assumption() -> Assumption:
     return Assumption(
         "small yaw",
         "the yaw is so small that a contact's curvatures are those without it",
@@ -132,9 +142,9 @@ def _rolling_assumption(equations: Equations) -> Assumption:
     )
 
 
-def _half_space() -> Assumption:
-    """Assumption that bodies are half-spaces. In a Hertzian contact the ratio of penetration to the shorter semi-axis
-    is about the ratio of that semi-axis to its radius.
+def _half_space_assumption() -> Assumption:
+    """Assumption that contacts are small beside the bodies' radii (half-spaces). In a Hertzian contact the ratio of
+    penetration to the shorter semi-axis is about the ratio of that semi-axis to its radius.
     """
 
     def watched(contacts: Array) -> Array:
@@ -166,7 +176,7 @@ def _elastic_assumption() -> Assumption:
     )
 
 
-def _slow_slip(equations: Equations) -> Assumption:
+def _slow_slip_assumption(equations: Equations) -> Assumption:
     speed = max(abs(equations.speed), wf.REGULARISED_SPEED)
     return Assumption(
         "constant friction",
@@ -225,20 +235,20 @@ def _climbing_assumption(wheelset: Wheelset) -> Assumption:
     )
 
 
-def _flange_way(wheelset: Wheelset, watch: Callable[[Result], Watched] | None = None) -> Assumption:
+def _flange_deflection_assumption(wheelset: Wheelset, watch: Callable[[Result], Watched] | None = None) -> Assumption:
     return Assumption(
         "on the tread",
         "the wheels roll on their cones, and a flange's rail gives way by a few mm at most",
         "name the effect profiles, which have flanges of their own",
         watch or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
         "m",
-        upper_limit=wheelset.flange_clearance + FLANGE_WAY,
+        upper_limit=wheelset.flange_clearance + LARGEST_FLANGE_DEFLECTION,
     )
 
 
-def _within_profiles(wheelset: Wheelset) -> Assumption:
-    """Assumption on the distances (mm) of contacts from the flange's tip on the wheel, and from the ends of the profile
-    on the rail.
+def _profile_bounds_assumption(wheelset: Wheelset) -> Assumption:
+    """Assumption that contacts lie within the profiles: their distances (mm) from the flange's tip, the wheel's face
+    and the ends of the rail's profile are above 0.
     """
     assert wheelset.profiles is not None
     side = wheelset.profiles.wheel_on_rail(wheelset.radius)
@@ -266,12 +276,12 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
 
 
 def _along_axle(path: WheelsetPath) -> Array:
-    """Positions (n, patches) of the contacts along the axle, from its middle (m)."""
+    """Positions (n, patches) of the contacts along the axle, from its middle, in m."""
     roll, yaw, contacts = path.states[:, ROLL, None], path.states[:, YAW, None], path.contacts
     x, y, z = (contacts[name] for name in "xyz")
     return np.asarray(np.cos(roll) * (np.cos(yaw) * y - np.sin(yaw) * x) + np.sin(roll) * z)
 
 
 def _across_track(path: WheelsetPath) -> Array:
-    """Lateral positions (n, patches) of the contacts, from the middle of the track (m)."""
+    """Lateral positions (n, patches) of the contacts, from the middle of the track, in m, positive to the right."""
     return np.asarray(path.states[:, Y, None] + path.contacts["y"])

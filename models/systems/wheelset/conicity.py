@@ -25,14 +25,14 @@ CONICITY_CHANNELS = {
     "spacing_error": ("-", "of the standard's: its difference on the table without every other row"),
     "wavelength": ("m", "of Klingel's wave on the track"),
 }
-"""What is saved at each amplitude, with its unit."""
+"""Channels over the amplitude: unit and meaning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Conicities:
-    """Equivalent conicities. table : rolling radius differences (m); rows : one per amplitude, not a number where there
-    is no wave; missing_reasons : reasons for that, by amplitude (m); source : text on what the table describes;
-    wavelengths : of the rows (m).
+    """Equivalent conicities over the amplitude. table : rolling radius differences (m) over lateral displacement (m);
+    rows : one per amplitude, NaN where the wheelset has no wave; missing_reasons : why there is no wave, by amplitude
+    (m); source : text on what the table describes; wavelengths : of Klingel's wave (m), one per row.
     """
 
     table: RollingRadiusTable
@@ -46,19 +46,20 @@ class Conicities:
         write_table(path, {"y": ("m", self.table.displacements), "dr": ("m", self.table.differences)})
 
 
-def told_conicity(scene: WheelsetScene) -> bool:
-    """Whether a run reports the conicity: where the scene has [conicity], or a wheelset with profiles."""
+def reports_conicity(scene: WheelsetScene) -> bool:
+    """Whether runs of a scene report the equivalent conicity: the scene has [conicity], or a wheelset with profiles."""
     return scene.conicity is not None or wheelset_of(scene).profiles is not None
 
 
 def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda share: None) -> Result:
-    """Compute both conicities at the scene's amplitudes; the detail is ``Conicities``.
+    """Compute the equivalent conicity by EN 15302 and by the first harmonic at the scene's amplitudes; the result's
+    detail is ``Conicities``.
 
-    report_progress : called with the share of the rolling radii that is done. InputError for a file that is no table
-    and for wheels that do not stand on their rails; an amplitude without a wave is a doubt.
+    report_progress : called with the share of the rolling radii that is done. Raises InputError for a file that is no
+    table and for wheels that do not stand on their rails; an amplitude without a wave is a doubt.
     """
     conicity_table, wheelset = scene.conicity or ConicityTable(), wheelset_of(scene)
-    table, source = _table(scene, conicity_table, wheelset, report_progress)
+    table, source = _rolling_radius_table(scene, conicity_table, wheelset, report_progress)
     rows, why = list[ConicityRow](), dict[float, str]()
     for amplitude in conicity_table.amplitudes:
         try:
@@ -79,8 +80,8 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
 
 
 def check(scene: WheelsetScene) -> None:
-    """Refuse, before anything is computed, a file that is no table of differences and a left side that is no
-    profile.
+    """Raise InputError, before anything is computed, for a file that is no table of rolling radius differences, and for
+    left wheel or rail files that are no profiles.
     """
     conicity_table = scene.conicity or ConicityTable()
     if conicity_table.table is not None:
@@ -90,7 +91,7 @@ def check(scene: WheelsetScene) -> None:
 
 
 def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles: Profiles) -> Profiles:
-    """Profiles of the left wheel and rail: those that [conicity] names, else those of the right side."""
+    """Profiles of the left wheel and rail: as [conicity] names them, else the right side's."""
     named = {
         key: value
         for key, value in (("wheel", conicity_table.left_wheel), ("rail", conicity_table.left_rail))
@@ -99,7 +100,7 @@ def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles
     return profiles.model_copy(update=named).with_full_paths(scene) if named else profiles
 
 
-def _table(
+def _rolling_radius_table(
     scene: WheelsetScene, conicity_table: ConicityTable, wheelset: Wheelset, report_progress: Callable[[float], Any]
 ) -> tuple[RollingRadiusTable, str]:
     if conicity_table.table is not None:
@@ -122,7 +123,7 @@ def _table(
 
 
 def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
-    """Raise InputError where the wheelset has no wave at any of the scene's amplitudes."""
+    """Raise InputError where the wheelset runs on no wave at any of the scene's amplitudes."""
     if len(conicities.missing_reasons) == len(conicities.rows):
         amplitude, why = next(iter(conicities.missing_reasons.items()))
         table = scene.conicity.table if scene.conicity else None
@@ -130,8 +131,8 @@ def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
 
 
 def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
-    """Both conicities at each amplitude (m) as plain numbers, with the centre (m) of the wave; None where there is no
-    wave.
+    """Equivalent conicity by EN 15302 and by the first harmonic at each amplitude (m), with the centre of the wave (m),
+    as numbers for a JSON file; None where there is no wave.
     """
     rows: tuple[ConicityRow, ...] = run_of_scene.detail.rows
     return {
@@ -143,7 +144,7 @@ def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
 
 
 def conicity_lines(conicities: Conicities) -> list[str]:
-    """Text with both conicities at every amplitude."""
+    """Lines of a text table with the equivalent conicity by EN 15302 and by the first harmonic at every amplitude."""
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
     lines_of_text = [f"  equivalent conicity of {conicities.source}", head]
     for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):

@@ -1,4 +1,4 @@
-"""The wheelset of a scene as a file of its engine: body, joints, and the suspension."""
+"""Export of the wheelset of a scene as a model file of an engine: body, joints and suspension, without the rails."""
 
 from models.engines.export import Exported, ExportSubject, export_free_vehicle
 from models.engines.wheelset import driven_wheelset
@@ -10,7 +10,7 @@ LEFT_OUT = ("normal and creep forces of the right rail", "normal and creep force
 
 
 def exported(scene: WheelsetScene, engine: str) -> Exported:
-    """Export the wheelset without the rails to "mujoco" or "exudyn"."""
+    """Export the wheelset, without the forces of the rails, as a model file of "mujoco" or "exudyn"."""
     equations = equations_of(scene, engine, path_speeds(scene)[0])
     return export_free_vehicle(
         engine, driven_wheelset(equations), ExportSubject(scene.title, scene.file, AXES), LEFT_OUT

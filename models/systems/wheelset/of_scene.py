@@ -1,4 +1,4 @@
-"""From a scene to its wheelset, and to the equations of motion of each implementation."""
+"""The wheelset of a scene, and its equations of motion in the reference, in Exudyn and in MuJoCo."""
 
 from functools import lru_cache
 from importlib import import_module
@@ -22,13 +22,17 @@ IMPLEMENTATION_MODULES = {
     "mujoco": "models.engines.wheelset.MujocoWheelset",
 }
 FLANGE_KEY = "flange_stiffness"
-"""The only parameter that profiles leave nothing to do: cones stand for them where motions are small."""
+"""Parameter that has no effect beside profiles, which have flanges themselves. The cones' other parameters still
+describe small motions.
+"""
 SPEED_SHARES = (0.9, 1.1)
-"""Speeds of the paths by the critical one, where the scene names none."""
+"""Ratios of the paths' speeds to the critical speed, where the scene names no speeds."""
 
 
 def wheelset_of(scene: WheelsetScene) -> Wheelset:
-    """The wheelset with the scene's overrides; an error names the file from which the value comes."""
+    """Returns the scene's wheelset: its parameter set with overrides, profiles and effects. An InputError names the
+    file from which the wrong value comes.
+    """
     name, override = scene.wheelset.parameters, scene.wheelset.override
     base = PARAMETER_SETS.get(name)
     if base is None and not name.endswith(".toml"):
@@ -50,7 +54,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
 
 
 def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset:
-    """The wheelset with these values; errors name the file and the table that they come from."""
+    """Build a wheelset from its parameters by name. An InputError names the file and the table of the wrong value."""
     try:
         return Wheelset(**values)
     except InputError as error:
@@ -59,8 +63,8 @@ def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset
 
 
 def implementation(engine: str) -> type[Equations]:
-    """The class of the equations of motion for an implementation; only its own engine is imported, when it is
-    needed.
+    """Returns the class of the equations of motion in "reference", "exudyn" or "mujoco"; no other engine is
+    imported.
     """
     module, _, name = IMPLEMENTATION_MODULES[engine].rpartition(".")
     return getattr(import_module(module), name)
@@ -82,16 +86,16 @@ def _initial_state(
 
 
 def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
-    """Equations at a speed (m/s), and the state (10,) in which the scene's paths begin. Both are kept for further
-    paths.
+    """Returns the equations of motion at a speed (m/s), and the state (10,) in which the scene's paths begin. Both are
+    cached for further paths.
     """
     contact, run = scene.contact, scene.run
     return _initial_state(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)
 
 
 def path_speeds(scene: WheelsetScene) -> list[float]:
-    """Speeds (m/s) of the paths: the scene's, else around the critical speed, or the last speed where there is no
-    critical one.
+    """Speeds (m/s) of the simulated motions: those of [run], else 0.9 and 1.1 of the critical speed, or the last of
+    [speeds] where there is no critical speed.
     """
     if scene.run.speeds:
         return list(scene.run.speeds)

@@ -1,4 +1,4 @@
-"""Runs of a wheelset's scene: paths, its linearisation over the speeds, the branch of limit cycles."""
+"""Runs of a wheelset scene: simulated motions, eigenvalues over the speed, the branch of limit cycles."""
 
 import math
 import time
@@ -29,7 +29,7 @@ from models.rail.limit_cycle import (
     solved_orbit,
 )
 from models.rail.linear import NoCriticalSpeed, critical_speed_or_reason
-from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
+from models.systems.wheelset.assumptions import assumptions, branch_assumptions, linear_motion_assumptions
 from models.systems.wheelset.of_scene import (
     SPEED_SHARES,
     equations_and_start,
@@ -43,12 +43,14 @@ from models.systems.wheelset.stated_error import FEWEST_CELLS, with_error, with_
 
 STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
 CONTACTS = {"normal": ("load", "N"), "fx": ("fx", "N"), "fy": ("fy", "N"), "mz": ("mz", "N m"), "power": ("power", "W")}
-"""What is saved of every path, with its place or field and its unit."""
+"""Channels of every path: states with their index, quantities of the contact patches with their field, and units."""
 SPEED: SoughtQuantity = "speed"
 AMPLITUDE: SoughtQuantity = "amplitude"
-"""What is sought of a cycle: along a branch, and at a speed."""
+"""Unknown that is solved for in a limit cycle: the speed along a branch, the amplitude at a given speed."""
 PAIRS_OF_MARCHES = 11
-"""Pairs of marches that linearise a return: what workers can share."""
+"""Pairs of simulated periods, displaced to both sides, whose differences linearise a limit cycle; worker processes
+share them.
+"""
 ORBIT_CHANNELS = {
     "speed": "m/s",
     "amplitude": "m",
@@ -57,31 +59,32 @@ ORBIT_CHANNELS = {
     "error": "m/s or m",
     "frequency_error": "Hz",
 }
-"""What is saved of every limit cycle of a branch, with its unit."""
+"""Channels over the limit cycles of a branch, with their units."""
 
 
 def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error: bool = False) -> Result:
-    """Compute the path at a speed (m/s), by default the first of the scene's; the detail is its ``WheelsetPath``.
+    """Simulate the wheelset at a speed (m/s), by default the scene's first; the result's detail is the
+    ``WheelsetPath``.
 
-    error : whether the error of steps and cells is estimated, by further paths. What the path assumes is judged always.
+    error : whether the errors of time steps and cells are estimated, by further paths; assumptions are checked always.
     Channels are states over time and forces of the contacts over time and patch. Raises InputError or RunFailed.
     """
     speed = path_speeds(scene)[0] if speed is None else speed
     equations_and_start(scene, engine, speed)  # kept: its seconds are none of the path
     start_time = time.process_time()
     motion = path(scene, engine, speed)
-    labelled = judged_path(scene, engine, speed, motion, seconds=time.process_time() - start_time)
+    labelled = path_result(scene, engine, speed, motion, seconds=time.process_time() - start_time)
     return with_error(labelled, scene, lambda changed_scene: path(changed_scene, engine, speed)) if error else labelled
 
 
-def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **result_fields: Any) -> Result:
-    """A motion as the result of a scene at a speed (m/s), with the assumptions that it breaks."""
+def path_result(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **result_fields: Any) -> Result:
+    """Returns the result of a simulated motion at a speed (m/s), with the assumptions that the motion breaks."""
     equations, _ = equations_and_start(scene, engine, speed)
     return with_assumptions(_labelled_result(scene, engine, motion, **result_fields), assumptions(equations))
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
-    """The motion at a speed (m/s) from the scene's displacement and yaw, at every step."""
+    """Simulate the wheelset at a speed (m/s) from the scene's initial displacement and yaw; states at every step."""
     equations, start = equations_and_start(scene, engine, speed)
     return equations.run(start, scene.run.duration, scene.run.step)
 
@@ -97,22 +100,25 @@ def _labelled_result(scene: WheelsetScene, engine: str, motion: WheelsetPath, **
 
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
-    """Results by engine and speed (m/s), joined to one result over engine, speed and time."""
-    by_engine = {engine: joined_result(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
+    """Join results by engine and speed (m/s) to one result over engine, speed and time."""
+    by_engine = {
+        engine: joined_result(join_results(path, "speed"), results_by_speed_text(path))
+        for engine, path in paths.items()
+    }
     joined = joined_result(join_results(by_engine, "engine"), by_engine)
     joined.data["speed"].attrs["units"] = "m/s"
     return joined
 
 
-def at_speeds(results: Mapping[Any, Result]) -> dict[str, Result]:
-    """Results of one engine by speed, with text such as "20 m/s" as keys."""
+def results_by_speed_text(results: Mapping[Any, Result]) -> dict[str, Result]:
+    """Results of one engine with their speeds as text keys, such as "20 m/s"."""
     return {f"{speed:g} m/s": result for speed, result in results.items()}
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
-    """Linearised motion. values (speeds, 9) : eigenvalues in 1/s at speeds (m/s); wavelength (m) : of the free
-    wheelset; critical_speed : critical speed (m/s), None if there is none; no_critical_reason : the reason.
+class LinearisedMotion:
+    """Linearised motion of a wheelset. values (speeds, 9) : eigenvalues (1/s) at the speeds (m/s); wavelength : of the
+    free wheelset (m); critical_speed : m/s, None if there is none; no_critical_reason : why there is none.
     """
 
     speeds: np.ndarray
@@ -123,17 +129,17 @@ class Linear:
 
     @property
     def hunting(self) -> np.ndarray:
-        """Eigenvalue (speeds,) of the least damped oscillation in 1/s."""
+        """Eigenvalue (speeds,) in 1/s of the least damped oscillation, the hunting motion."""
         return hunting_eigenvalue(self.values)
 
 
 def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
-    """Eigenvalues over the scene's speeds with linear creep; the result's detail is ``Linear``.
+    """Compute eigenvalues over the scene's speeds with linear creep; the result's detail is ``LinearisedMotion``.
 
     error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
     """
     kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
-    linear = Linear(
+    linear = LinearisedMotion(
         speeds,
         root_locus(kind, wheelset, speeds),
         wavelength(kind, wheelset),
@@ -144,7 +150,7 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
         for name, part_of_values in (("real", linear.values.real), ("imag", linear.values.imag))
     }
     labelled = result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
-    with_assumptions(labelled, of_linear(wheelset))
+    with_assumptions(labelled, linear_motion_assumptions(wheelset))
     left = hunting_uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
     if math.isfinite(left):
         estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
@@ -160,12 +166,13 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
 def branch_result(
     scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: None, *, error: bool = False
 ) -> Result:
-    """Limit cycles in the order of rising amplitude, within the scene's speeds, by the written equations; the detail is
-    their orbits.
+    """Compute the branch of limit cycles by the reference's equations, in the order of rising amplitude, within the
+    scene's speeds; the result's detail is the list of orbits.
 
-    Where no branch begins because nothing is stable, cycles that motions reach at these speeds. Why it ends or never
-    begins is a doubt. The scene's workers compute what linearises. progress : called with the number of cycles after
-    each; error : whether one is solved on half the cells, too, from which the error of the cells is estimated.
+    Where no branch begins because the wheelset is unstable at all speeds, the cycles are those that motions reach at
+    these speeds. Why the branch ends or never begins is a doubt. The scene's worker processes compute linearisations.
+    progress : called after each cycle with the number of cycles; error : whether one cycle is also solved on half the
+    cells, from which the error of the cells is estimated.
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
@@ -176,7 +183,9 @@ def branch_result(
                 progress(len(orbits))
         except NoCriticalSpeed as no_speed:
             why, unknown = [f"no branch begins: the wheelset {no_speed.allowed}"], AMPLITUDE
-            reached = block_results(partial(_reached_cycle, scene), speeds.tolist() if no_speed.unstable else [], pool)
+            reached = block_results(
+                partial(_cycle_reached_at_speed, scene), speeds.tolist() if no_speed.unstable else [], pool
+            )
             orbits = [orbit for orbit in reached if orbit is not None]
         except RunFailed as failure:
             why = [f"the branch is followed no further: {failure.reason}"]
@@ -185,16 +194,16 @@ def branch_result(
         for name, unit in ORBIT_CHANNELS.items()
     }
     labelled = result(scene, channels, {}, engine="reference", doubts=why, detail=orbits)
-    with_assumptions(labelled, of_branch(equations.wheelset))
+    with_assumptions(labelled, branch_assumptions(equations.wheelset))
     if error and orbits:
         middle = len(orbits) // 2
-        coarse = _on_half_the_cells(scene, orbits[middle], unknown)
+        coarse = _cycle_on_half_the_cells(scene, orbits[middle], unknown)
         with_error_of_cycles(labelled, orbits, {} if coarse is None else {middle: coarse}, unknown, scene.contact.cells)
     return labelled
 
 
-def _on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: SoughtQuantity) -> Orbit | None:
-    """The limit cycle solved on half the cells, in twice the step; None where there is none."""
+def _cycle_on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: SoughtQuantity) -> Orbit | None:
+    """Returns the limit cycle solved on half the cells, in twice the time step; None where there is no solution."""
     if scene.contact.cells < FEWEST_CELLS:
         return None
     coarse = replace(limit_cycle, step_count=limit_cycle.step_count // 2)
@@ -208,8 +217,8 @@ def _on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: Sought
         return None
 
 
-def _reached_cycle(scene: WheelsetScene, speed: float) -> Orbit | None:
-    """The refined limit cycle that a motion reaches at a speed (m/s); None where the motion dies out."""
+def _cycle_reached_at_speed(scene: WheelsetScene, speed: float) -> Orbit | None:
+    """Returns the refined limit cycle that a motion reaches at a speed (m/s); None where the motion dies out."""
     orbit = _attained_in_engine(scene, speed)
     return None if orbit is None else refined_orbit(orbit, AMPLITUDE)
 
@@ -221,7 +230,9 @@ def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
-    """A speed (m/s) above the one at which the branch begins; the scene's last speed where there is no branch."""
+    """Returns a speed (m/s) just above the bifurcation at which the branch begins, at most the scene's last speed;
+    without a branch that last speed.
+    """
     last_speed = float(scene.speeds.all().max())
     return min(last_speed, round(SPEED_SHARES[1] * orbits[0].speed, 2)) if orbits else last_speed
 
@@ -229,11 +240,12 @@ def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
 def cycles_of_engines(
     scene: WheelsetScene, engines: Sequence[str], speed: float, *, error: bool = False
 ) -> tuple[dict[str, Result], dict[str, str]]:
-    """One period of the refined limit cycle at a speed (m/s) in every engine, and reasons why some engines have none.
+    """Solve the limit cycle at a speed (m/s) in every engine. Returns the results over one period by engine, and the
+    reasons of failures by engine.
 
-    Each engine starts from a guess that is deliberately off. The details are the orbits. Both are empty where the
-    motion dies out. error : whether each is solved on half the cells, too, from which the error of the cells is
-    estimated.
+    Each engine starts from a guess that is deliberately off. Details of the results are the orbits. Both are empty
+    where the motion dies out. error : whether each cycle is also solved on half the cells, from which the error of the
+    cells is estimated.
     """
     results, failed = dict[str, Result](), dict[str, str]()
     first = _attained_in_engine(scene, speed)
@@ -243,19 +255,19 @@ def cycles_of_engines(
         try:
             guess = guess_from_orbit(first, equations_of(scene, engine, speed))
             orbit = refined_orbit(solved_orbit(guess, AMPLITUDE, precise=False), AMPLITUDE)
-            results[engine] = _one_period(scene, engine, orbit, error)
+            results[engine] = _one_period_result(scene, engine, orbit, error)
         except RunFailed as failure:
             failed[engine] = str(failure)
     return results, failed
 
 
-def _one_period(scene: WheelsetScene, engine: str, limit_cycle: Orbit, error: bool) -> Result:
-    """The result of a limit cycle over one period; its detail is the orbit."""
+def _one_period_result(scene: WheelsetScene, engine: str, limit_cycle: Orbit, error: bool) -> Result:
+    """Returns the result of a limit cycle over one period; its detail is the orbit."""
     labelled = with_assumptions(_labelled_result(scene, engine, limit_cycle.path()), assumptions(limit_cycle.equations))
     period = Result(over_speeds({engine: {limit_cycle.speed: labelled}}).data, limit_cycle)
     if not error:
         return period
-    coarse = _on_half_the_cells(scene, limit_cycle, AMPLITUDE)
+    coarse = _cycle_on_half_the_cells(scene, limit_cycle, AMPLITUDE)
     return with_error_of_cycles(
         period, [limit_cycle], {} if coarse is None else {0: coarse}, AMPLITUDE, scene.contact.cells
     )

@@ -1,4 +1,6 @@
-"""Scenes of a wheelset on straight track: the wheelset, the law of creep, speeds, and how a path begins."""
+"""Scenes of a wheelset on straight track: parameters, law of creep, speeds, initial displacement, equivalent
+conicity.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,37 +17,37 @@ from models.core.strict import Strict, quantity
 from models.rail.laid_profiles import Profiles
 
 HIGHEST_SPEED = 200.0
-"""m/s"""
+"""Highest speed (m/s) that a scene may have."""
 LARGEST_SHIFT, LARGEST_YAW = 0.02, 0.05
-"""m, rad: beyond, no wheelset stands on its rails."""
-
-
+"""Largest lateral displacement (m) and yaw (rad) at the start: beyond, a wheelset does not stand on its rails."""
 WHEELS_OF_SCENE = {"reach", "spacing", "right_radius", "left_radius", "left_wheel", "left_rail"}
-"""Keys of [conicity] that say which wheels the scene has."""
-MOST_PLACES = 1000
-"""Displacements on one side at which profiles are put on their rails: some hundredths of a second for each."""
+"""Keys of [conicity] that describe the wheels and rails, which a table of rolling radius differences replaces."""
+MOST_DISPLACEMENTS = 1000
+"""Most lateral displacements on one side at which profiles are put on their rails; each takes some hundredths of a
+second.
+"""
 RADIUS_RANGE = (0.1, 1.5)
-"""m: of a railway's wheels, with room."""
+"""Smallest and largest rolling radius (m) that a scene may have, wider than that of railway wheels."""
 MOST_CELLS = 200
-"""Of FASTSIM, along each strip."""
+"""Most cells of FASTSIM along each strip of the contact patch."""
 
 
 class WheelsetTable(Strict):
-    """[wheelset]: a parameter set or the user's own file, with overrides."""
+    """[wheelset]: a parameter set or the user's parameter file, and values that replace some of its parameters."""
 
     parameters: str = Field(default="chosen", description="a parameter set, or a TOML file with every parameter")
     override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
 
 
 class Creep(Strict):
-    """[contact]: the law of creep forces on every path; linearisation and critical speed have the linear law."""
+    """[contact]: the law of creep forces in simulated motions; eigenvalues and critical speed use the linear law."""
 
     law: Literal["linear", "fastsim"] = Field(default="fastsim", description="Kalker's linear theory, or FASTSIM")
     cells: int = Field(default=11, ge=3, le=MOST_CELLS, description="of FASTSIM, along each strip")
 
 
 class RunTable(Strict):
-    """[run]: how paths begin, how long and how finely they are computed."""
+    """[run]: initial displacement and yaw, duration, time step and speeds of the simulated motions."""
 
     duration: float = quantity("s", "length of a path", default=2.0)
     step: float = quantity("s", "step of RK4 in every implementation", default=5e-4)
@@ -59,8 +61,8 @@ class RunTable(Strict):
 class ConicityTable(Strict):
     """[conicity]: amplitudes at which the equivalent conicity is computed, and the profiles of the wheels.
 
-    A table of rolling radius differences takes the place of the scene's cones or profiles. Beside these, the right
-    wheel has the scene's shape and radius, and the left one too unless another is named here.
+    A table of rolling radius differences replaces the scene's cones or profiles. Without a table the right wheel has
+    the scene's shape and radius, and so has the left wheel unless it is named here.
     """
 
     amplitudes: list[float] = Field(
@@ -81,7 +83,7 @@ class ConicityTable(Strict):
 
 
 class WheelsetScene(SceneFile):
-    """One scene of a wheelset."""
+    """A scene of a wheelset on straight track: all tables of its scene file."""
 
     system: Literal["wheelset"] = "wheelset"
     study: str = Field(default="wheelset", description="the study that runs the scene")
@@ -95,7 +97,9 @@ class WheelsetScene(SceneFile):
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelsetScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Build a checked wheelset scene from the nested tables of a scene file. Raises InputError for unknown keys and for
+    values outside their ranges.
+    """
     scene = checked(WheelsetScene, table, file, folder)
     _check_speeds(scene)
     _check_run(scene)
@@ -143,9 +147,9 @@ def _check_conicity(scene: WheelsetScene) -> None:
             raise InputError(scene.file, f"conicity.{key}", getattr(conicity_table, key), allowed)
     if not (
         conicity_table.reach <= LARGEST_SHIFT
-        and conicity_table.reach / MOST_PLACES <= conicity_table.spacing <= conicity_table.reach / 4.0
+        and conicity_table.reach / MOST_DISPLACEMENTS <= conicity_table.spacing <= conicity_table.reach / 4.0
     ):
-        allowed = f"must be from 1/{MOST_PLACES} to 1/4 of reach, and reach at most {LARGEST_SHIFT:g} m"
+        allowed = f"must be from 1/{MOST_DISPLACEMENTS} to 1/4 of reach, and reach at most {LARGEST_SHIFT:g} m"
         raise InputError(scene.file, "conicity.spacing", conicity_table.spacing, allowed)
     for key in ("right_radius", "left_radius"):
         radius = getattr(conicity_table, key)

@@ -1,8 +1,8 @@
 """Stated errors of a wheelset's results: errors of time steps, and of FASTSIM's cells.
 
-Cells leave a hundred times as much as steps. One more path on half the cells, in twice the step where that can be,
-tells what cells leave; a few steps of twice the length on all cells tell how much of that is of steps, which grows
-along the path as what cells leave does.
+The error of the cells is a hundred times that of the time steps. The error of the cells is estimated by one more path
+on half the cells, in twice the step where this is possible. The error of the steps is estimated by a few steps of twice
+the length on all cells; it grows along the path as the error of the cells does.
 """
 
 import math
@@ -31,27 +31,31 @@ from models.systems.wheelset.assumptions import sums_by_wheel
 from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
 
 UNIT_OF_CHANNEL = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
-"""Channels whose error is told; forces are the sum over the patches of a wheel."""
-STILL = 1e-12
-"""m, rad, and share of the load: a channel of a centred wheelset that is smaller is rounding, and no share is of it."""
+"""Channels whose error is stated, with their units; forces are the sum over the patches of a wheel."""
+ROUNDING_SIZE = 1e-12
+"""Size of a channel below which its values are rounding (m, rad, or share of the load), as of a centred wheelset;
+relative errors refer to at least this size.
+"""
 RK4_ORDER, KINKED_ORDER = 4, 2.0
-"""Of RK4, and as it is left where cells begin to slide one by one: 1 to 4 in random scenes."""
-OF_CELLS = 1.5
-"""Order that is taken for the cells to use; their error falls with the first to the second power."""
+"""Order of RK4, and the order that is observed where cells begin to slide one by one: 1 to 4 in random scenes."""
+CELL_ERROR_ORDER = 1.5
+"""Assumed order of the error of the cells, which falls with the first to the second power of their number."""
 HALF_STEP_SHARE, LEAST_STEPS = 0.1, 20
-"""Share of the path that half the step repeats where twice the step cannot be, and its steps at least."""
+"""Share of the path that is repeated in half the step where twice the step is too long, and its least number of
+steps.
+"""
 FEWEST_CELLS = 5
-"""Cells from which on half of them are a net."""
+"""Fewest cells per strip that can be halved."""
 March = Callable[[WheelsetScene], WheelsetPath]
-"""The path of a scene, by one engine at one speed."""
+"""Function that simulates a scene in one engine at one speed, and returns the path."""
 
 
 def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
-    """The result of a path with the errors of its principal channels; RunFailed where these are so large that it is no
-    answer.
+    """Returns the result of a path with the stated errors of its principal channels. Raises RunFailed where the errors
+    are too large for the result to be used.
     """
     fine, step = principal_series(run.detail), scene.run.step
-    sizes = _sizes(fine, float(np.abs(run.detail.contacts["load"]).max()))
+    sizes = _channel_sizes(fine, float(np.abs(run.detail.contacts["load"]).max()))
     if scene.contact.law == "linear":
         return with_estimated_errors(
             run,
@@ -64,28 +68,30 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     cells = scene.contact.cells
     other_cells = coarser_cells(cells) if cells >= FEWEST_CELLS else 2 * cells
     try:
-        coarse = _coarse_run(scene, march_scene, other_cells)
+        coarse = _coarse_series(scene, march_scene, other_cells)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"on {other_cells} cells the path fails: {failure}")
-    estimates = _of_steps(scene, march_scene, fine, coarse, sizes)
+    estimates = _step_errors(scene, march_scene, fine, coarse, sizes)
     for name, unit in UNIT_OF_CHANNEL.items():
         gap = _rms_difference(fine, coarse, name)
-        estimates[f"{name} of cells"] = grid_error(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
+        estimates[f"{name} of cells"] = grid_error(gap, sizes[name], unit, cells, CELL_ERROR_ORDER, MOST_CELLS)
     return with_stated_errors(run, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
 def principal_series(path: WheelsetPath) -> Series:
-    """Time series of the principal channels of a path."""
+    """Time series of the channels whose error is stated: lateral displacement (m), yaw (rad), and creep forces (N) of
+    each wheel.
+    """
     forces = {
         name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
     }
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 
-def _sizes(fine_series: Series, load: float) -> dict[str, float]:
-    """Sizes of the channels by which errors are divided; ``load`` : the largest of a patch (N)."""
+def _channel_sizes(fine_series: Series, load: float) -> dict[str, float]:
+    """Sizes of the channels, by which relative errors are divided; ``load`` : largest load of a patch (N)."""
     return {
-        name: max(reference_size(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
+        name: max(reference_size(values), ROUNDING_SIZE * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
         for name, values in fine_series.channels.items()
     }
 
@@ -93,8 +99,8 @@ def _sizes(fine_series: Series, load: float) -> dict[str, float]:
 def with_step_factor(
     scene: WheelsetScene, step_factor: float, share: float = 1.0, cells: int | None = None
 ) -> WheelsetScene:
-    """The scene with a step that is ``step_factor`` as long, over a share of its path (whole steps), and with another
-    number of cells. Raises RunFailed for a step that outlasts the path.
+    """Returns the scene with its time step multiplied by ``step_factor``, over the first ``share`` of its path (whole
+    steps), and with ``cells`` if given. Raises RunFailed for a step that outlasts the path.
     """
     step = step_factor * scene.run.step
     if step > scene.run.duration * (1.0 + 1e-9):
@@ -105,21 +111,23 @@ def with_step_factor(
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse_run(scene: WheelsetScene, march_scene: March, cells: int) -> Series:
-    """The path on another number of cells, in twice the step where this is possible."""
+def _coarse_series(scene: WheelsetScene, march_scene: March, cells: int) -> Series:
+    """Time series of the path on another number of cells, in twice the time step where this is possible."""
     with suppress(InputError, RunFailed):
         return principal_series(march_scene(with_step_factor(scene, 2.0, cells=cells)))
     return principal_series(march_scene(with_step_factor(scene, 1.0, cells=cells)))
 
 
-def _of_steps(
+def _step_errors(
     scene: WheelsetScene,
     march_scene: March,
     fine_series: Series,
     coarse_series: Series,
     channel_sizes: Mapping[str, float],
 ) -> dict[str, Estimate]:
-    """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
+    """Errors of the time steps over the whole path. They are measured over its first part, and enlarged as the errors
+    of the cells grow from there.
+    """
     power = 2.0**KINKED_ORDER
     try:
         first_part, share, remains = (
@@ -143,8 +151,8 @@ def _of_steps(
 
 
 def _rms_difference(fine_series: Series, other_series: Series, name: str, end_time: float = math.inf) -> float:
-    """Root mean square of the difference between two series in one channel, up to a time (s), at the rows that both
-    have.
+    """Root mean square of the difference of a channel between two series, up to a time (s), at the times of the coarser
+    one.
     """
     long, short = sorted((fine_series, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
     shared_times = long.times[long.times <= min(end_time, short.times[-1]) * (1.0 + 1e-9)]
@@ -155,10 +163,10 @@ def _rms_difference(fine_series: Series, other_series: Series, name: str, end_ti
 def with_error_of_cycles(
     run: Result, orbits: Sequence[Orbit], coarse_orbits: Mapping[int, Orbit], sought_quantity: str, cells: int
 ) -> Result:
-    """The result of limit cycles with the errors of the frequency and of the unknown that was solved for.
+    """Returns the result of limit cycles with the errors of the frequency (Hz) and of the unknown that was solved for.
 
-    Each cycle was also solved in half the step, which gives the error of the steps. ``coarse_orbits`` : some of them on
-    half the cells, by their index.
+    Each cycle was also solved in half the step, which gives the error of the steps. ``coarse_orbits`` : some cycles on
+    half the cells, by index into ``orbits``.
     """
     units, estimates = (
         {sought_quantity: "m" if sought_quantity == "amplitude" else "m/s", "frequency": "Hz"},
@@ -173,7 +181,7 @@ def with_error_of_cycles(
         if coarse_orbits:
             gaps = [getattr(orbits[k], name) - getattr(coarse_orbit, name) for k, coarse_orbit in coarse_orbits.items()]
             left = LIKELY_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
-            estimates[f"{name} of cells"] = grid_error(left, size, unit, cells, OF_CELLS, MOST_CELLS)
+            estimates[f"{name} of cells"] = grid_error(left, size, unit, cells, CELL_ERROR_ORDER, MOST_CELLS)
     cells_text = (
         f", and half the cells at {len(coarse_orbits)} of {len(orbits)} cycles"
         if coarse_orbits

@@ -20,7 +20,7 @@ from models.core.trajectory import Trajectory
 from models.engines.catalogue import CATALOGUE
 from models.engines.spatial_protocol import build
 from models.engines.spatial_reference import SpatialReference
-from models.systems.ride.nonlinear import row_of
+from models.systems.ride.nonlinear import factors_of_output
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.price.problems import Curves, curves_of_methods, largest_differences, milliseconds, settings_of_curves
@@ -141,7 +141,7 @@ class FreeVehicle:
         accelerations = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
         motion = np.column_stack([accelerations, states[:, n:], states[:, :n], road])
         return {
-            name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
+            name: motion @ np.array([factors_of_output(output) for output in self._outputs if output.kind == kind]).T
             for name, kind in OUTPUT_KINDS.items()
         }
 

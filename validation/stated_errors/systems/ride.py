@@ -18,7 +18,7 @@ from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import RoadPath
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, varying_speed
 from models.road.excitation import Excitation
-from models.systems.ride.nonlinear import RUNGE_KUTTA_ORDER, Sampling, in_engine, linearised_result, ride_over
+from models.systems.ride.nonlinear import RUNGE_KUTTA_ORDER, Sampling, engine_result, linearised_result, ride_over
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.run import ANY_SPEED, run
 from models.systems.ride.scene import RideScene, build
@@ -203,12 +203,12 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half_step=path.half_step / FINER_STEPS)
     wheel_heights_and_rates = finer.wheel_heights_and_rates(steps * FINER_STEPS, sample_number)
     try:
-        result = in_engine(scene, engine, vehicle, sampling, True, table[::FINER_STEPS].copy())
+        result = engine_result(scene, engine, vehicle, sampling, True, table[::FINER_STEPS].copy())
     except RunFailed as failure:
         result = failure.partial
     rows = result.detail.rows * FINER_STEPS
     stride, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
-    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, every=stride)
+    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, stride=stride)
     gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     calls = RUNGE_KUTTA_ORDER * steps + len(rows)

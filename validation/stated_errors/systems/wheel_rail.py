@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.discretisation import errors_of, finite_rms
-from models.systems.wheel_rail.run import POSITIONS_PER_ERROR, WHEEL_QUANTITIES, run, wheel_sums
+from models.systems.wheel_rail.run import ERROR_POSITION_STRIDE, WHEEL_QUANTITIES, run, wheel_sums
 from models.systems.wheel_rail.scene import WheelRailScene, build
 from validation.stated_errors.sample import Sample, random_samples
 
@@ -58,7 +58,7 @@ def _sample_of_position(scene: WheelRailScene) -> Sample | None:
     true = {name: finite_rms(gaps[:, :, k]) for k, name in enumerate(WHEEL_QUANTITIES)}
     calls, extra_seconds = (
         len(placed) * scene.method.cells**2,
-        len(placed[::POSITIONS_PER_ERROR]) * (scene.method.cells / 2.0) ** 2,
+        len(placed[::ERROR_POSITION_STRIDE]) * (scene.method.cells / 2.0) ** 2,
     )
     name = f"{scene.wheelset.load:.3g} N, {scene.method.cells} cells, {'rolling' if case.friction else 'pressed'}"
     return (

@@ -31,7 +31,7 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
         path, stop = drive.detail, Stop(drive.detail)
         if len(path.times) < 3:
             raise RunFailed("braking", f"{name} ends before it has begun", float(path.times[-1]))
-        for key, value in {**stop.of_vehicle(), **stop.of_wheels()}.items():
+        for key, value in {**stop.vehicle_results(), **stop.wheel_results()}.items():
             numbers[key] += [*np.atleast_1d(np.asarray(value, float))[:, None]]
         steps += drive.counts()["steps"]
         states = path.states[0].size + path.turning.shape[1] + (scene.pressure is not None) * path.pressures.shape[1]

@@ -27,7 +27,7 @@ def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> Ru
 
 def steps(scene: HubScene) -> int:
     """Number of steps of a run."""
-    return scene.steps
+    return scene.step_count
 
 
 divisible_steps = steps

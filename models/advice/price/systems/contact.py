@@ -14,7 +14,7 @@ from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.tables import RowBlock, table_blocks
-from models.systems.contact.cases_table import ANSWER_COLUMNS, BY_AXES, BY_CURVATURES, solved_rows
+from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES, OUTPUT_COLUMNS, solved_rows
 from models.systems.contact.run import run, table_contacts
 from models.systems.contact.scene import ContactScene, Method
 
@@ -107,7 +107,7 @@ class PricedContact:
             values = np.column_stack([contact[name] for name in self.channels])
         else:
             answered = solved_rows(self.rows, partial(table_contacts, self.scene), method, False)["forces"]
-            values = answered[:, [ANSWER_COLUMNS.index(name) for name in self.channels]]
+            values = answered[:, [OUTPUT_COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
     def priced_run(self, solution: tuple[np.ndarray, int]) -> PricedRun:

@@ -20,7 +20,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
 from models.multibody.numbers import Handling
-from models.systems.handling.run import Drive, build, drive_run, judged_drive, read_run
+from models.systems.handling.run import Drive, build, drive_of_fixed_steps, drive_result, drive_run
 from models.systems.handling.scene import HandlingScene
 
 SEARCHED_DURATION = 1.0
@@ -71,13 +71,13 @@ class PricedHandling(MeshedScene):
         )
         if not solved.success:
             raise RunFailed(self.reference_engine, solved.message)
-        return read_run(handling, Trajectory(times, solved.y.T), self.reference_engine)
+        return drive_of_fixed_steps(handling, Trajectory(times, solved.y.T), self.reference_engine)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """Times (n,) in s and values (n, k) of the quantity along a manoeuvre, and the number of force calls; the
         assumptions of the run are judged.
         """
-        judged_drive(self.scene, self.reference_engine, self.name, run)
+        drive_result(self.scene, self.reference_engine, self.name, run)
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 

@@ -10,7 +10,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds, wheelset_of
-from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
+from models.systems.wheelset.run import CONTACTS, STATES, path, path_result
 from models.systems.wheelset.scene import WheelsetScene
 
 SEARCHED_DURATION = 0.25
@@ -49,7 +49,7 @@ class PricedWheelset(MeshedScene):
         calls; the assumptions of each path are judged.
         """
         for speed, wheelset_run in zip(self.speeds, run, strict=True):
-            judged_path(self.scene, self.reference_engine, speed, wheelset_run)
+            path_result(self.scene, self.reference_engine, speed, wheelset_run)
         name, times = self.quantity, run[0].times
         if name in STATES:
             columns = [wheelset_run.states[:, [STATES[name][0]]] for wheelset_run in run]

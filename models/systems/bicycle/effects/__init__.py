@@ -1,12 +1,15 @@
-"""Effects of scenes of a bicycle: what turns the steering beside the bicycle itself, and how sensors and motor err."""
+"""Effects of bicycle scenes: feedback to a steering motor, friction of the steering, errors of sensors and motor."""
 
 from typing import Any
 
 from models.core.scene_effects import Entry, Table
 
 
-def _of_control(key: str, neutral: float, usual_value: float, description: str, **entry_fields: Any) -> Entry:
-    """An effect of the control: it is present where this key of [control] has a value other than ``neutral``."""
+def _control_effect(key: str, neutral: float, usual_value: float, description: str, **entry_fields: Any) -> Entry:
+    """Returns an effect that is present where a key of [control] has a value other than ``neutral``.
+
+    usual_value : value of the key when the effect is added to a scene.
+    """
 
     def is_present(scene: Any) -> bool:
         return bool(getattr(scene.control, key) != neutral)
@@ -23,13 +26,15 @@ def _of_control(key: str, neutral: float, usual_value: float, description: str, 
     )
 
 
-NEEDS_OF_SENSING = {"needs": ("feedback",), "why": "whose command or sensor it changes"}
+NEEDS_FEEDBACK = {"needs": ("feedback",), "why": "whose command or sensor it changes"}
 TABLE = {
-    "feedback": _of_control("gain", 0.0, 2.0, "Steer torque by the lean rate, less the faster the bicycle is"),
-    "steering_friction": _of_control("friction", 0.0, 0.15, "Viscous friction of the steering"),
-    "dry_friction": _of_control("dry_friction", 0.0, 0.16, "Dry friction of the steering"),
-    "torque_gain": _of_control("torque_gain", 1.0, 0.9, "A motor that gives less than its command", **NEEDS_OF_SENSING),
-    "encoder_gain": _of_control("encoder_gain", 1.0, 0.8, "An encoder that tells less than the steer angle"),
-    "speed_gain": _of_control("speed_gain", 1.0, 1.066, "A speed sensor of another slope", **NEEDS_OF_SENSING),
-    "speed_bias": _of_control("speed_bias", 0.0, -0.128, "A speed sensor with a bias", **NEEDS_OF_SENSING),
+    "feedback": _control_effect("gain", 0.0, 2.0, "Steer torque by the lean rate, less the faster the bicycle is"),
+    "steering_friction": _control_effect("friction", 0.0, 0.15, "Viscous friction of the steering"),
+    "dry_friction": _control_effect("dry_friction", 0.0, 0.16, "Dry friction of the steering"),
+    "torque_gain": _control_effect(
+        "torque_gain", 1.0, 0.9, "A motor that gives less than its command", **NEEDS_FEEDBACK
+    ),
+    "encoder_gain": _control_effect("encoder_gain", 1.0, 0.8, "An encoder that tells less than the steer angle"),
+    "speed_gain": _control_effect("speed_gain", 1.0, 1.066, "A speed sensor of another slope", **NEEDS_FEEDBACK),
+    "speed_bias": _control_effect("speed_bias", 0.0, -0.128, "A speed sensor with a bias", **NEEDS_FEEDBACK),
 }

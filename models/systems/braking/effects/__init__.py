@@ -1,7 +1,8 @@
-"""Effects of scenes of braking: see ``models.core.scene_effects``.
+"""Effects of braking scenes: controller, brakes, pressure dynamics, sensors, surfaces, tyres, trailer, suspension (see
+``models.core.scene_effects``).
 
-Counts are those of one stop: coordinates and wheels of the vehicle, what its brakes, chambers and tyres keep, and how
-many hold the controller in the loop.
+Counts are those of a stop: coordinates and wheels of the vehicle, memory of its brakes, chambers and tyres, and
+controllers in the loop.
 """
 
 from typing import Any
@@ -11,19 +12,19 @@ from models.systems.handling.effects import without_trailer
 
 AXLE_KEYS = ("front", "rear", "trailer")
 NOISE_KEYS, CONVERTER_KEYS, SCALE_KEYS = ("noise",), ("bits", "range"), ("gain", "offset")
-"""Keys of white noise, of the steps of a converter, and of a sensor that is not set right."""
+"""Keys of a sensor's white noise, of its analogue-digital converter, and of its wrong calibration."""
 
 
 def _differs_from_default(table: Any, keys: tuple[str, ...]) -> bool:
-    """Whether any of these keys of a scene's table differs from its default."""
+    """Whether any of some keys of a scene's table differs from its default."""
     return any(getattr(table, key) != type(table).model_fields[key].default for key in keys)
 
 
-def _of_sensor(
+def _sensor_effect(
     signal_kind: str, keys: tuple[str, ...], description: str, cost: str, count_name: str, usual_value: dict[str, float]
 ) -> Entry:
-    """An effect of the sensors at a port: present where keys of [port.signals] or [port.pressures] differ from those of
-    a perfect sensor.
+    """Returns an effect of sensors at the port, present where keys of [port.signals] or [port.pressures] differ from
+    those of a perfect sensor.
     """
 
     def is_present(scene: Any) -> bool:
@@ -43,17 +44,17 @@ def _of_sensor(
     )
 
 
-def _of_brakes(
+def _brake_effect(
     keys: tuple[str, ...],
-    freed: tuple[str, ...],
+    removed_keys: tuple[str, ...],
     description: str,
     key_path: str,
     cost: str,
     count_name: str,
     usual_value: Any,
 ) -> Entry:
-    """An effect that the brakes' keys ``keys`` switch on. Leaving it out removes the keys ``freed``; putting it in
-    updates the table of the front and of the rear brake by ``usual(axle, brake)``.
+    """Returns an effect of the brakes, present where keys of [brakes.AXLE] differ from their defaults. Leaving it out
+    removes ``removed_keys``; putting it in updates the front and rear tables by ``usual_value(axle, brake)``.
     """
 
     def is_present(scene: Any) -> bool:
@@ -61,7 +62,7 @@ def _of_brakes(
 
     def leave_out(table: Table, scene: Any) -> None:
         for axle in {*AXLE_KEYS} & {*table["brakes"]}:
-            for key in freed:
+            for key in removed_keys:
                 table["brakes"][axle].pop(key, None)
 
     def put_in(table: Table, scene: Any) -> None:
@@ -76,31 +77,31 @@ def _of_brakes(
 
 
 def _without_reservoir(table: Table, scene: Any) -> None:
-    """Remove the reservoir and its volume, so that the supply's pressure is constant."""
+    """Edit a scene: remove the reservoir and its volume, so that the supply pressure is constant."""
     for key in ("reservoir", "volume"):
         table["pressure"].pop(key, None)
 
 
 def _without_slow_apply(table: Table, scene: Any) -> None:
-    """Remove slow filling: valves apply, hold and release. The controller loses its parameter ``slow`` and applies in
-    steps.
+    """Edit a scene: remove slow filling, so that valves apply, hold and release. The controller loses its parameter
+    ``slow`` and applies in steps.
     """
     del table["pressure"]["slow"]
     table.get("controller", {}).get("parameters", {}).pop("slow", None)
 
 
 def _with_slow_apply(table: Table, scene: Any) -> None:
-    """Let valves fill through a throttle, too, eight times as slowly."""
+    """Edit a scene: let valves fill slowly, too, with eight times the time constant."""
     fill = 0.15 if scene.pressure is None else scene.pressure.fill
     table.setdefault("pressure", {})["slow"] = 8.0 * fill
 
 
 def _with_delay(table: Table, scene: Any) -> None:
-    """Set the valves' delay to two samples."""
+    """Edit a scene: set the delay of the valves to two samples."""
     table.setdefault("pressure", {})["delay"] = 2.0 * scene.run.sample
 
 
-def _of_two_surfaces(scene: Any) -> bool:
+def _has_two_surfaces(scene: Any) -> bool:
     stretches = scene.road.stretches
     return any(
         len({s.left for s in stretches} | {procedure.right or s.right or s.left for s in stretches}) > 1
@@ -109,7 +110,7 @@ def _of_two_surfaces(scene: Any) -> bool:
 
 
 def _on_one_surface(table: Table, scene: Any) -> None:
-    """Replace the road by a single surface, the one that is left of the line at the start."""
+    """Edit a scene: replace the road by a single surface, the one left of the line at the start."""
     first = scene.road.stretches[0].left
     table["road"] = {"stretches": [{"left": first}]}
     for procedure in table["procedures"].values():
@@ -117,29 +118,29 @@ def _on_one_surface(table: Table, scene: Any) -> None:
             procedure["right"] = first
 
 
-def _on_another_surface(table: Table, scene: Any) -> None:
-    """Append a stretch that begins 10 m after the last one does: ice if the last one is dry, else dry."""
+def _add_surface(table: Table, scene: Any) -> None:
+    """Edit a scene: append a stretch of road 10 m after the beginning of the last stretch; ice after dry, else dry."""
     last_stretch = scene.road.stretches[-1]
     stretches = table.setdefault("road", {}).setdefault("stretches", [{"left": "ice"}])
     stretches.append({"x": last_stretch.x + 10.0, "left": "ice" if last_stretch.left == "dry" else "dry"})
 
 
-def _in_the_plane(table: Table, scene: Any) -> None:
-    """Replace the vehicle by one in the plane with the same masses, axles and wheels."""
+def _without_suspension(table: Table, scene: Any) -> None:
+    """Edit a scene: replace the suspended vehicle by a plane vehicle with the same masses, axles and wheels."""
     from models.systems.braking.of_scene import vehicle_of
 
     table["vehicle"] = {"override": vehicle_of(scene).model_dump()}
 
 
 def _with_trailer(table: Table, scene: Any) -> None:
-    """Add the trailer ``CHOSEN_TRAILER``, which is unladen."""
+    """Edit a scene: add the unladen trailer CHOSEN_TRAILER."""
     from models.brake.trailer import CHOSEN_TRAILER
 
     table["trailer"] = CHOSEN_TRAILER.model_dump(exclude_unset=True)
 
 
 def _tows_bodies(scene: Any) -> bool:
-    """Whether the vehicle of the scene's file tows bodies."""
+    """Whether the vehicle of vehicle.file tows bodies."""
     from models.systems.braking.of_scene import spatial_vehicle_of
 
     spatial_vehicle = spatial_vehicle_of(scene)
@@ -167,7 +168,7 @@ TABLE = {
         usual_value=[{"kind": "lost", "start": 0.1, "end": 0.2}],
         is_present=lambda scene: scene.port is not None and bool(scene.port.faults),
     ),
-    "hysteresis": _of_brakes(
+    "hysteresis": _brake_effect(
         ("release", "falling"),
         ("release", "falling"),
         "Brakes whose torque falls along another line than it rises",
@@ -200,7 +201,7 @@ TABLE = {
         why="which leaves no controller that could be asked",
         usual_value={},
     ),
-    "pressure_calibration": _of_sensor(
+    "pressure_calibration": _sensor_effect(
         "pressures",
         SCALE_KEYS,
         "Pressures that come out too large or shifted",
@@ -217,7 +218,7 @@ TABLE = {
         why="which are the chambers'",
         usual_value={},
     ),
-    "pressure_noise": _of_sensor(
+    "pressure_noise": _sensor_effect(
         "pressures",
         NOISE_KEYS,
         "White noise on the pressures that a controller asks for",
@@ -225,7 +226,7 @@ TABLE = {
         "noisy signals",
         {"noise": 0.02},
     ),
-    "pressure_quantisation": _of_sensor(
+    "pressure_quantisation": _sensor_effect(
         "pressures",
         CONVERTER_KEYS,
         "Pressures that a controller asks for, in the steps of a converter",
@@ -233,7 +234,7 @@ TABLE = {
         "converted signals",
         {"bits": 12, "range": 16.0},
     ),
-    "push_out": _of_brakes(
+    "push_out": _brake_effect(
         ("push_out",),
         ("push_out", "release"),
         "Pressure that the brakes need before any torque comes",
@@ -271,11 +272,11 @@ TABLE = {
         "road.stretches",
         "the surface under each wheel is looked up at every step",
         {"surfaces": 1, "tables": 1},
-        is_present=_of_two_surfaces,
+        is_present=_has_two_surfaces,
         leave_out=_on_one_surface,
-        put_in=_on_another_surface,
+        put_in=_add_surface,
     ),
-    "signal_calibration": _of_sensor(
+    "signal_calibration": _sensor_effect(
         "signals",
         SCALE_KEYS,
         "Wheel speeds that are read too large or shifted",
@@ -283,7 +284,7 @@ TABLE = {
         "wrong signals",
         {"gain": 1.01},
     ),
-    "signal_noise": _of_sensor(
+    "signal_noise": _sensor_effect(
         "signals",
         NOISE_KEYS,
         "White noise on the wheel speeds that the controller is given",
@@ -291,7 +292,7 @@ TABLE = {
         "noisy signals",
         {"noise": 0.05},
     ),
-    "signal_quantisation": _of_sensor(
+    "signal_quantisation": _sensor_effect(
         "signals",
         CONVERTER_KEYS,
         "Wheel speeds in the steps of a converter",
@@ -313,7 +314,7 @@ TABLE = {
         "vehicle.file",
         "every freedom of its file, and a step of an engine around the compiled tyres",
         modules=("models.brake.sprung", "models.engines.braking_sprung"),
-        leave_out=_in_the_plane,
+        leave_out=_without_suspension,
     ),
     "teeth": Entry(
         "Wheel speeds that are counted from the teeth of a wheel by a timer",

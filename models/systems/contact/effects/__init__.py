@@ -1,7 +1,8 @@
-"""Effects of scenes of one contact: see ``models.core.scene_effects``.
+"""Effects of contact scenes: saturation, shape of the area, half-spaces, profiles, falling friction, spin (see
+``models.core.scene_effects``).
 
-The theory of a scene is made of them: linear is that of no effect, FASTSIM that of saturation alone. Counts are those
-of what computes: whether forces are bounded, areas of any shape, half-spaces, laws of friction, motions with spin.
+Effects decide the theory: without any effect it is the linear one, with saturation alone FASTSIM. Counts are those of
+bounded forces, areas of any shape, half-spaces, laws of friction, and motions with spin.
 """
 
 from collections.abc import Callable
@@ -11,16 +12,16 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_theory(
-    description: str, theory: str, cost: str, count_name: str, instead: Callable[[Any], dict[str, str]]
+def _theory_effect(
+    description: str, theory: str, cost: str, count_name: str, method_without: Callable[[Any], dict[str, str]]
 ) -> Entry:
-    """An effect that names a theory beyond FASTSIM. ``instead`` gives the [method] of the scene without this theory,
-    cells excepted.
+    """Returns the effect of a theory beyond FASTSIM. ``method_without`` returns the scene's [method] without this
+    theory, except the key cells.
     """
 
     def leave_out(table: Table, scene: Any) -> None:
         cells = {key: value for key, value in table["method"].items() if key == "cells"}
-        table["method"] = cells | instead(scene)
+        table["method"] = cells | method_without(scene)
 
     return Entry(
         description,
@@ -30,22 +31,22 @@ def _of_theory(
         **BOUND_BY_CONSTANT_FRICTION,
         is_present=lambda scene: scene.method.name == theory,
         leave_out=leave_out,
-        put_in=_method(theory),
+        put_in=_naming_theory(theory),
     )
 
 
-def _without_shape(scene: Any) -> dict[str, str]:
+def _method_without_shape(scene: Any) -> dict[str, str]:
     if scene.profiles is not None:
         raise InputError(scene.file, "method.name", "simplified", "is the cheapest theory of profiles: leave it in")
     return {}
 
 
-def _without_half_space(scene: Any) -> dict[str, str]:
+def _method_without_half_space(scene: Any) -> dict[str, str]:
     return {"name": "fastsim" if scene.profiles is None else "simplified"}
 
 
-def _method(name: str) -> Callable[[Table, Any], None]:
-    """Return the edit of a scene that names a theory in [method]."""
+def _naming_theory(name: str) -> Callable[[Table, Any], None]:
+    """Returns a function that edits a scene so that its [method] names the theory."""
 
     def put_in(table: Table, scene: Any) -> None:
         table["method"] = {"name": name}
@@ -66,7 +67,7 @@ def _without_profiles(table: Table, scene: Any) -> None:
 
 
 def _spin_is_swept(scene: Any) -> bool:
-    """Whether the scene sweeps the spin."""
+    """Whether the scene's [sweep] varies the spin."""
     return scene.sweep is not None and scene.sweep.of == "spin"
 
 
@@ -77,9 +78,9 @@ def _without_spin(table: Table, scene: Any) -> None:
     table["creepage"].pop("spin")
 
 
-SATURATION = ("saturation",)
+NEEDS_SATURATION = ("saturation",)
 BOUND_BY_CONSTANT_FRICTION: dict[str, Any] = {
-    "needs": SATURATION,
+    "needs": NEEDS_SATURATION,
     "excludes": ("falling_friction",),
     "why": "which FASTSIM alone computes",
 }
@@ -91,21 +92,21 @@ TABLE = {
         {"bounded": 1},
         is_present=lambda scene: scene.method.name != "linear",
         leave_out=_without_slip,
-        put_in=_method("fastsim"),
+        put_in=_naming_theory("fastsim"),
     ),
-    "any_shape": _of_theory(
+    "any_shape": _theory_effect(
         "Contact areas of any shape, by the simplified theory of 1983",
         "simplified",
         "an area that is found cell by cell",
         "areas of any shape",
-        _without_shape,
+        _method_without_shape,
     ),
-    "half_space": _of_theory(
+    "half_space": _theory_effect(
         "Tractions and displacements of half-spaces, by the exact theory",
         "exact",
         "a system of equations as large as the area has cells, hundreds of times FASTSIM",
         "half-spaces",
-        _without_half_space,
+        _method_without_half_space,
     ),
     "profiles": Entry(
         "Cross-sections of wheel and rail, whose patches are looked for",
@@ -120,7 +121,7 @@ TABLE = {
         "falling_friction",
         "an exponential per cell, and a march of its own",
         {"laws of friction": 1},
-        SATURATION,
+        NEEDS_SATURATION,
         modules=("models.contact.fastsim_falling",),
         usual_value={"floor": 0.4, "decay": 0.6, "speed": 20.0},  # of the size of measured values
     ),

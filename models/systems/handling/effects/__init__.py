@@ -1,7 +1,8 @@
-"""Effects of scenes of handling: see ``models.core.scene_effects``.
+"""Effects of handling scenes: braking, driving, steering, rough road, measured drive, inclined wheels, trailer (see
+``models.core.scene_effects``).
 
 Counts are those of all manoeuvres: coordinates, wheels and towed bodies of the vehicle, waves of the road, wheels that
-lean, controls that act, pushes from outside.
+lean, controls that act, external forces.
 """
 
 from typing import Any
@@ -10,8 +11,10 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_manoeuvres(key: str, description: str, cost: str, work_counts: dict[str, int], usual_value: Any) -> Entry:
-    """An effect that a key of the manoeuvres switches on; it is left out of all manoeuvres, or put into all."""
+def _manoeuvre_effect(key: str, description: str, cost: str, work_counts: dict[str, int], usual_value: Any) -> Entry:
+    """Returns an effect that is present where a key of any manoeuvre has a value; it is left out of all manoeuvres, or
+    put into all.
+    """
 
     def is_present(scene: Any) -> bool:
         values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
@@ -33,12 +36,12 @@ def _of_manoeuvres(key: str, description: str, cost: str, work_counts: dict[str,
 
 
 CAR_ALONE, CAR_WITH_CARAVAN = "r19_free", "r19_caravan"
-"""Shipped vehicles, the second of which is the first with a caravan."""
+"""Names of two shipped vehicles: a car, and the same car with a caravan."""
 
 
 def without_trailer(table: Table, scene: Any) -> None:
-    """Replace the shipped car and caravan by the shipped car. InputError for another file, which its user must
-    change.
+    """Replace the shipped car with caravan by the shipped car alone. Raises InputError for another vehicle file, which
+    its user must change.
     """
     if scene.vehicle.file != CAR_WITH_CARAVAN:
         allowed = "has bodies with a hitch: name a vehicle file without them"
@@ -47,7 +50,7 @@ def without_trailer(table: Table, scene: Any) -> None:
 
 
 def with_trailer(table: Table, scene: Any) -> None:
-    """Replace the shipped car by the shipped car with its caravan. InputError for another file."""
+    """Replace the shipped car by the shipped car with caravan. Raises InputError for another vehicle file."""
     if scene.vehicle.file != CAR_ALONE:
         allowed = "has no trailer: add a body with a hitch, and its wheels, to that file"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
@@ -55,16 +58,16 @@ def with_trailer(table: Table, scene: Any) -> None:
 
 
 MEASURED_CONTROLS = ("steer", "brake", "drive")
-"""Controls that a measured drive has."""
+"""Controls that a measured drive determines."""
 
 
 def _is_measured_drive(scene: Any) -> bool:
-    """Whether a manoeuvre is a measured drive."""
+    """Whether any manoeuvre of the scene is a measured drive."""
     return any(manoeuvre.measured for manoeuvre in scene.manoeuvres.values())
 
 
-def _without_measured(table: dict[str, Any], scene: Any) -> None:
-    """Replace measured drives by rolling straight ahead, for as long and from the same speed."""
+def _without_measured_drive(table: dict[str, Any], scene: Any) -> None:
+    """Replace measured drives by rolling straight ahead from the same speed for the same time."""
     for manoeuvre in table["manoeuvres"].values():
         manoeuvre.pop("measured", None)
         manoeuvre.pop("stretch", None)
@@ -72,16 +75,16 @@ def _without_measured(table: dict[str, Any], scene: Any) -> None:
 
 TABLE_LOOKUP_COST = "a look into a table of times per call"
 TABLE = {
-    "braking": _of_manoeuvres(
+    "braking": _manoeuvre_effect(
         "brake", "Torque of the brakes", TABLE_LOOKUP_COST, {"controls": 1}, [[1.0, 0.0], [1.2, 1000.0]]
     ),
-    "driving": _of_manoeuvres(
+    "driving": _manoeuvre_effect(
         "drive", "Torque of the driven wheels", TABLE_LOOKUP_COST, {"controls": 1}, [[1.0, 0.0], [1.2, 300.0]]
     ),
-    "steering": _of_manoeuvres(
+    "steering": _manoeuvre_effect(
         "steer", "Front wheels that the driver turns", TABLE_LOOKUP_COST, {"controls": 1}, [[0.5, 0.0], [0.8, 0.02]]
     ),
-    "rough_road": _of_manoeuvres(
+    "rough_road": _manoeuvre_effect(
         "rough", "A rough road under all tyres, of plane waves", "a cosine per wave, tyre and call", {"waves": 48}, True
     ),
     "measured_drive": Entry(
@@ -89,7 +92,7 @@ TABLE = {
         "manoeuvres.NAME.measured",
         "about four marches of the manoeuvre in MuJoCo, once, that seek the torques",
         is_present=_is_measured_drive,
-        leave_out=_without_measured,
+        leave_out=_without_measured_drive,
         modules=("models.measured.drive", "models.systems.handling.following"),
     ),
     "inclined_wheels": Entry(
@@ -104,7 +107,7 @@ TABLE = {
         "vehicle.file",
         "the coordinates of its hitch, wheels and spins, and a tyre per wheel",
         {"coordinates": 7, "towed bodies": 1, "wheels": 2},
-        is_present=lambda scene: bool(scene.given().towed),
+        is_present=lambda scene: bool(scene.file_vehicle().towed),
         leave_out=without_trailer,
         put_in=with_trailer,
     ),

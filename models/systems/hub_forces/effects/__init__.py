@@ -1,4 +1,6 @@
-"""Effects of scenes of hub forces: see ``models.core.scene_effects``."""
+"""Effects of hub forces scenes: noise, interpolation, frame, stabilisers, virtual measurement (see
+``models.core.scene_effects``).
+"""
 
 from typing import Any
 
@@ -12,27 +14,27 @@ def _selected_effect(
     cost: str,
     work_counts: dict[str, int],
     usual_value: str,
-    instead: str | None,
+    value_without: str | None,
     **entry_fields: Any,
 ) -> Entry:
-    """An effect that a word of the scene selects: ``usual_value`` with the effect, ``instead`` without it, None for the
-    default.
+    """Returns an effect that is selected by the value of a scene key: ``usual_value`` with the effect,
+    ``value_without`` without it; None removes the key.
 
-    An effect that needs the virtual measurement is absent where the scene has files. Stated deviations of noise stay
-    without the effect: the filter gets the same ones as before.
+    An effect that needs the virtual measurement is absent where the scene has files. Without an effect of noise its
+    stated deviations stay, so that the filter uses the same values.
     """
     name, key = key_path.split(".")
 
     def is_present(scene: Any) -> bool:
         word = getattr(getattr(scene, name), key)
-        named = word == usual_value if key != "frame" else word != instead
+        named = word == usual_value if key != "frame" else word != value_without
         return named and not (entry_fields.get("needs") and scene.road is None)
 
     def leave_out(table: Table, scene: Any) -> None:
-        if instead is None:
+        if value_without is None:
             del table[name][key]
         else:
-            table.setdefault(name, {})[key] = instead
+            table.setdefault(name, {})[key] = value_without
 
     def put_in(table: Table, scene: Any) -> None:
         table.setdefault(name, {})[key] = usual_value

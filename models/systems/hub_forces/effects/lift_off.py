@@ -1,4 +1,4 @@
-"""Tyres of the virtual measurement that only push: a wheel may leave the road, and its hub then feels nothing of it."""
+"""Tyres of the virtual measurement that only push, so that a wheel may leave the road without a force on its hub."""
 
 from typing import Any
 
@@ -17,5 +17,5 @@ class Parameters(Strict):
 
 
 def extend(vehicle: SpatialVehicle, p: Any) -> SpatialVehicle:
-    """The vehicle on tyres that only push, by the law of ``models.systems.pitch_plane.effects.lift_off``."""
+    """Returns the vehicle with tyres that only push, by the law of ``models.systems.pitch_plane.effects.lift_off``."""
     return vehicle.with_tyres(pushes_only=True)

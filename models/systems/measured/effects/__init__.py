@@ -1,4 +1,6 @@
-"""Effects of scenes of a recording: see ``models.core.scene_effects``."""
+"""Effects of scenes of recordings: faults of virtual transducers, clocks of files, stabilisers, virtual measurement
+(see ``models.core.scene_effects``).
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,36 +9,38 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **counts: int) -> Entry:
-    """An effect of virtual transducers, which a key of [virtual.faults] switches on. It cannot be chosen for files,
-    which have their own faults.
+def _transducer_effect(key: str, description: str, cost: str, usual_value: dict[str, Any], **counts: int) -> Entry:
+    """Returns an effect of virtual transducers that is present where a key of [virtual.faults] has a value. Measured
+    files cannot have it, as their faults are their own.
     """
     why = "for files have the faults that they have"
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         fault = getattr(scene.virtual.faults, key) if scene.virtual is not None else None
         return any(fault.values()) if isinstance(fault, Mapping) else fault is not None
 
     def put_in(table: Table, scene: Any) -> None:
         if "virtual" not in table:
             raise InputError(scene.file, f"virtual.faults.{key}", None, f"needs a table [virtual], {why}")
-        table["virtual"].setdefault("faults", {})[key] = usual
+        table["virtual"].setdefault("faults", {})[key] = usual_value
 
     faulty = {name.replace("_", " "): count for name, count in counts.items()}
     needs = ("virtual_measurement",)
-    return Entry(says, f"virtual.faults.{key}", cost, faulty, needs, why=why, is_present=there, put_in=put_in)
+    return Entry(
+        description, f"virtual.faults.{key}", cost, faulty, needs, why=why, is_present=is_present, put_in=put_in
+    )
 
 
-def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
-    """An effect that is a method of holding roll and pitch. Without it they are not held, as the other method costs
-    more.
+def _stabiliser_effect(method: str, description: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
+    """Returns the effect of a stabiliser method. Without it roll and pitch are not stabilised, as the other method
+    costs more.
     """
 
     def leave_out(table: Table, scene: Any) -> None:
         table.setdefault("stabilise", {})["method"] = "none"
 
     return Entry(
-        says,
+        description,
         "stabilise.method",
         cost,
         {count: 2},
@@ -47,20 +51,20 @@ def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple
     )
 
 
-def _count_alike(table: Table, scene: Any) -> None:
-    """Remove offset and drift of the files' clocks, so that all files count the same time."""
+def _without_clock_errors(table: Table, scene: Any) -> None:
+    """Edit a scene: remove offset and drift of the files' clocks."""
     for file in table["files"]:
         file.pop("offset", None)
         file.pop("drift", None)
 
 
 def _keep_road(table: Table, scene: Any) -> None:
-    """Raise InputError: the virtual measurement can be left out only if files replace it."""
+    """Raise InputError, as the virtual measurement can be left out only if measured files replace it."""
     raise InputError(scene.file, "virtual", None, "can only give way to [[files]] that were measured: name them")
 
 
 TABLE = {
-    "dropouts": _of_transducers(
+    "dropouts": _transducer_effect(
         "dropouts",
         "Virtual transducers that fall silent for a while",
         "gaps to be bridged or left to the filter before the run, no more in it",
@@ -68,21 +72,21 @@ TABLE = {
         faulty_channels=29,
         silent_channels=29,
     ),
-    "kalman_filter": _of_stabiliser(
+    "kalman_filter": _stabiliser_effect(
         "kalman",
         "Roll and pitch held by a moment towards a Kalman filter's estimate",
         "a filter over all samples before the run, and a moment over time",
         "pulled angles",
         ("models.systems.hub_forces.tilt_filter", "models.systems.hub_forces.tilt_march"),
     ),
-    "late_channels": _of_transducers(
+    "late_channels": _transducer_effect(
         "delay",
         "Channels of virtual transducers that are late",
         "a spline through each late channel before the run, no more in it",
         {"force": 2e-3},
         faulty_channels=12,
     ),
-    "offsets": _of_transducers(
+    "offsets": _transducer_effect(
         "bias",
         "Virtual transducers that do not read nought at nought",
         "a sum per sample and channel before the run, no more in it",
@@ -95,22 +99,22 @@ TABLE = {
         "signals are moved to one clock by interpolation",
         {"moved clocks": 1},
         is_present=lambda scene: any(file.offset or file.drift for file in scene.files),
-        leave_out=_count_alike,
+        leave_out=_without_clock_errors,
     ),
-    "prescribed_angles": _of_stabiliser(
+    "prescribed_angles": _stabiliser_effect(
         "prescribed",
         "Roll and pitch enforced as measured, smoothed",
         "derivatives of the smoothed angles before the run, and in every call a mass matrix solved for two moments",
         "enforced angles",
     ),
-    "quantisation": _of_transducers(
+    "quantisation": _transducer_effect(
         "quantisation",
         "Samples of virtual transducers rounded to the steps of a converter",
         "a rounding per sample and channel before the run, no more in it",
         {"bits": 12},
         faulty_channels=29,
     ),
-    "sensor_noise": _of_transducers(
+    "sensor_noise": _transducer_effect(
         "noise",
         "White noise on every sample of virtual transducers",
         "a random number per sample and channel before the run, no more in it",
@@ -124,7 +128,7 @@ TABLE = {
         {"runs on tyres": 1},
         leave_out=_keep_road,
     ),
-    "wrong_gains": _of_transducers(
+    "wrong_gains": _transducer_effect(
         "gain",
         "Virtual transducers whose factor is wrong",
         "a product per sample and channel before the run, no more in it",

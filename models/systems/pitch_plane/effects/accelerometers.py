@@ -1,7 +1,7 @@
-"""Tri-axial accelerometers on the chassis, on rigid mounts or on a bracket that gives way.
+"""Tri-axial accelerometers on the chassis, on rigid mounts or on a compliant bracket.
 
-They read the engine's own accelerations at their instants, and feed nothing back. Between their samples the
-reading is held.
+They read the engine's accelerations at their sampling times and have no effect on the motion. Between samples the
+reading is constant.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,14 @@ from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Channels
 from models.engines.model import Model
-from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, instant_numbers, read_samples, within_range
+from models.systems.pitch_plane.sampling import (
+    PATH_FIELD,
+    SEED_FIELD,
+    check_rate,
+    instant_numbers,
+    read_samples,
+    within_range,
+)
 
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
@@ -24,19 +31,19 @@ COUNTS = {"all": {"channels": 3}}
 
 CHANNELS = ("ax1", "ay1", "az1 and so on, three per sensor")
 USUAL_RANGE = 157.0
-"""m/s^2, 16 g: the largest range of most micromechanical accelerometers."""
-PLACE = "effects.accelerometers.sampling_rate"
+"""Usual range (m/s^2) of an accelerometer: 16 g, the largest of most micromechanical ones."""
+RATE_KEY = "effects.accelerometers.sampling_rate"
 
 
 class Bracket(Strict):
-    """[effects.accelerometers.sensors.NAME.bracket]: what the sensor stands on, too light to move the body."""
+    """[effects.accelerometers.sensors.NAME.bracket]: compliant mount of a sensor, too light to move the body."""
 
     frequency: float = quantity("Hz", "natural frequency of the sensor on its bracket")
     damping: float = quantity("", "damping ratio", zero=True)
 
 
 class Sensor(Strict):
-    """[effects.accelerometers.sensors.NAME]: where it is, from the centre of mass along the chassis' own axes."""
+    """[effects.accelerometers.sensors.NAME]: position of a sensor from the centre of mass, in axes of the chassis."""
 
     x: float = quantity("m", "forward", signed=True)
     y: float = quantity("m", "to the right", default=0.0, signed=True)
@@ -45,7 +52,7 @@ class Sensor(Strict):
 
 
 class Parameters(Strict):
-    """[effects.accelerometers]."""
+    """[effects.accelerometers]: sampling rate, sensors, noise and range."""
 
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     sensors: dict[str, Sensor] = Field(min_length=1, description="tables with x, y, z of each sensor, by its name")
@@ -53,21 +60,21 @@ class Parameters(Strict):
     range: float | None = quantity(
         "m/s^2", "largest reading of each axis; 157, as of most, where none is given", default=None
     )
-    seed: int = SEED
-    path: int = PATH
+    seed: int = SEED_FIELD
+    path: int = PATH_FIELD
 
     def positions(self) -> dict[str, tuple[float, float, float]]:
-        """Positions (m) of all sensors by name."""
+        """Positions (x, y, z) of all sensors in m from the centre of mass, by name."""
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
 def channels_of_sensors(parameters: Parameters) -> list[tuple[str, ...]]:
-    """Channels of each sensor in the scene's order: ax1, ay1, az1, then those of the next one."""
+    """Names of the three channels of each sensor, in the scene's order: ax1, ay1, az1, then ax2 and so on."""
     return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(parameters.sensors))]
 
 
 def readings_of(result: Result, parameters: Parameters) -> np.ndarray:
-    """Readings (n, sensors, 3) in m/s^2 of the accelerometers, from a run's result."""
+    """Returns the readings (n, sensors, 3) in m/s^2 of the accelerometers in a result."""
     return np.stack(
         [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(parameters)],
         axis=1,
@@ -76,14 +83,14 @@ def readings_of(result: Result, parameters: Parameters) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Accelerometers:
-    """Output of a run that gives the readings of the sensors."""
+    """Function that computes the readings of all accelerometers over a run."""
 
     parameters: Parameters
 
     def __call__(self, assembly: Assembly, run: Trajectory, model: Model) -> Channels:
-        """Three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
+        """Returns three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
         p, number = self.parameters, instant_numbers(run.times, self.parameters.sampling_rate)
-        row = read_samples(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, PLACE)
+        row = read_samples(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, RATE_KEY)
         values = self._readings(assembly, run, model, np.unique(row))[number]
         return {
             channel: ("m/s^2", f"accelerometer {sensor}, specific force along the chassis' {axis}", values[:, i, j])
@@ -92,7 +99,7 @@ class Accelerometers:
         }
 
     def _readings(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
-        """Readings (samples, sensors, 3) at ``rows``, the run's rows at the sensors' sampling times."""
+        """Readings (samples, sensors, 3) in m/s^2 at ``rows``, the run's rows at the sampling times."""
         from models.sensors.sensor_array import reading_on_bracket, sensor_readings
 
         p, y = self.parameters, run.states[rows]
@@ -113,8 +120,8 @@ class Accelerometers:
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with accelerometer readings among its results."""
-    check_rate(assembly.scene, PLACE, p.sampling_rate)
+    """Returns the assembly with accelerometer readings among its channels."""
+    check_rate(assembly.scene, RATE_KEY, p.sampling_rate)
     axes = {
         f"{sensor}, {axis}": channel
         for sensor, channels in zip(p.sensors, channels_of_sensors(p), strict=True)

@@ -1,7 +1,7 @@
-"""Where the massless contact points of a force-excited vehicle are (rows 9 and 10 of eq. 37).
+"""Motion of the massless tyre contact points of a force-excited vehicle (rows 9, 10 of eq. 37).
 
-With e = z - zeta each obeys d e' + k e = f alone: it feels the vehicle's force and never feeds back. So
-it is not a state of any engine but an exact filter over the samples of the force, whatever the run's steps.
+With e = z - zeta each contact point obeys d e' + k e = f alone: it follows the wheel force and has no effect on the
+vehicle. So it is no state of any engine but an exact filter over the force samples, whatever the run's steps.
 """
 
 import math
@@ -30,7 +30,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with the contact points among its results."""
+    """Returns the assembly with the motion of the contact points among its channels."""
     if assembly.mode == "force-body":
         raise InputError(
             assembly.scene.file,
@@ -42,8 +42,8 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
-    """Channels zeta1, zeta2 (m, down) of the contact points; at the start the tyres are at rest under the first
-    force.
+    """Channels zeta1, zeta2 (m, positive down) of the contact points over a run. At the start the tyres are at rest
+    under the first force.
     """
     p, signal = assembly.parameters, assembly.input
     forces = signal.parts[0] if isinstance(signal, Stacked) else signal
@@ -82,7 +82,7 @@ def compression(
 
 
 def _particular_solution(force_pieces: np.ndarray, tau: float) -> np.ndarray:
-    """Coefficients of f - tau f' + tau^2 f'' - ..., shape as ``force_pieces``."""
+    """Coefficients of the particular solution f - tau f' + tau^2 f'' - ..., shape as ``force_pieces``; tau in s."""
     total, derivative = np.zeros_like(force_pieces), force_pieces.copy()
     for order in range(len(force_pieces)):
         total += (-tau) ** order * derivative
@@ -93,7 +93,9 @@ def _particular_solution(force_pieces: np.ndarray, tau: float) -> np.ndarray:
 
 
 def _start_compressions(particular: np.ndarray, first: float, sample_period: float, tau: float) -> np.ndarray:
-    """Compression (m) at the start of each piece, equal to that at the end of the piece before."""
+    """Tyre compression (m) at the start of each polynomial piece, equal to the compression at the end of the piece
+    before.
+    """
     powers = sample_period ** np.arange(len(particular))
     gained = powers @ particular - particular[0] * math.exp(-sample_period / tau)
     starts = np.empty(particular.shape[1])

@@ -11,7 +11,7 @@ from models.core.noise import normal_samples
 from models.core.signals import Sampled, Smooth
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.sampling import PATH, SEED
+from models.systems.pitch_plane.sampling import PATH_FIELD, SEED_FIELD
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
@@ -20,15 +20,15 @@ EXAMPLE = {"deviation": 8.0}
 
 
 class Parameters(Strict):
-    """[effects.force_noise]."""
+    """[effects.force_noise]: standard deviation of the noise, its seed and its path."""
 
     deviation: float = quantity("N", "standard deviation of each sample", zero=True)
-    seed: int = SEED
-    path: int = PATH
+    seed: int = SEED_FIELD
+    path: int = PATH_FIELD
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with noise added to both wheel forces."""
+    """Returns the assembly with noise added to both wheel forces."""
     signal = assembly.input
     assert isinstance(signal, Sampled | Smooth)
     noisy = signal.values + p.deviation * normal_samples(p.seed, p.path, len(signal.values), 2)

@@ -1,4 +1,4 @@
-"""Sine and cosine of the pitch, where without it the vehicle turns by small angles."""
+"""Exact sine and cosine of the pitch; without it the equations are linear in the pitch."""
 
 from typing import Any
 
@@ -8,15 +8,15 @@ COUNTS = {"exudyn": {"native items": 10}}
 
 
 def named(scene: Any) -> bool:
-    """Whether a scene names the effect."""
+    """Whether a scene has exact geometry."""
     return bool(scene.vehicle.geometry == "exact")
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """Leave the effect out: the equations become linear in the pitch."""
+    """Edit a scene so that the equations are linear in the pitch."""
     table.setdefault("vehicle", {})["geometry"] = "linear"
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
-    """Write the default geometry, "exact", into the scene's table."""
+    """Edit a scene so that its geometry is "exact"."""
     table.setdefault("vehicle", {})["geometry"] = "exact"

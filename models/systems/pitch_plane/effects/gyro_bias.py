@@ -1,4 +1,4 @@
-"""A bias on the gyro: a constant turn-on part and a slow first-order Gauss-Markov instability.
+"""A bias of the gyro, with a constant turn-on part and a slow first-order Gauss-Markov instability.
 
 The grade of an inertial unit, 0.001 to 10 degrees per hour, is a statement on this bias, not on its white noise.
 """
@@ -13,7 +13,7 @@ from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, bias_path
 from models.systems.pitch_plane.effects.gyro import Gyro
-from models.systems.pitch_plane.sampling import PATH, instant_numbers
+from models.systems.pitch_plane.sampling import PATH_FIELD, instant_numbers
 
 NEEDS = ("gyro",)
 COST = "one filter over the gyro's samples after the run; no state in any engine"
@@ -24,24 +24,24 @@ CHANNELS = ("gyro_bias",)
 
 
 class Parameters(Strict):
-    """[effects.gyro_bias]."""
+    """[effects.gyro_bias]: standard deviations of turn-on bias and bias instability, and correlation time."""
 
     turn_on: float = quantity("deg/h", "standard deviation of the part that is drawn once and stays", zero=True)
     instability: float = quantity("deg/h", "standard deviation of the part that wanders", default=0.0, zero=True)
     correlation_time: float = quantity("s", "time in which the wandering part forgets itself", default=300.0)
     seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the bias")
-    path: int = PATH
+    path: int = PATH_FIELD
 
 
 @dataclass(frozen=True)
 class BiasedGyro:
-    """A gyro with a bias added to its samples."""
+    """Function that computes the reading of a gyro with a bias on its samples."""
 
     gyro: Gyro
     parameters: Any
 
     def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
-        """Channels ``gyro``, the reading with its bias, and ``gyro_bias``, the bias alone (both rad/s)."""
+        """Returns the channels ``gyro``, the reading with its bias, and ``gyro_bias``, the bias alone (both rad/s)."""
         p, rate = self.parameters, self.gyro.parameters.sampling_rate
         unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
         number = instant_numbers(times, rate)
@@ -58,6 +58,6 @@ class BiasedGyro:
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with its gyro replaced by one with a bias."""
+    """Returns the assembly with its gyro replaced by a gyro with a bias."""
     biased = tuple(BiasedGyro(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
     return replace(assembly, outputs=biased)

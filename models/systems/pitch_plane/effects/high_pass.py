@@ -1,4 +1,4 @@
-"""The paper's high-pass against drift, acting during the run: pitch slower than a cut-off is taken out.
+"""The paper's high-pass filter against drift, which removes slow pitch during the run.
 
 Integrating the pitch acceleration through a second-order high-pass, s^2 / (s^2 + 2 zeta wc s + wc^2) in place of
 1, is algebraically a rotational spring and damper to the ground. The inertia that it works against is that of the
@@ -20,12 +20,14 @@ COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}
 
 
 class Parameters(Strict):
-    """[effects.high_pass]."""
+    """[effects.high_pass]: cut-off frequency and damping ratio of the high-pass."""
 
     cut_off: float = quantity("Hz", "pitch slower than this is taken for drift")
     damping_ratio: float = quantity("1", "damping ratio of the high-pass", default=0.7, zero=True)
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle with a spring and damper to the ground that hold back slow pitch."""
+    """Returns the force-excited vehicle with the rotational spring and damper to the ground that are equivalent to the
+    high-pass.
+    """
     return assembly.with_spring(PitchSpring("chassis", *pitch_spring(assembly.parameters, p.cut_off, p.damping_ratio)))

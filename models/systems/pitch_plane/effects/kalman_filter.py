@@ -1,8 +1,8 @@
-"""A moment that draws the pitch towards a Kalman filter's estimate from measured angle and rate, also across gaps.
+"""A moment that pulls the pitch towards a Kalman filter's estimate from measured angle and rate.
 
-The filter runs before the simulation and alone, beside a vehicle of the scene's own parameters and forces
-(``pitch_filter``). The simulation then feels two moments. One is what the model's inertia lacks by the filter's
-estimate: its share of the suspension's moment. The other draws the pitch to the estimate,
+The filter runs before the simulation, on the scene's parameters and forces (``pitch_filter``), also across gaps of the
+measurement. Two moments then act in the simulation. The first corrects the error of the model's inertia by the filter's
+estimate: its share of the suspension's moment. The second pulls the pitch to the estimate,
 (I + J) (wc^2 (estimate - pitch) + 2 zeta wc (its rate - pitch rate)) with J of the wheels, wc = 2 pi bandwidth: a
 native rotational spring and damper, and a moment over time. So no estimate is differentiated, the forces stay
 functions of time and state alone, and every engine gets the very same estimate.
@@ -59,18 +59,22 @@ CHANNELS = (
 
 
 PULL_BANDWIDTH = 3.0
-"""Hz. Above the filter's own, (q/r)^(1/4) = 1.2 Hz at 0.2 % of force noise and an angle of 0.1 degree white at 1 kHz,
-so that the vehicle follows what the filter corrects; not more, because all that is faster in the estimate is the
-measurement's noise: the moment's rms grows from 0.4 % of I pitch'' at 3 Hz to 1.4 % at 8 Hz."""
+"""Default bandwidth (Hz) of the moment towards the estimate. It is above the filter's bandwidth, (q/r)^(1/4) = 1.2 Hz
+at 0.2 % of force noise and an angle of 0.1 degree white at 1 kHz, so that the vehicle follows the filter's corrections.
+It is not larger, as faster motion of the estimate is noise: the moment's rms grows from 0.4 % of I pitch'' at 3 Hz to
+1.4 % at 8 Hz.
+"""
 
 
 INNOVATION_LIMIT = 4.0
-"""Largest mean of the normalised innovation squared with which a run is made: errors twice as large as stated. A right
-filter has 1; one that is sure of a model with 5 % wrong inertia 1.1 to 1.3."""
+"""Largest mean of the normalised innovation squared at which a run is made: errors twice as large as stated. A right
+filter has 1; a filter that trusts a model with 5 % wrong inertia has 1.1 to 1.3."""
 
 
 class Parameters(Strict):
-    """[effects.kalman_filter]; a deviation per measured column, at least one."""
+    """[effects.kalman_filter]: measured pitch and pitch rate, deviations of their noise, and bandwidth of the moment
+    towards the estimate.
+    """
 
     file: str = Field(
         description="CSV with the columns time [s] and pitch [rad] and/or pitch_rate [rad/s]; nose up; "
@@ -92,9 +96,9 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle with a moment that draws its pitch towards the filter's estimate."""
+    """Returns the force-excited vehicle with a moment that pulls its pitch towards the filter's estimate."""
     guide = guide_of(assembly, p)
-    _check_surprise(assembly, p, guide)
+    _check_innovations(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
     stiffness, damping = pitch_spring(assembly.parameters, p.bandwidth, p.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
@@ -110,14 +114,15 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 @dataclass(frozen=True)
 class GuidingEstimate:
-    """Estimated pitch that a guided run follows, at times i ``period`` (s).
+    """Estimated pitch that a run follows, at n times ``period`` (s) apart.
 
-    states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
+    states : (n, 7), states of the filter (``models/systems/pitch_plane/pitch_filter.py``)
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
-    inertia : (n,), share by which 1/I is estimated above the model's; inertia_moment : (n,), the moment (N m) to it
-    used_values, missed_values : (n,), measured values so far
-    innovation_sum : (n,), sum of the normalised innovations squared so far
-    consistency : what all innovations say of the filter
+    inertia : (n,), share by which 1/I is estimated above the model's; inertia_moment : (n,), moment (N m) that corrects
+    this share
+    used_values, missed_values : (n,), numbers of measured values used and missed until then
+    innovation_sum : (n,), sum of the normalised innovations squared until then
+    consistency : test of the filter by all innovations
     """
 
     period: float
@@ -133,12 +138,12 @@ class GuidingEstimate:
 
 
 _LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
-"""The last guide, by all that it depends on: a check and a run per engine need it once."""
+"""Cache of the last estimate, by all inputs on which it depends: the check and the run in every engine use the same."""
 
 
 def guide_of(assembly: Assembly, parameters: Parameters) -> GuidingEstimate:
-    """The estimated pitch that a force-excited assembly follows; InputError for an unusable file, RunFailed from the
-    filter.
+    """Returns the estimated pitch that a force-excited assembly follows. Raises InputError for an unusable file, and
+    RunFailed from the filter.
     """
     from models.systems.pitch_plane.pitch_filter import estimate
 
@@ -165,7 +170,7 @@ def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measuremen
     from models.systems.pitch_plane.pitch_filter import INERTIA_SHARE, KEPT_STATES, PITCH, PITCH_RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
-    deviations = np.sqrt(estimated.errors()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
+    deviations = np.sqrt(estimated.error_covariances()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
     share, names = estimated.states[:, INERTIA_SHARE], {PITCH: "pitch", PITCH_RATE: "pitch_rate"}
     relative = np.zeros((8, len(share)))
     relative[KEPT_STATES] = estimated.states[:, :6].T
@@ -186,7 +191,9 @@ def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measuremen
 
 
 def _measurement(assembly: Assembly, parameters: Parameters) -> "Measurement":
-    """The measured columns of the file with their standard deviations; InputError for what the filter cannot use."""
+    """Reads the measured pitch and pitch rate of the file, with their standard deviations. Raises InputError for files
+    that the filter cannot use.
+    """
     from models.core.time_series import read_time_series
     from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, Measurement
 
@@ -223,8 +230,10 @@ def _measurement(assembly: Assembly, parameters: Parameters) -> "Measurement":
     )
 
 
-def _check_surprise(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
-    """Refuse a filter whose measurement contradicts its forces or its model: it would draw the vehicle anywhere."""
+def _check_innovations(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
+    """Raise InputError where the measurement contradicts wheel forces or model: the mean normalised innovation squared
+    is above INNOVATION_LIMIT.
+    """
     mean = float(guiding_estimate.innovation_sum[-1] / max(guiding_estimate.used_values[-1], 1))
     if mean > INNOVATION_LIMIT:
         raise InputError(
@@ -237,7 +246,7 @@ def _check_surprise(assembly: Assembly, parameters: Parameters, guiding_estimate
 
 
 def _filter_objections(parameters: Parameters, guiding_estimate: GuidingEstimate) -> tuple[str, ...]:
-    """Objections to the filter that follow from its own innovations."""
+    """Objections to the measurement or the model, as text, where the filter's innovations are not consistent."""
     if guiding_estimate.consistency.consistent:
         return ()
     square = guiding_estimate.consistency.statistics[0]
@@ -252,26 +261,26 @@ def _filter_objections(parameters: Parameters, guiding_estimate: GuidingEstimate
 
 
 def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
-    """Assumption that the innovations' statistics are those of a correctly tuned filter."""
+    """Assumption that the statistics of the innovations are those of a correctly tuned filter."""
     return Assumption(
         "innovations",
         "the filter's innovations are as its model and deviations make them",
         "correct the measured pitch (bias, delay, unit) or the inertia, or state deviations that are true",
-        partial(_places_in_intervals, guiding_estimate.consistency),
+        partial(_positions_in_intervals, guiding_estimate.consistency),
         "half widths of a right filter's band",
         -1.0,
         1.0,
     )
 
 
-def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
-    """Position of each statistic in its interval, from -1 at the lower end to 1 at the upper one."""
+def _positions_in_intervals(consistency: Consistency, run: Result) -> Watched:
+    """Position of each statistic of the innovations in its interval, from -1 at the lower end to 1 at the upper end."""
     return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
 
 
 def _check_bandwidth(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
-    """Refuse a bandwidth at which the moment reacts more slowly than the pitch diverges. Only vertical forces make it
-    diverge.
+    """Raise InputError for a bandwidth at which the moment acts more slowly than the pitch diverges. Only forces that
+    stay vertical make it diverge.
     """
     if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
         return
@@ -294,7 +303,9 @@ def _guiding_channels(
     times: np.ndarray,
     states: np.ndarray,
 ) -> Channels:
-    """Channels of the guiding moment and of the estimate that it follows, at the saved times."""
+    """Channels of the moments towards the estimate, and of the estimate, at times (n,) in s of a run with states
+    (n, 8).
+    """
     grid = guiding_estimate.period * np.arange(len(guiding_estimate.values))
     pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
         np.interp(times, grid, column)

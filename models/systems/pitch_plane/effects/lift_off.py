@@ -1,4 +1,4 @@
-"""Tyres that only push: a wheel may leave the road, where the paper's linear tyre pulls it back.
+"""Tyres that only push, so that a wheel may leave the road; the paper's linear tyre would pull.
 
 A tyre of stiffness k (N/m) and damping d (N s/m) that is compressed by e (m, the static deflection included) has
 
@@ -31,6 +31,6 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with tyres that only push."""
+    """Returns the assembly with tyres that only push."""
     struts = tuple(replace(strut, pushes_only=strut.lower.body is None) for strut in assembly.vehicle.struts)
     return replace(assembly, vehicle=replace(assembly.vehicle, struts=struts))

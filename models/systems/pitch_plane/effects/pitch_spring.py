@@ -1,4 +1,4 @@
-"""A rotational spring and damper between chassis and ground: the folk remedy against drift."""
+"""A rotational spring and damper between chassis and ground, the usual remedy against drift."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}
 
 
 class Parameters(Strict):
-    """[effects.pitch_spring]."""
+    """[effects.pitch_spring]: stiffness, damping and dead band of the spring."""
 
     stiffness: float = quantity("N m/rad", "rotational stiffness to the ground")
     damping: float = quantity("N m s/rad", "rotational damping to the ground", default=0.0, zero=True)
@@ -21,5 +21,5 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with a rotational spring between chassis and ground."""
+    """Returns the assembly with a rotational spring and damper between chassis and ground."""
     return assembly.with_spring(PitchSpring("chassis", p.stiffness, p.damping, p.dead_band))

@@ -1,7 +1,8 @@
-"""Heave and pitch of the chassis prescribed from a file: what the model lacks shows as a force and a moment.
+"""Heave and pitch of the chassis prescribed from a file, by an enforced force and moment.
 
-With the true motion and the true wheel forces, a chassis that is too light by dm takes a mean force dm g (down),
-and one whose centre of mass lies x too far forward a mean moment m3 g x (nose up).
+The enforced force and moment show errors of the model. With true motion and true wheel forces, a chassis that is too
+light by dm takes a mean force dm g (down), and a centre of mass that lies x too far forward a mean moment m3 g x (nose
+up).
 """
 
 from typing import Any
@@ -27,14 +28,14 @@ COUNTS = {
 
 
 class Parameters(Strict):
-    """[effects.prescribed_heave_and_pitch]."""
+    """[effects.prescribed_heave_and_pitch]: file of the motion, and bandwidth to which it is smoothed."""
 
     file: str = Field(description="CSV with the columns time [s], z3 [m], pitch [rad]; positive down and nose up")
     bandwidth: float | None = quantity("Hz", "a measured motion is smoothed down to this before use", default=None)
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle whose chassis' heave and pitch are prescribed inputs, twice differentiable."""
+    """Returns the force-excited vehicle with heave and pitch of the chassis prescribed, twice differentiable."""
     from models.systems.pitch_plane.effects.prescribed_pitch import prescribe
 
     columns = {"z3": METRES, "pitch": RADIANS}

@@ -1,7 +1,7 @@
-"""Pitch prescribed from a file (eq. 39): the vehicle is guided, and the moment that this takes is a result.
+"""Pitch prescribed from a file (eq. 39), by an enforced moment that is a result.
 
-A measured pitch is differentiated twice: white noise of 0.1 degrees at 1 kHz would take 1e6 N m. ``bandwidth``
-smooths it before.
+A measured pitch is differentiated twice: white noise of 0.1 degrees at 1 kHz would take 1e6 N m. So the pitch is
+smoothed to ``bandwidth`` before.
 """
 
 from collections.abc import Mapping
@@ -33,24 +33,24 @@ COUNTS = {
 
 
 class Parameters(Strict):
-    """[effects.prescribed_pitch]."""
+    """[effects.prescribed_pitch]: file of the pitch, and bandwidth to which it is smoothed."""
 
     file: str = Field(description="CSV with the columns time [s], pitch [rad]; positive nose up")
     bandwidth: float | None = quantity("Hz", "a measured pitch is smoothed down to this before use", default=None)
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle whose pitch is a prescribed input, a twice differentiable quintic spline."""
+    """Returns the force-excited vehicle with prescribed pitch, a quintic spline through the samples of a file."""
     return prescribe(assembly, "prescribed_pitch", p, "pitch", {"pitch": RADIANS})
 
 
 def prescribe(
     assembly: Assembly, effect: str, p: Any, drive_mode: Mode, columns: Mapping[str, Mapping[str, float]]
 ) -> Assembly:
-    """The force-excited vehicle with the coordinates of ``drive_mode`` prescribed by a quintic spline through the
-    samples of a file.
+    """Returns the force-excited vehicle with the coordinates of ``drive_mode`` prescribed by a quintic spline through
+    the samples of a file.
 
-    ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
+    p : has the effect's ``file`` and ``bandwidth`` (Hz or None); columns : names of the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
     from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, sparse_record_warning

@@ -1,4 +1,4 @@
-"""A road under the wheels (eq. 38): from a formula, an ISO 8608 class, or a measured file."""
+"""A road under the wheels (eq. 38), from a formula, an ISO 8608 class, or a measured file."""
 
 from dataclasses import replace
 from functools import partial
@@ -26,12 +26,12 @@ KEYS_OF_SOURCE = {
     "opencrg": ("file", "track", "offset", "beyond_end", "run_in"),
     "csv": ("file", "track", "beyond_end", "run_in"),
 }
-"""Which keys belong to which source; a measured road has a grade of its own, which no key may change."""
-NEEDED = {"iso8608": ("road_class",), "opencrg": ("file", "beyond_end"), "csv": ("file", "beyond_end")}
+"""Keys of [effects.road] that each source of the road takes; the grade of a measured road cannot be changed."""
+REQUIRED_KEYS = {"iso8608": ("road_class",), "opencrg": ("file", "beyond_end"), "csv": ("file", "beyond_end")}
 
 
 class Parameters(Strict):
-    """[effects.road]; keys beyond source and speed belong to one source each."""
+    """[effects.road]: source of the road and speed of the vehicle; the other keys depend on the source."""
 
     source: Literal["study", "hills", "iso8608", "opencrg", "csv"] = Field(description="where the road comes from")
     speed: float = quantity("m/s", "constant speed of the vehicle")
@@ -54,7 +54,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The vehicle driven over the road."""
+    """Returns the assembly with the road as its input."""
     from models.road.signal import RoadUnderWheels
 
     _check_keys(assembly.scene.file, p)
@@ -71,7 +71,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def _slopes_under_wheels(speed: float, run: Result) -> Watched:
-    """Slope angle (n,) in rad of the road under each wheel, positive uphill."""
+    """Slope angle (n,) in rad of the road under each wheel over a run at a speed (m/s), positive uphill."""
     metres = speed * run.times
     slopes = {f"{axle} wheel": -np.gradient(run[f"zeta{i + 1}"], metres) for i, axle in enumerate(("front", "rear"))}
     return {name: np.arctan(slope) for name, slope in slopes.items()}
@@ -84,7 +84,7 @@ def _check_keys(file: str, parameters: Parameters) -> None:
             accepted_keys = ", ".join(("speed", *KEYS_OF_SOURCE[parameters.source]))
             allowed = f"has no meaning for source = {parameters.source!r}, which takes {accepted_keys}"
             raise InputError(file, f"effects.road.{name}", value, allowed)
-    for name in NEEDED.get(parameters.source, ()):
+    for name in REQUIRED_KEYS.get(parameters.source, ()):
         if name not in keys:
             meaning = str(type(parameters).model_fields[name].description).partition(": ")[2]
             allowed = f"is missing: source = {parameters.source!r} needs it ({meaning})"
@@ -92,7 +92,7 @@ def _check_keys(file: str, parameters: Parameters) -> None:
 
 
 def _road_profile(scene: Any, parameters: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
-    """The road profile, and the stations (m) at which it is only twice continuously differentiable."""
+    """Returns the road profile, and the stations (m) at which it is only twice continuously differentiable."""
     if parameters.source in ("opencrg", "csv"):
         profile = _measured_road(scene, parameters, distance)
         return profile, (profile.start, profile.start + profile.window_length)
@@ -141,7 +141,7 @@ def _measured_road(scene: Any, parameters: Parameters, distance: float) -> Any:
 
 
 def _check_length(scene: Any, parameters: Parameters, raw: Any, distance: float, run_in: float) -> None:
-    """Refuse a road file that is too short for the run-in or the run; the message names the scene's keys."""
+    """Raise InputError for a road file that is too short for the run-in (m) or for the driven distance (m)."""
     total = raw.end - raw.start
     if run_in > total:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Wheel forces prescribed from a file (eq. 37): the vehicle is cut off the road."""
+"""Wheel forces prescribed from a file (eq. 37), in place of tyres on a road."""
 
 from dataclasses import replace
 from functools import partial
@@ -25,12 +25,12 @@ EXCLUDES = ("road",)
 COST = "one force per wheel, read from a table; no tyre"
 EXAMPLE = {"file": "forces.csv", "interpolation": "held"}
 COUNTS = {"exudyn": {"callbacks": 3}}
-"""Two forces stand in the place of two tyres. Held ones take one callback before each of Exudyn's steps beside one per
-wheel, and none in MuJoCo."""
+"""Counts that the effect adds. In Exudyn held forces take a callback per wheel and one before each step; in MuJoCo they
+take none."""
 
 
 class Parameters(Strict):
-    """[effects.wheel_forces]."""
+    """[effects.wheel_forces]: file of the wheel forces, their interpolation and their axis."""
 
     file: str = Field(description="CSV with the columns time [s], front [N], rear [N]; forces up on the wheels")
     interpolation: Interpolation = Field(description="held, linear or smooth between the samples")
@@ -41,7 +41,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The vehicle without tyres, driven by two wheel forces from a file."""
+    """Returns the vehicle without tyres, with two wheel forces from a file as its input."""
     from models.core.time_series import read_time_series
 
     scene = assembly.scene
@@ -58,8 +58,8 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 def _doubts_about_forces(
     assembly: Assembly, parameters: Parameters, values: np.ndarray, sample_period: float
 ) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
-    """Doubts about wheel forces (n, 2) in N that do not suit this vehicle, and assumptions that they carry its weight;
-    InputError for impossible forces.
+    """Returns doubts about wheel forces (n, 2) in N that do not suit the vehicle, and assumptions that they carry its
+    weight. Raises InputError for impossible forces.
     """
     from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
     from models.measured.signal import Signal
@@ -79,7 +79,7 @@ def _doubts_about_forces(
         starts_at_rest=not scene.start,
         turns_with_chassis=assembly.mode == "force-body",
     )
-    looked = (*check_axle_forces(axles), *_samples((front, rear), values, sample_period))
+    looked = (*check_axle_forces(axles), *_sample_findings((front, rear), values, sample_period))
     findings = tuple(
         finding for finding in looked if finding.weight != "note" and finding.check not in parameters.accept
     )
@@ -96,7 +96,9 @@ def _doubts_about_forces(
 
 
 def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[Assumption, ...]:
-    """Assumptions that the mean forces carry the vehicle's weight and each axle's, as far as the record can tell."""
+    """Assumptions that the mean wheel forces carry the vehicle's weight and balance in pitch, within the uncertainty of
+    the record's length.
+    """
     from models.measured.axle_balance import equilibrium_residual
 
     means = equilibrium_residual(axles)
@@ -124,9 +126,9 @@ def _steady_accelerations(acceleration: float, run: Result) -> Watched:
     return {"chassis": np.array([acceleration])}
 
 
-def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, sample_period: float) -> "list[Finding]":
-    """Findings on samples that no wheel can have felt: spikes, and values that the sensor's range cut off. The zeros of
-    a lifted wheel are neither.
+def _sample_findings(signals: "tuple[Signal, ...]", values: np.ndarray, sample_period: float) -> "list[Finding]":
+    """Findings on impossible samples of wheel forces: spikes, and values clipped at the sensor's range. Zeros of a
+    lifted wheel do not count.
     """
     from models.measured.checks import clipped, spikes
     from models.measured.checks.evidence import Evidence

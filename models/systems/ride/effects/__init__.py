@@ -1,4 +1,4 @@
-"""Effects of scenes of ride: see ``models.core.scene_effects``; what of them a choice may leave out, ``omissions``."""
+"""Effects of ride scenes (see ``models.core.scene_effects``); ``omissions`` lists those that a choice may leave out."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,36 +7,36 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_vehicle(description: str, cost: str, is_present: Callable[[Any], bool]) -> Entry:
-    """An effect that belongs to the vehicle file and not to a table of the scene."""
+def _vehicle_effect(description: str, cost: str, is_present: Callable[[Any], bool]) -> Entry:
+    """Returns an effect that belongs to the vehicle file, so that only another vehicle file leaves it out."""
     return Entry(description, "vehicle.file", cost, is_present=is_present, leave_out=_keep_vehicle)
 
 
 def _keep_vehicle(table: Table, scene: Any) -> None:
-    """Raise InputError: the effect can be left out only if another vehicle file is named."""
+    """Raise InputError, as the effect can be left out only if another vehicle file is named."""
     allowed = 'has it: name a file without it, or let effects = "auto" leave it out'
     raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
 
 
-def _omissions_of_sort(sort: str) -> Callable[[Any], bool]:
-    """Return the test whether a scene's vehicle and road have effects of this sort, which can be left out."""
+def _has_omissions_of_kind(kind: str) -> Callable[[Any], bool]:
+    """Returns a function of a scene: whether its vehicle or road has effects of a kind that can be left out."""
 
     def is_present(scene: Any) -> bool:
         from models.systems.ride.omissions import has_omissions
 
-        return has_omissions(scene, sort)
+        return has_omissions(scene, kind)
 
     return is_present
 
 
-def _vehicle(scene: Any) -> Any:
+def _vehicle_of_scene(scene: Any) -> Any:
     from models.systems.ride.of_scene import vehicle_of
 
     return vehicle_of(scene)
 
 
 def _equal_heights_edit(key: str) -> Callable[[Table, Any], None]:
-    """Return the edit that sets ``key`` of [road] so that wheels meet equal heights."""
+    """Returns a function that edits a scene: it sets a key of [road] so that wheels meet equal heights."""
 
     def leave_out(table: Table, scene: Any) -> None:
         table.setdefault("road", {})[key] = "equal"
@@ -45,7 +45,7 @@ def _equal_heights_edit(key: str) -> Callable[[Table, Any], None]:
 
 
 def _straighten_curves(table: Table, scene: Any) -> None:
-    """Replace the springs' curves by their slopes at rest."""
+    """Edit a scene so that springs have their slopes at rest instead of curves."""
     table["vehicle"]["small_motion"] = True
 
 
@@ -64,25 +64,25 @@ def _hold_mean_speed(table: Table, scene: Any) -> None:
 
 
 def _weight_first_output(table: Table, scene: Any) -> None:
-    """Weight the first acceleration among the outputs by Wk."""
-    name = next(output.name for output in _vehicle(scene).outputs if output.kind == "acceleration")
+    """Edit a scene so that its first acceleration output is weighted by Wk (ISO 2631-1)."""
+    name = next(output.name for output in _vehicle_of_scene(scene).outputs if output.kind == "acceleration")
     table["weighting"] = {name: "Wk"}
 
 
-BY_SPEED = "a linear vehicle of its own at every speed"
+COST_PER_SPEED = "a linear vehicle of its own at every speed"
 TABLE = {
-    "anti_roll_bars": _of_vehicle(
-        "Anti-roll bars, one by one", "a product per bar", _omissions_of_sort("anti_roll_bars")
+    "anti_roll_bars": _vehicle_effect(
+        "Anti-roll bars, one by one", "a product per bar", _has_omissions_of_kind("anti_roll_bars")
     ),
-    "body_mass": _of_vehicle(
+    "body_mass": _vehicle_effect(
         "Mass of the wheels, of one axle or of all, and of every other light body: what moves then follows its springs",
         "two states per freedom of a light body",
-        _omissions_of_sort("body_mass"),
+        _has_omissions_of_kind("body_mass"),
     ),
-    "bushings": _of_vehicle(
+    "bushings": _vehicle_effect(
         "Bushings of the wheels: the stiffer springs between wheels and what they carry, rigid along their direction",
         "a product per bushing, and the fastest modes of the vehicle",
-        _omissions_of_sort("bushings"),
+        _has_omissions_of_kind("bushings"),
     ),
     "curves": Entry(
         "Curves and friction of springs and dampers, beyond their slopes at rest",
@@ -90,7 +90,7 @@ TABLE = {
         "runs in time by an engine in place of one covariance",
         {"bent springs": 1},
         modules=("models.ride.statistical_linearisation",),
-        is_present=_omissions_of_sort("curves"),
+        is_present=_has_omissions_of_kind("curves"),
         leave_out=_straighten_curves,
     ),
     "delay": Entry(
@@ -99,16 +99,18 @@ TABLE = {
         "a filter of the road per axle",
         {"delays": 1},
         usual_value="delayed",
-        is_present=_omissions_of_sort("delay"),
+        is_present=_has_omissions_of_kind("delay"),
         leave_out=_equal_heights_edit("front_rear"),
     ),
-    "drag": _of_vehicle(
-        "Drag of the air, which loads the axles by the speed", BY_SPEED, lambda scene: bool(_vehicle(scene).drags)
+    "drag": _vehicle_effect(
+        "Drag of the air, which loads the axles by the speed",
+        COST_PER_SPEED,
+        lambda scene: bool(_vehicle_of_scene(scene).drags),
     ),
-    "freedoms": _of_vehicle(
+    "freedoms": _vehicle_effect(
         "Single freedoms of bodies: locked. Wheels keep their up and down; their other freedoms are locked together",
         "two states per freedom",
-        _omissions_of_sort("freedoms"),
+        _has_omissions_of_kind("freedoms"),
     ),
     "gravity_and_preload": Entry(
         "Gravity, and the preload of the springs that carry the bodies",
@@ -126,10 +128,10 @@ TABLE = {
         modules=("models.road.fitted",),
         leave_out=_take_papers_road,
     ),
-    "mounts": _of_vehicle(
+    "mounts": _vehicle_effect(
         "Mounts and seats: a body that carries no tyre sits rigidly on the one that its springs join it to",
         "a product per mount, and the freedoms of what it carries",
-        _omissions_of_sort("mounts"),
+        _has_omissions_of_kind("mounts"),
     ),
     "second_corner": Entry(
         "The road's second corner: its filters of second order become those of first order",
@@ -144,16 +146,16 @@ TABLE = {
         "a second filter of the road per axle",
         {"heights": 2},
         usual_value="modelled",
-        is_present=_omissions_of_sort("second_track"),
+        is_present=_has_omissions_of_kind("second_track"),
         leave_out=_equal_heights_edit("left_right"),
     ),
-    "side_forces": _of_vehicle(
-        "Side forces of tyres, by slip angle", BY_SPEED, lambda scene: bool(_vehicle(scene).side_forces)
+    "side_forces": _vehicle_effect(
+        "Side forces of tyres, by slip angle", COST_PER_SPEED, lambda scene: bool(_vehicle_of_scene(scene).side_forces)
     ),
-    "tyre_damping": _of_vehicle(
+    "tyre_damping": _vehicle_effect(
         "Damping of the tyres: nothing but their springs is left",
         "a product per tyre; without a second corner white noise at the outputs",
-        _omissions_of_sort("tyre_damping"),
+        _has_omissions_of_kind("tyre_damping"),
     ),
     "varying_speed": Entry(
         "A speed that varies along the road",

@@ -1,4 +1,4 @@
-"""Tyres that only push: a wheel may leave the road. It has no covariance, so that it is run in time."""
+"""Tyres that only push, so that a wheel may leave the road. Such a vehicle has no covariance and is run in time."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,5 +19,7 @@ class Parameters(Strict):
 
 
 def extend(built: Built, p: Any) -> Built:
-    """The vehicle on tyres that only push, by the law of ``models.systems.pitch_plane.effects.lift_off``."""
+    """Returns vehicle and road with tyres that only push, by the law of
+    ``models.systems.pitch_plane.effects.lift_off``.
+    """
     return replace(built, vehicle=built.vehicle.with_tyres(pushes_only=True))

@@ -1,4 +1,5 @@
-"""Effects of scenes of a wheelset: see ``models.core.scene_effects``.
+"""Effects of wheelset scenes: contact damping, FASTSIM, flanges, suspension, profiles (see
+``models.core.scene_effects``).
 
 Counts are those of a wheelset in an implementation: its springs and dampers, tables of profiles, calls of FASTSIM.
 """
@@ -10,11 +11,11 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_parameters(
+def _parameter_effect(
     description: str, keys: tuple[str, ...], cost: str, work_counts: dict[str, int], **entry_fields: Any
 ) -> Entry:
-    """An effect that is present where any of these parameters of the wheelset is above zero; its usual values are those
-    of the chosen wheelset.
+    """Returns an effect that is present where any of some wheelset parameters is above zero. Its usual values are the
+    parameters of CHOSEN_WHEELSET.
     """
 
     def is_present(scene: Any) -> bool:
@@ -55,8 +56,8 @@ def _has_profiles(scene: Any) -> bool:
 
 
 def _without_profiles(table: Table, scene: Any) -> None:
-    """Replace profiles by cones on rail heads of one radius, with springs as flanges. InputError where the parameters
-    have profiles.
+    """Replace the scene's profiles by cones on rail heads of one radius, with springs as flanges. Raises InputError
+    where the profiles belong to the wheelset's parameter file.
     """
     if scene.profiles is None:
         raise InputError(
@@ -66,15 +67,15 @@ def _without_profiles(table: Table, scene: Any) -> None:
 
 
 def _with_profiles(table: Table, scene: Any) -> None:
-    """Add the profiles S1002 on UIC60 in place of the cones' flange springs."""
+    """Add the profiles S1002 on UIC60 to a scene, and drop the flange springs of its cones."""
     table["profiles"] = {}
     table.get("wheelset", {}).get("override", {}).pop("flange_stiffness", None)
 
 
-PRODUCT_COST_TEXT = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
-IN_ENGINES = {"exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 4}}
+COST_TEXT = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
+ENGINE_COUNTS = {"exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 4}}
 TABLE = {
-    "contact_damping": _of_parameters(
+    "contact_damping": _parameter_effect(
         "Normal forces that grow with the speed of approach",
         ("contact_damping",),
         "one product per wheel and call",
@@ -89,7 +90,7 @@ TABLE = {
         leave_out=lambda table, scene: table.update(contact={"law": "linear"}),
         put_in=lambda table, scene: table.update(contact={"law": "fastsim"}),
     ),
-    "flange": _of_parameters(
+    "flange": _parameter_effect(
         "A flange that touches its rail beyond a clearance",
         ("flange_stiffness",),
         "one comparison per wheel and call",
@@ -97,19 +98,19 @@ TABLE = {
         excludes=("profiles",),
         why="which have flanges of their own",
     ),
-    "primary_dampers": _of_parameters(
+    "primary_dampers": _parameter_effect(
         "Dampers that hold the axle to its frame",
         ("damping_x", "damping_y", "damping_z"),
-        PRODUCT_COST_TEXT,
+        COST_TEXT,
         {"dampers": 3},
-        in_engines=IN_ENGINES,
+        in_engines=ENGINE_COUNTS,
     ),
-    "primary_springs": _of_parameters(
+    "primary_springs": _parameter_effect(
         "Springs that hold the axle to its frame",
         ("stiffness_x", "stiffness_y", "stiffness_z"),
-        PRODUCT_COST_TEXT,
+        COST_TEXT,
         {"springs": 3},
-        in_engines=IN_ENGINES,
+        in_engines=ENGINE_COUNTS,
     ),
     "profiles": Entry(
         "Measured cross-sections in place of cones on round heads",
