@@ -11,7 +11,7 @@ import numpy as np
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import FULL_FRICTION_SPEED
 from models.multibody.plain.joint_elements import AppliedForces, PlainTree
-from models.own_model.constraints import Rows, by_differences, constrained_forces, plain_constraints
+from models.own_model.constraints import JacobianAt, constrained_forces, jacobian_by_differences, plain_constraints
 from models.own_model.coordinates import MujocoState
 from models.own_model.reading import TwinModel, constant_controls
 

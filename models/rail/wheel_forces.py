@@ -7,9 +7,9 @@ Normal force
     is left out of the curvatures, and of nothing else. Profiles have several patches on a wheel, each with a
     penetration of its own (``profile_contact``).
 Creepage
-    Velocity of the wheel relative to the rail by the speed of travel V, or by REGULAR where |V| is less; there the
-    forces of rolling forwards and backwards are mixed as V goes from REGULAR to -REGULAR, so that nothing jumps.
-    Both have no power, nor has a mixture of them.
+    Velocity of the wheel relative to the rail by the speed of travel V, or by REGULARISED_SPEED where |V| is less;
+    there the forces of rolling forwards and backwards are mixed as V goes from REGULARISED_SPEED to its opposite, so
+    that nothing jumps. Both have no power, nor has a mixture of them.
 Creep law
     LINEAR (Kalker, without bound) or FASTSIM.
 Flange
@@ -277,7 +277,7 @@ def fill_creep_forces(contacts, slip, speed, rails, workspace):
             contact.l1, contact.l2, contact.l3 = flexibilities_at(
                 contact.a, contact.b, rails.wheels[0].shear, rails.wheels[0].nu
             )
-    forwards = min(1.0, max(0.0, 0.5 + 0.5 * speed / REGULAR))
+    forwards = min(1.0, max(0.0, 0.5 + 0.5 * speed / REGULARISED_SPEED))
     first, last = 0 if forwards > 0.0 else 1, 1 if forwards < 1.0 else 0
     for way in range(first, last + 1):  # one call for both ways, or callers are compiled with two copies of the law
         sign, share = (1.0, forwards) if way == 0 else (-1.0, 1.0 - forwards)

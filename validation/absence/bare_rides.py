@@ -41,7 +41,7 @@ def ride_runs(engine: str, step_count: int) -> tuple[Job, Job]:
     """Two functions that simulate a ride without effects in an engine, by twinrig's model and by the hand-written car.
     Both return states (step_count + 1, 14) and check them in the same way."""
     vehicle, road = vehicle_and_road()
-    wheel_heights_and_rates, rest_state, duration = (
+    table, rest_state, duration = (
         road.wheel_heights_and_rates(step_count, 0),
         np.zeros(len(vehicle.coordinates())),
         step_count * road.step,

@@ -234,7 +234,7 @@ def _constant_speed_rows() -> list[Row]:
         / TIMED_REPEATS
     )
     copies, slow = _timed_call(
-        at_constant_speed, vehicle, road, STEADY_SPEED, STEADY_SECONDS, copies=STEADY_COPY_COUNT, seed=SEED
+        variances_at_constant_speed, vehicle, road, STEADY_SPEED, STEADY_SECONDS, copies=STEADY_COPY_COUNT, seed=SEED
     )
     columns = [copies.names.index(point) for point in BODY_POINTS]
     z = copies.z(exact.deviation[None])[0]

@@ -61,9 +61,9 @@ class StartState(NamedTuple):
 class BrakedVehicle:
     """A vehicle with brakes and tyres on a road, ready to run.
 
-    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in their place steering : such angles by time (s), evaluated
-    in the middle of each sample; engine : ``models.engines.braking.EngineChassis`` if an engine is to carry the
-    chassis.
+    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in their place steering : such angles by time (s),
+    evaluated in the middle of each sample; engine : ``models.engines.braking.EngineChassis`` if an engine is to carry
+    the chassis.
     sprung : ``models.brake.sprung.Sprung`` of a vehicle on their suspension, which their engine then integrates.
     """
 

@@ -147,8 +147,8 @@ class HubScene(SceneFile):
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
     def spring_force_route(self, method: Method) -> ForceRoute:
-        """native compiled with a run computes spring forces. Enforced roll and pitch need compiled forces, whatever the scene
-        says.
+        """How a run computes spring forces ("native" or "compiled") with a stabiliser. Enforced roll and pitch need
+        compiled forces, whatever the scene says.
         """
         return "compiled" if method == "prescribed" else self.run.forces
 

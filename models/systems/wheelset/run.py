@@ -17,7 +17,7 @@ from models.core.result import Channel, Result, join_results, result
 from models.core.told import joined_result
 from models.ensemble.runner import block_results
 from models.ensemble.workers import Crew, folders_for_workers
-from models.rail.eigenvalues import hunting_eigenvalue, largest_growth, root_locus, uncertainty, wavelength
+from models.rail.eigenvalues import hunting_eigenvalue, hunting_uncertainty, largest_growth, root_locus, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
 from models.rail.limit_cycle import (
     Orbit,

@@ -201,7 +201,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     road = excitation_of(scene, wheels(vehicle))
     path = _road_path_of_run(scene, engine, vehicle, sampling, road, speed)
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half_step=path.half_step / FINER_STEPS)
-    wheel_heights_and_rates = finer.wheel_heights_and_rates(steps * FINER_STEPS, sample_number)
+    table = finer.wheel_heights_and_rates(steps * FINER_STEPS, sample_number)
     try:
         result = engine_result(scene, engine, vehicle, sampling, True, table[::FINER_STEPS].copy())
     except RunFailed as failure:
