@@ -74,7 +74,8 @@ def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
         f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
         f"largest pressure {1e-6 * p.peak:,.0f} MPa",
         *_contact_point_lines(scene),
-        f"  pressed in {duration(rolls.pressing_seconds)} once, rolled in {cost(rolls.rolling_seconds)} at each creepage"
+        f"  pressed in {duration(rolls.pressing_seconds)} once, rolled in {cost(rolls.rolling_seconds)} at each "
+        + "creepage"
         + ", errors included" * bool(rolls.errors),
         f"  forces on the wheel by {theory_text(scene.method)}; mu N = {limit:,.0f} N",
         f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
