@@ -202,7 +202,7 @@ RIGHT: Files = {
         {"Fz": (BACK, FZ)},
     ),
     "TDMS of two rates": ("a common clock does not exist", file_of_two_rates(".tdms"), TWO_RATES),
-    "TDMS of two rates in channel_named group": (
+    "TDMS of two rates in one group": (
         "the clock belongs to the channel",
         tdms_file(channel_named("Fz", FZ), channel_named("Fx", FX, wf_increment=SLOW_PERIOD)),
         TWO_RATES,
