@@ -221,7 +221,7 @@ class RigidVehicle:
 
 
 def rigid_vehicle(vehicle: CutVehicle) -> RigidVehicle:
-    """``Rigid`` with the mass properties of all bodies of a cut vehicle, combined in the design position."""
+    """``RigidVehicle`` with the mass properties of all bodies of a cut vehicle, combined in the design position."""
     bodies = vehicle.uncut.bodies
     mass = sum(body.mass for body in bodies)
     centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass
