@@ -47,7 +47,7 @@ AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 @dataclass(frozen=True)
 class Content:
     """Content of a file that needs attention. kind : its name for ``--without``; names : of the elements concerned,
-    with "FILE:LINE" where known; why : reason why other builds cannot represent it."""
+    with "FILE:LINE" where known; reason : why other builds cannot represent it."""
 
     kind: str
     names: tuple[str, ...]

@@ -28,7 +28,7 @@ ANGLES = {"roll": ROLL, "pitch": PITCH, "heading": HEADING}
 class Element:
     """Spring, mount or bar of a cut vehicle: a force along an axis, positive in compression, or a moment.
 
-    F = held + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
+    F = preload + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
     d = axis . (second_point - first_point) less its design value, in the axes of the body ``frame``, the chassis
     mostly; of an anti-roll bar the axis is divided by the track, so that d is an angle and F a moment. points in the
     design position, m; N or N m."""
