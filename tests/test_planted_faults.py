@@ -131,7 +131,7 @@ def test_a_fault_lives_only_while_its_model_works():
         (mujoco, "specification"),
         (mujoco, "_add_suspension"),
         (mujoco, "_guidance_forces"),
-        (equations, "suspension"),
+        (equations, "suspension_forces"),
         (equations, "newton_euler"),
         (reference, "njit"),
         (reference, "_FIXED"),

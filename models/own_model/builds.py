@@ -35,7 +35,7 @@ State = tuple[np.ndarray, np.ndarray]
 WHOLE_FRICTION_SHARE = 1.0 - 1e-12
 """Share of its full force from which a dry friction counts as sliding."""
 Equations = Callable[[np.ndarray, np.ndarray], Motion]
-"""Function that returns the motion (``Moved``) at coordinates and rates (n,)."""
+"""Function that returns the motion (``Motion``) at coordinates and rates (n,)."""
 
 
 def equations_of_build(twin: TwinModel, build: str) -> Equations:

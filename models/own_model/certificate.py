@@ -147,7 +147,7 @@ def softness_difference(twin: TwinModel, count: int) -> float:
 
 
 def reference_of_file(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
-    """``Reference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``moved_at``
+    """``Reference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``motion_at``
     does."""
     law = partial(expected_equations, build=build)
     moved = motion_at(law(twin), states)

@@ -47,7 +47,7 @@ AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 @dataclass(frozen=True)
 class Content:
     """Content of a file that needs attention. kind : its name for ``--without``; names : of the elements concerned,
-    with "FILE:LINE" where known; why : reason why other builds cannot represent it."""
+    with "FILE:LINE" where known; reason : why other builds cannot represent it."""
 
     kind: str
     names: tuple[str, ...]
@@ -254,7 +254,7 @@ def _forget_equalities(model: mujoco.MjModel) -> None:
 
 
 def _forget_actuators(model: mujoco.MjModel) -> None:
-    """Switch off the force of the actuators from ``_odd_actuators``, by setting gain and bias to zero."""
+    """Switch off the force of the actuators from ``_unbuilt_actuators``, by setting gain and bias to zero."""
     for i in [i for _, i in _unbuilt_actuators(model)]:
         model.actuator_gaintype[i], model.actuator_biastype[i] = GAIN.mjGAIN_FIXED, BIAS.mjBIAS_NONE
         model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0

@@ -48,7 +48,7 @@ LARGEST_NUMBER = 1e30
 class ModelFile:
     """A file that was read.
 
-    document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out;
+    document : its elements; twin : its model; removed_contents : content without an equivalent, left out on request;
     ignored_limits : joints and tendons whose limits are switched off, and inside whose ranges states are drawn; notes :
     sentences on what reading passed over.
     """

@@ -9,7 +9,8 @@ matrix couples them; a stiff constraint magnifies the rounding of places; weight
 where the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it.
 
 Forces of a turning body that cancel on every axis, as those towards the axle of a pendulum without weight do, stay zero
-whatever the numbers are, and leave rounding all the same: sizes of what is summed up are added (``_summed``).
+whatever the numbers are, and leave rounding all the same: sizes of what is summed up are added
+(``_with_summation_rounding``).
 
 Solving for accelerations rounds once more, and the entries of the mass matrix independently of one another, which no
 change of the model's numbers does: that is added (``_with_solver_rounding``). Up to 100 roundings of it were seen, on a

@@ -32,9 +32,9 @@ class UrdfText:
 class _Writer:
     """Writer of the wanted elements of a URDF, each on its original line.
 
-    standing, massive : names of links that stand on the world, and that have masses; left : counts of elements that are
-    left away, by tag; around : the tags around, and the name of the link; inside : depth within an unwanted element.
-    """
+    fixed_links, links_with_mass : names of links that stand on the world, and that have masses; removed_tags : counts
+    of elements that are left away, by tag; enclosing_tags : of the present element; link : its name; removed_depth :
+    depth within an unwanted element."""
 
     fixed_links: frozenset[str]
     links_with_mass: frozenset[str]

@@ -97,9 +97,9 @@ class _Reader:
 
 
 class _Folders(NamedTuple):
-    """Folders of included files. allowed : folder that must contain all of them; base : folder in which MuJoCo looks
-    for them, that of the model file, not of the including file (an attached model has its own); elements : of the files
-    with this base."""
+    """Folders of included files. allowed_folder : folder that must contain all of them; model_folder : folder in which
+    MuJoCo looks for them, that of the model file, not of the including file (an attached model has its own); elements :
+    of the files with this model folder."""
 
     allowed_folder: Path
     model_folder: Path

@@ -127,9 +127,8 @@ class LoadedWheel:
     wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
-    known. approach : vertical (m). creep_lift : vertical part of the creep forces, upwards on the rail (N). normal :
-    that of the normal forces (N). moment : of the creep forces about the axle (N m).
-    """
+    known. approach : vertical (m). creep_lift : vertical part of the creep forces, upwards on the rail (N).
+    normal_force : that of the normal forces (N). moment : of the creep forces about the axle (N m)."""
 
     pose: Pose
     touches: list[TouchingPlace]

@@ -132,8 +132,8 @@ def _heights_on_grid(patch: Patch, x: Array, y: Array) -> Array:
 def _pressure_share(
     pressure: Array, x: Array, y: Array, contour_position: float, cell: float, piece_labels: Array
 ) -> PatchShare:
-    """``Share`` of a patch whose origin is at a position on the contour (m); ``pressure`` (Pa) is zero outside this
-    patch."""
+    """``PatchShare`` of a patch whose origin is at a position on the contour (m); ``pressure`` (Pa) is zero outside
+    this patch."""
     total = float(pressure.sum())
     if total == 0.0:
         return PatchShare(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)

@@ -70,10 +70,9 @@ LARGEST_AMPLITUDE = 2.0
 class Orbit:
     """A periodic motion of a wheelset. state (10,) : at a maximum of y; period : s, with the number of steps in it.
 
-    slopes (9, 11) : derivatives of the state after a period (without the angle of spin) with respect to the state
-    before, the speed and the period, in units of STATE_SIZES, 1 m/s and the period. error : change of the unknown when
-    the step is halved, frequency_error : Hz; both NaN where the step was not halved.
-    """
+    return_slopes (9, 11) : derivatives of the state after a period (without the angle of spin) with respect to the
+    state before, the speed and the period, in units of STATE_SIZES, 1 m/s and the period. error : change of the unknown
+    when the step is halved, frequency_error : Hz; both NaN where the step was not halved."""
 
     equations: Equations
     state: Array

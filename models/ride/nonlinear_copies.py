@@ -219,7 +219,7 @@ def _slopes_of_pieces(curve: Curve | None) -> np.ndarray:
 def force_laws(
     vehicle: SpatialVehicle, linear: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float
 ) -> ForceLaws:
-    """``Laws`` of the vehicle for compiled loops; ``linear`` is the vehicle without the nonlinear parts of these
+    """``ForceLaws`` of the vehicle for compiled loops; ``linear`` is the vehicle without the nonlinear parts of these
     springs."""
     n = len(linear.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))

@@ -22,7 +22,7 @@ from models.vehicles.spatial import SpatialVehicle
 
 @dataclass(frozen=True)
 class RoadPath:
-    """Random road travelled at a constant ``speed`` (m/s) and sampled every ``half`` step (s)."""
+    """Random road travelled at a constant ``speed`` (m/s) and sampled every ``half_step`` (s)."""
 
     excitation: Excitation
     speed: float

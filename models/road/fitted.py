@@ -20,11 +20,12 @@ HIGHEST_WAVENUMBER = 2.0 * math.pi * 2.83
 
 @dataclass(frozen=True)
 class FilterFit:
-    """First-order filter fitted to a measured density between the wavenumbers ``low`` and ``high`` (rad/m).
+    """First-order filter fitted to a measured density between the wavenumbers ``low_wavenumber`` and
+    ``high_wavenumber`` (rad/m).
 
     corner_error, intensity_error: relative standard errors from the scatter about the fit. ``log_residual``: rms of
     ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``corner_is_resolved`` if it lies
-    within the band and is known to half of itself; it is never sought below a tenth of ``low``.
+    within the band and is known to half of itself; it is never sought below a tenth of ``low_wavenumber``.
     """
 
     filter: ShapeFilter

@@ -64,7 +64,7 @@ class DensityTerm:
 @dataclass(frozen=True)
 class IsotropicRoad:
     """Random road with the same statistics in all directions; its track density is the sum of several terms
-    ``DensityPart``."""
+    ``DensityTerm``."""
 
     parts: tuple[DensityTerm, ...]
 

@@ -93,7 +93,7 @@ class StartState:
 class CutOffs:
     """Cut-off frequencies (Hz) of high-pass filters against drift; None means no filter.
 
-    turning : of the rates and again of the angles, which takes true grades away, too; position : of velocity and of
+    rotation : of the rates and again of the angles, which takes true grades away, too; position : of velocity and of
     position.
     """
 

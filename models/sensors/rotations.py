@@ -183,7 +183,7 @@ def quaternion_from_matrix(s: np.ndarray) -> np.ndarray:
         raise ValueError(
             f"not a rotation: S^T S departs from the identity by {departure:.3g}, or S turns left into right"
         )
-    return Rotation.quaternion_from_matrix(s).as_quat(canonical=True, scalar_first=True)
+    return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
 
 
 def quaternion_from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:

@@ -28,7 +28,7 @@ ANGLES = {"roll": ROLL, "pitch": PITCH, "heading": HEADING}
 class Element:
     """Spring, mount or bar of a cut vehicle: a force along an axis, positive in compression, or a moment.
 
-    F = held + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
+    F = preload + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
     d = axis . (second_point - first_point) less its design value, in the axes of the body ``frame``, the chassis
     mostly; of an anti-roll bar the axis is divided by the track, so that d is an angle and F a moment. points in the
     design position, m; N or N m."""
@@ -221,7 +221,7 @@ class RigidVehicle:
 
 
 def rigid_vehicle(vehicle: CutVehicle) -> RigidVehicle:
-    """``Rigid`` with the mass properties of all bodies of a cut vehicle, combined in the design position."""
+    """``RigidVehicle`` with the mass properties of all bodies of a cut vehicle, combined in the design position."""
     bodies = vehicle.uncut.bodies
     mass = sum(body.mass for body in bodies)
     centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass

@@ -63,11 +63,10 @@ class JointElement:
     """Spring, damper, constant force and geared rotor along a sum of coordinates, d = sum of factor q over coordinates
     q.
 
-    F = held + stiffness d + damping d' + inertia d'' acts as -factor F on each of the ``coordinates`` (body, freedom).
-    held (N or N m), stiffness (N/m, N m/rad), damping (N s/m, N m s/rad), inertia (kg, kg m^2): of what turns with d
-    alone, as the rotor of a gear motor does ("armature"). ``models.own_model`` reads them from MJCF and URDF; in a
-    vehicle of a scene ``held`` is the preload that ``spatial_linear.preloads`` finds.
-    """
+    F = preload + stiffness d + damping d' + inertia d'' acts as -factor F on each of the ``coordinates`` (body,
+    freedom). preload (N or N m), stiffness (N/m, N m/rad), damping (N s/m, N m s/rad), inertia (kg, kg m^2): of what
+    turns with d alone, as the rotor of a gear motor does ("armature"). ``models.own_model`` reads them from MJCF and
+    URDF; in a vehicle of a scene ``preload`` is the preload that ``spatial_linear.preloads`` finds."""
 
     name: str
     coordinates: tuple[tuple[str, Freedom], ...]

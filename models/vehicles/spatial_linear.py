@@ -295,8 +295,8 @@ def reduced_vehicle(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarra
     """Linear vehicle in the remaining coordinates r of a reduced vehicle, with q = N r; the mass matrix may be
     singular.
 
-    mass_matrix : (n, n) of ``massless``; N : (n, r) of ``free``. InputError where no coordinate is left.
-    """
+    mass_matrix : (n, n) of ``mass_matrix_without``; N : (n, r) of ``remaining_motions``. InputError where no coordinate
+    is left."""
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
     moved = [factors @ N for factors in linear.read[:3]] if linear.outputs else [()] * 3

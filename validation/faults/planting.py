@@ -231,10 +231,10 @@ EQUATIONS_FAULTS = (
     EngineFault(
         "cos(pitch) missing in the damper",
         REFERENCE_ONLY,
-        patch=rewritten_reference(suspension=patches.damper_without_cosine),
+        patch=rewritten_reference(suspension_forces=patches.damper_without_cosine),
     ),
     EngineFault(
-        "forces from the state before", REFERENCE_ONLY, patch=rewritten_reference(suspension=patches.stale_state)
+        "forces from the state before", REFERENCE_ONLY, patch=rewritten_reference(suspension_forces=patches.stale_state)
     ),
     EngineFault(
         "no reaction on the front wheel", REFERENCE_ONLY, patch=rewritten_reference(newton_euler=patches.no_reaction)
