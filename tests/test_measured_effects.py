@@ -81,8 +81,8 @@ def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch
         whole = Variants(own, "mujoco")
         part = whole.window(20)
         assert measured.steps(own) == steps and measured.steps(part.scene) == 120  # at least 100 samples
-        assert whole.of(step_factor=2).counts["steps"] == steps // 2
-        paths = [one.of().quantities["body z"].cases[0] for one in (whole, part)]
+        assert whole.quantities_of_run(step_factor=2).counts["steps"] == steps // 2
+        paths = [one.quantities_of_run().quantities["body z"].cases[0] for one in (whole, part)]
         assert len(paths[1]) == 121 and abs(paths[0][:115] - paths[1][:115]).max() < 1e-12 * abs(paths[0]).max()
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from models.contact.material import MaterialPair
-from models.contact.rolling_kernels import answer, factor, orthogonalise, substitute, sweep, turned
+from models.contact.rolling_kernels import cell_traction, factorise, orthogonalise, rotate_column, substitute, sweep
 from models.contact.rolling_operator import SlipOperator, gmres
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -19,7 +19,7 @@ def test_factors_of_many_systems_and_their_solutions():
         skewed = draw.normal(size=(stop - start, stop - start))
         system[start:stop, start:stop] = skewed @ skewed.T + np.eye(stop - start) + skewed - skewed.T
     factors, wanted = systems.copy(), draw.normal(size=(2, 7))
-    factor(factors, spans)
+    factorise(factors, spans)
     for made, system in zip(factors, systems, strict=True):
         assert (np.tril(made, -1) + np.eye(7)) @ np.triu(made) == pytest.approx(system, abs=1e-12)
     solved = np.linalg.solve(systems, wanted[..., None])[..., 0]
@@ -46,7 +46,7 @@ def test_a_vector_beside_a_basis_and_its_turned_components():
     turns, left = np.zeros((3, 2)), np.array([1.7, 0.0, 0.0, 0.0])
     triangle = np.zeros((3, 3))
     for k in range(3):
-        triangle[: k + 1, k] = turned(columns[: k + 2, k].copy(), turns, left)
+        triangle[: k + 1, k] = rotate_column(columns[: k + 2, k].copy(), turns, left)
     expected = np.linalg.qr(columns)[1]
     assert np.abs(triangle) == pytest.approx(np.abs(expected), rel=1e-12)
     least = np.linalg.lstsq(columns, 1.7 * np.eye(4)[0], rcond=None)
@@ -65,7 +65,7 @@ def rubbed(slip, own, bound):
 def test_one_cell_sticks_or_slips():
     draw = np.random.default_rng(4)
     for slip, bound in zip(draw.normal(size=(30, 2)), draw.uniform(0.05, 3.0, 30), strict=True):
-        computed = answer(*slip, 0.8, 1.3, bound)
+        computed = cell_traction(*slip, 0.8, 1.3, bound)
         assert computed == pytest.approx(tuple(rubbed(slip, np.array([0.8, 1.3]), bound)), rel=1e-10)
 
 

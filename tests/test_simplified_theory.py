@@ -10,7 +10,13 @@ from models.contact.half_space import Z, influence
 from models.contact.hertz import by_load
 from models.contact.material import MaterialPair
 from models.contact.patches import separate
-from models.contact.simplified_kernels import FineNet, displacement, drag, march, step_on
+from models.contact.simplified_kernels import (
+    FineNet,
+    displacement,
+    march,
+    tangential_displacement_sums,
+    traction_after_step,
+)
 from models.contact.simplified_theory import PAPER, SimplifiedOptions, press, roll
 from models.contact.undeformed_distance import Distance, from_arrays, from_function, quadratic
 from models.core.errors import InputError
@@ -117,7 +123,7 @@ def test_patches_drag_each_other_as_the_half_space_does():
     """Far from a cell its traction is a load in its middle: 0.2 % off at ten cells' distance."""
     at, force = (np.array([5e-3, -3e-3]), np.array([4e-3, 6e-3])), np.array([[2.0], [-1.0]])
     numbers = influence(*at, 5e-4, 5e-4, PAIR)[..., :2, :2] / 5e-4**2
-    found = drag(np.zeros(1), np.zeros(1), force, *at, PAIR.nu) / (np.pi * PAIR.G)
+    found = tangential_displacement_sums(np.zeros(1), np.zeros(1), force, *at, PAIR.nu) / (np.pi * PAIR.G)
     assert found == pytest.approx((numbers @ force)[..., 0].T, rel=2e-3)
 
 
@@ -208,13 +214,15 @@ def test_the_march_is_of_second_order_where_tractions_turn():
 
 def test_a_slipping_traction_turns_exactly():
     # A traction of size 2 at right angles to a slip that would take 0.6 of the bound: tan(psi/2) = exp(-0.3).
-    x, y, slips = step_on(0.0, 2.0, 0.6, 0.0, 2.0, 2.0, True)
+    x, y, slips = traction_after_step(0.0, 2.0, 0.6, 0.0, 2.0, 2.0, True)
     angle = 2.0 * math.atan(math.exp(-0.3))
     assert (x, y) == pytest.approx((-2.0 * math.cos(angle), 2.0 * math.sin(angle)), rel=1e-12)
     assert slips
     # The same traction, on the bound but sticking until now, is cut back along its own way.
     cut = 2.0 / math.hypot(0.6, 2.0)
-    assert step_on(0.0, 2.0, 0.6, 0.0, 2.0, 2.0, False) == pytest.approx((-0.6 * cut, 2.0 * cut, 1), rel=1e-12)
+    assert traction_after_step(0.0, 2.0, 0.6, 0.0, 2.0, 2.0, False) == pytest.approx(
+        (-0.6 * cut, 2.0 * cut, 1), rel=1e-12
+    )
 
 
 def test_flat_and_ring_like_bottoms_give_finite_positive_answers():

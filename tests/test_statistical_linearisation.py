@@ -123,7 +123,7 @@ def test_sentences_say_when_the_covariance_is_no_longer_good():
 
 
 def test_no_fixed_point_is_told(monkeypatch):
-    monkeypatch.setattr("models.ride.statistical_linearisation.MOST_ROUNDS", 3)
+    monkeypatch.setattr("models.ride.statistical_linearisation.LARGEST_ITERATION_COUNT", 3)
     with pytest.raises(RunFailed, match="no one way to move"):
         statistically_linear(*vehicle_and_road(NONLINEAR_VEHICLE), SPEED)
 

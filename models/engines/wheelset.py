@@ -72,7 +72,7 @@ class EngineWheelset(Equations):
         joints = joints_from_states(np.asarray(state, float))
         return state_rates(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
-    def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
+    def _states_and_contacts(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States (m, 10) by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
         joints = joints_from_states(state)
         states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))

@@ -34,7 +34,10 @@ KIND_OF_LIBRARY = {
 """Kind of work that a call within a library or a source folder belongs to."""
 ENGINES = ("exudyn", "mujoco", "reference")
 MARCH_FUNCTIONS = frozenset(
-    ("march", "march_adaptively", "solve", "ended", "run", "rollout", "SolveDynamic", "_marched", "_fixed", "_adaptive")
+    (
+        *("march", "march_adaptively", "solve", "run", "rollout", "SolveDynamic"),
+        *("_states_and_contacts", "_march_fixed", "_march_adaptively"),
+    )
 )
 """Names of the functions in which an engine integrates in time; in all others it is built or evaluates one state."""
 FORCE_FUNCTIONS = frozenset(("force", "forces", "law"))

@@ -43,7 +43,7 @@ def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], 
     body, rails = equations.body, equations.rails
     wheels, profiles = rails.wheels[0], rails.profile.nodes.size > 0  # profiles have flanges of their own
     counts = {
-        "spring_counts": sum(stiffness > 0.0 for stiffness in body.stiffness),
+        "springs": sum(stiffness > 0.0 for stiffness in body.stiffness),
         "dampers": sum(damping > 0.0 for damping in body.damping),
         "creep nets": int(rails.law == forces.FASTSIM),
         "flanges": int(wheels.flange > 0.0 and not profiles),

@@ -130,7 +130,9 @@ FAULTS = (
     CampaignFault("a damping 1 % off", "Exudyn", _element_law_patch(damping=1.01)),
     CampaignFault("a preload 1 % off", "Exudyn", _element_law_patch(preload=1.01)),
     CampaignFault(
-        "a bar's factor 1 % off", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:Coordinates.add", _larger_bar_factor)
+        "a bar's factor 1 % off",
+        "Exudyn",
+        attribute_patch(f"{EXUDYN_MODULE}:CoordinateConnectors.add", _larger_bar_factor),
     ),
     CampaignFault(
         "mounts' axes fixed in the space",
