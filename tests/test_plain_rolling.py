@@ -77,7 +77,7 @@ def test_a_sweep_takes_one_cell_after_the_other():
     bound[0, :2] = 0.0
     traction = draw.normal(0.0, 0.3, (4, 5, 2)) * (bound > 0.0)[..., None]
     computed = np.ascontiguousarray(np.moveaxis(traction, -1, 0))
-    sweep(computed, np.ascontiguousarray(np.moveaxis(rigid, -1, 0)), operator.reversed, bound, relaxation)
+    sweep(computed, np.ascontiguousarray(np.moveaxis(rigid, -1, 0)), operator.reversed_kernel, bound, relaxation)
     for row in range(4):
         for column in range(4, -1, -1):
             if bound[row, column] > 0.0:
