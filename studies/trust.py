@@ -171,8 +171,8 @@ def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, n
 
 
 def _saved_paths(scene: Scene, rows: list[Row], drift_off_times: dict[str, np.ndarray]) -> Result:
-    """Result with the drift-off times (s) by source of error, and the drift-off times and pitch errors of the noise
-    paths."""
+    """Result to be saved: times (s) after which each source of error takes the motion out of tolerance, and the same
+    times and the pitch errors of random runs with noise."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
         for name in ("predicted", "measured")

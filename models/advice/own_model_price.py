@@ -105,9 +105,8 @@ class PricedModel:
         return Setting("reference", REFERENCE_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times (s), coordinates of the quantity, and number of force calls of a run; RunFailed where a method stops or
-        the motion blows up.
-        """
+        """Run the model: times (s), values of the priced coordinates, and number of force calls. RunFailed if the
+        method stops or the motion blows up."""
         steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin, 1)
         path = self._path(setting, (q, v), steps)
         if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST_STATE):

@@ -184,9 +184,8 @@ def _fill_block(block, first, count, contacts, strips, slips):
 
 @lean
 def _collect_forces(block, first, count, contacts, strips, answers):
-    """Add the lanes' sums to the forces of their ellipses, and their numbers of slipping cells, weighted by length, to
-    the slip area.
-    """
+    """Add what ``count`` strips carry to the forces of their contact ellipses, and their slipping cells, each with its
+    length, to the slip areas."""
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
         contact, answer = contacts[c], answers[c]

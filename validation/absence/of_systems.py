@@ -57,8 +57,7 @@ def _scene_folder(system: str) -> tempfile.TemporaryDirectory[str]:
 
 
 def hand_written_tables(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
-    """Effect without usual values -> tables that replace tables of the bare scene, once without and once with the
-    effect."""
+    """For each effect without default values, by its name: the scene tables to use without and with the effect."""
     return getattr(absence_module_of(system), "HAND_WRITTEN_TABLES", {})
 
 

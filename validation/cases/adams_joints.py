@@ -335,7 +335,7 @@ def _engine_row(
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Table of the output files of the other code: digits, and energy lost where nothing damps."""
+    """Table of the output files of Adams: digits that they print, and energy that undamped motions in them lose."""
     rows = tuple(
         (family, str(file_facts["digits"]), "-" if file_facts["lost"] is None else f"{file_facts['lost']:.1e}")
         for family, file_facts in case_data.items()

@@ -77,8 +77,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
-    """The wheelset at every lateral displacement (mm), and the processor time (s) per position. Wall time would count
-    other cases that run at the same time."""
+    """Contacts of the wheelset at every lateral displacement (mm), and the processor time (s) per displacement.
+    Wall time would count other cases that run at the same time."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
     return placed_run.detail.placed, placed_run.seconds / len(shifts)

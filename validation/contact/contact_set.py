@@ -51,7 +51,7 @@ Range = tuple[float, float]
 
 
 def regular_contacts() -> list[ContactCase]:
-    """All contacts of the regular set, without forces."""
+    """All contacts on the grid of axis ratios, creepages and spins; forces are not yet computed."""
     return [
         case
         for ratio in AXIS_RATIOS

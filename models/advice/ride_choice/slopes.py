@@ -41,7 +41,7 @@ class Shifts:
         return cls(tuple(changes[:3]), tuple(changes[3:5]), tuple(changes[5:8]), tuple(changes[8:]))
 
     def only(self, is_present: np.ndarray) -> "Shifts":
-        """The matrix changes, with zeros for parameters that are not ``is_present`` (p,)."""
+        """The same changes of matrices, with zeros for parameters whose ``is_present`` (p,) is false."""
         parts = (self.stiffness, self.by_heights, self.by_motion, self.by_road)
         return Shifts(
             *(tuple(matrix_changes * is_present[:, None, None] for matrix_changes in matrices) for matrices in parts)

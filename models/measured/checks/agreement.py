@@ -107,7 +107,7 @@ class Agreement:
 
     @cached_property
     def predicted_powers(self) -> np.ndarray:
-        """Powers (f, k) of the readings that the forces predict."""
+        """Spectral powers (frequencies, signals) of the readings that the measured forces predict."""
         return np.einsum("fkc,fkc->fk", self._expected_times_forces, self.response.conj()).real
 
     @property
