@@ -39,7 +39,6 @@ STEP = {"road": 1e-3, "wheel-20": 2.5e-4}
 WEAK_DAMPING = 1e-3
 """Damping (N s/m) of the cheap force law, which hardly changes the motion."""
 METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
-ForceFunction = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")

@@ -222,7 +222,7 @@ def page_text(results: Saved, case_data: Path, map_cases: Callable[..., Iterable
         "marked": docstring_markup,
         "numeric_columns": numeric_columns,
     }
-    environment.globals |= {"margin": margin_of_row, "case_of": case_of_row}
+    environment.globals |= {"margin": margin_of_row}
     names = list(dict.fromkeys(map(case_of_row, results["rows"])))
     drawn = dict(zip(names, map_cases(partial(case_on_page, case_data), names), strict=True))
     return environment.get_template(PAGE_TEMPLATE).render(
