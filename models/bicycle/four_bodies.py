@@ -40,7 +40,9 @@ class Ride:
 
 
 def four_bodies(b: Whipple) -> SpatialVehicle:
-    """The bicycle's bodies as a vehicle description, in the design position with the steering axis upright."""
+    """The bicycle's bodies in tree order, as a vehicle description in the design position with the steering axis
+    upright.
+    """
     sine, cosine = math.sin(b.tilt), math.cos(b.tilt)
     rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     origin = np.array([0.0, 0.0, b.rear_wheel.radius])

@@ -44,8 +44,8 @@ from models.vehicles.spatial import SpatialVehicle
 
 WHEEL_COUNT = 2
 (GAIN, FEEDBACK_SPEED_LIMIT, FRICTION, DRY_FRICTION, DRY_RATE, SPEED_GAIN, SPEED_BIAS, CONTROL_COUNT) = range(8)
-"""Column indices of the control's parameters in the table of numbers, with gains multiplied; CONTROL_COUNT is their
-number.
+"""Indices of the control's parameters in their section of the table of numbers, with gains multiplied; CONTROL_COUNT
+is their number.
 """
 
 

@@ -69,8 +69,8 @@ def ranked_suspects(
 def averaged_weave(
     bicycle: Whipple, base_control: Control, choice: SubsetChoice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Decay rate and angular frequency (2,) of the weave, averaged over all subsets of parameters with their weights,
-    and their standard deviations (2,).
+    """Real and imaginary part (2,) of the weave eigenvalue (1/s), averaged over all subsets of parameters with their
+    weights, and their standard deviations (2,).
     """
     return choice.forecast(
         lambda values: predicted_weave(bicycle, base_control.model_copy(update=values), observation)[:2]

@@ -95,8 +95,8 @@ class Control(Strict):
     speed_bias: float = quantity("m/s", "measured speed at standstill", default=0.0, signed=True)
 
     def lean_rate_gain(self, speed: float) -> float:
-        """Ratio of the feedback's steer torque to the lean rate (N m s/rad) at a speed (m/s), without its negative
-        sign.
+        """Ratio of the feedback's steer torque to the lean rate (N m s/rad) at a speed (m/s), both positive to the
+        right.
         """
         missing = max(self.until - self.speed_gain * abs(speed) - self.speed_bias, 0.0)
         return self.torque_gain * self.gain * missing

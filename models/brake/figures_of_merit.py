@@ -1,7 +1,7 @@
 """Figures of merit of a braking test: decelerations, distances, adhesion utilisation, split friction, turns.
 
 Formulas of UN Regulation 13, of ISO 21994, 16552 and 14794 as they are commonly quoted: not checked against the text of
-the regulation or standard. Speeds in m/s, times in s, distances in m, forces in N; z is a deceleration by g.
+the regulation or standard. Speeds in m/s, times in s, distances in m, forces in N; z is a deceleration divided by g.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Axles:
 
 def crossing_time(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
     """Time (s) at which the vehicle's speed first falls below ``speed`` (m/s), interpolated linearly between samples;
-    NaN if it never does.
+    NaN if it never does, or is below at the first sample already.
     """
     rows_below = np.flatnonzero(speeds < speed)
     if rows_below.size == 0 or rows_below[0] == 0:

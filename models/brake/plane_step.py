@@ -29,8 +29,9 @@ from models.tyre.tyre_table import TableCell, cell_and_share, lateral_adhesion
 ACCELERATION_TOLERANCE = 1e-7
 """Remaining error of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the iteration of the loads ends."""
 HALF_ROUNDS, ANDERSON_ROUNDS, ROUNDS_PER_WINDOW, MOST_WINDOWS = 1, 12, 16, 1000
-"""Numbers of iterations: in a half step, which starts from the last step's loads; before Anderson's method gives way to
-means; between two checks of progress; and the number of such checks before giving up.
+"""Numbers of iterations: in a half step, which starts from the last step's accelerations, near enough for order two;
+before Anderson's method gives way to means; between two checks of progress; and the number of such checks before giving
+up.
 """
 JUMP_WIDTH = 1e-3
 """Width (m/s^2, and rad/s^2 times 1 m) of the interval to which a jump of the accelerations is narrowed down where
@@ -208,8 +209,7 @@ def fill_response(motion, torques_before, torques_after, step, vehicle, frame):
 
 @inlined
 def find_accelerations(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
-    """Find the mean accelerations over a step by iteration, from the last ones on, and write them into ``motion``;
-    returns the estimated remaining error.
+    """Find the mean accelerations over a step by iteration, from the last ones on, and write them into ``motion``.
 
     Anderson's method of depth one runs for at most ``most_rounds`` rounds. If they have not converged and were
     ``ANDERSON_ROUNDS`` or more, ``find_by_means`` takes over. Returns the estimated remaining error, from the last

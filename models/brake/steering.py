@@ -52,7 +52,8 @@ class YawResponse:
 
 
 def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
-    """Step response of steering from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not steady.
+    """Response to a step of steering, from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not
+    steady.
 
     half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
     vehicles); not checked against the text of the standard.

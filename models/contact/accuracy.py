@@ -124,8 +124,8 @@ def _largest_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: R
 
 
 def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
-    """Likely discretisation errors of force (N) and moment (N m): LIKELY times the difference between fine and coarse
-    grid, plus a small allowance for errors that both grids share.
+    """Likely discretisation errors of force (N) and moment (N m): LIKELY_SHARE times the difference between fine and
+    coarse grid, plus a small allowance for errors that both grids share.
     """
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:

@@ -85,5 +85,7 @@ def grid(cells: int, strips: int, bound: Bound) -> Grid:
 
 
 def _pressure(t: Array, bound: Bound) -> Array:
-    """Ratio of the pressure bound at the distance ``t`` from the centre (in semi-axes) to that in the centre."""
+    """Ratio of the pressure that bounds the traction, at the distance ``t`` from the centre (in semi-axes), to that in
+    the centre.
+    """
     return ((1.0 - t) * (1.0 + t)) ** POWERS[bound]

@@ -17,19 +17,16 @@ A, B, LOAD, MU = range(4)
 """Indices of the first fields of CONTACT, for callers that keep contacts in a table of doubles."""
 ONE_FLEXIBILITY, THREE_FLEXIBILITIES, BLENDED = 0, 1, 2
 X_WEIGHT, SPIN_WEIGHT, OPPOSING_SPIN_SHARE, BLEND_REACH, BLEND_POWER = 0.5, 0.52, 0.86, 1.9, 1.3
-"""Constants of the blend of flexibilities: weights of xi_x and spin relative to xi_y, how much of it lateral creepage
-against spin takes away, the reach at which the one flexibility has its main part and the power of its beginning; then
-powers of a/b in the second and the fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of
-them with lateral creepage against spin, and compared with others (validation case ``contact_price``).
+"""Constants of the blend of flexibilities: weights of xi_x and of spin, where xi_y has 1; how much of it lateral
+creepage against spin takes away; the reach at which the one flexibility has its main part, and the power of its
+beginning. With those below, calibrated on 910 contacts of the exact theory, 250 of them with lateral creepage against
+spin, and compared with others (validation case ``contact_price``).
 """
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
-"""Of the blend: what xi_x and spin count by xi_y, how much of it lateral creepage against spin takes away, the reach at
-which the one flexibility has its main part and the power of its beginning; then powers of a/b in the second and the
-fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of them with lateral creepage against
-spin, and held against others (validation case ``contact_price``)."""
+"""Further constants of the blend: powers of a/b, within ``RATIOS``, in the weight of spin and in the reach."""
 SLIDING_SQUARE, LARGEST_BLEND_EXPONENT = 8.0, 100.0
-"""Square of the ratio of traction to bound at which creepage without spin makes the whole area slide, and exponent
-beyond which nothing changes.
+"""Square of the ratio of the linear theory's traction to the bound at which creepage without spin makes the whole area
+slide, and exponent beyond which nothing changes.
 """
 
 
@@ -185,7 +182,8 @@ def _fill_block(block, first, count, contacts, strips, slips):
 @lean
 def _collect_forces(block, first, count, contacts, strips, answers):
     """Add what ``count`` strips carry to the forces of their contact ellipses, and their slipping cells, each with its
-    length, to the slip areas."""
+    length, to the slip areas.
+    """
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
         contact, answer = contacts[c], answers[c]

@@ -62,7 +62,7 @@ along x and y, and padded heights.
 HEADER = size_of(HEAD)
 MOST_CELLS = 200
 DEPTH_TOLERANCE = 1e-12
-"""Ratio of the remaining error of the depth to the approach beyond first touch at which the iteration ends."""
+"""Ratio of the error of the approach to the approach beyond first touch at which the search of the depth ends."""
 MOST_ITERATIONS = 100
 
 

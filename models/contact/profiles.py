@@ -17,7 +17,7 @@ from models.core.errors import InputError
 
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
-SPIKE_HEIGHT = 2e-4
+SPIKE_DISTANCE = 2e-4
 """Distance (m) from both neighbours above which a point that turns back counts as a measurement error."""
 LARGEST_BACKWARD_STEP = 1e-3
 """Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; also the
@@ -107,7 +107,7 @@ def _check_spikes(points: Array, file: object) -> None:
     sharply.
     """
     way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
-    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE_HEIGHT)
+    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE_DISTANCE)
     if spikes.any():
         y, z = points[1 + int(np.argmax(spikes))]
         raise InputError(

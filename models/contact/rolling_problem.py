@@ -285,7 +285,7 @@ def _newton(state: _State) -> Array:
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    with_tractions = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
-    size = np.linalg.norm(with_tractions, axis=-1)
+    new_tractions = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
+    size = np.linalg.norm(new_tractions, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
-    return with_tractions * onto[..., None]
+    return new_tractions * onto[..., None]

@@ -75,11 +75,16 @@ FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN_TRAVEL, PRELOAD
     13,
     14,
 )
+"""Indices of the numbers of a spring, mount or bar: last joint and point (m, from there) of both ends, axis, travel at
+rest (m), preload (N), stiffness (N/m) and damping (N s/m)."""
 AXIS_JOINT, FRICTION, FRICTION_RATE, TRAVEL_CURVE, RATE_CURVE, PER_ELEMENT = range(15, 21)
 """Further indices of the numbers of a spring, mount or bar: the last joint of the body in which its axis is fixed,
 friction force (N), friction speed (m/s), and where the table has its curves of force over travel and over rate (0:
 nowhere)."""
 LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, ONE_SIDED, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10, 11
+"""Indices of the numbers of a hub: last joint, point (m, from there), and of its former tyre: height of the point at
+rest (m), static load (N), stiffness (N/m), damping (N s/m), cornering stiffness (N/rad), roll steer (-), whether it
+only pushes."""
 WRENCH, GUIDE_COLUMNS = 6, 6
 """Number of columns of the inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their
 accelerations."""

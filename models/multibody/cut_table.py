@@ -53,7 +53,8 @@ class HubInputs:
         return list(itertools.pairwise(ends))
 
     def in_steps(self, first_step: int, last_step: int) -> "HubInputs":
-        """Hub inputs of the steps from ``first`` to ``last_step`` alone; their time starts at 0."""
+        """Hub inputs of the steps from ``first_step`` to ``last_step`` alone, with the hub forces of their start
+        throughout; their time starts at 0."""
         hubs = np.repeat(self.hubs[2 * first_step : 2 * first_step + 1], 2 * (last_step - first_step) + 1, axis=0)
         return replace(
             self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first_step : 2 * last_step + 1]

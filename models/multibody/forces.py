@@ -80,12 +80,13 @@ from models.tyre.bristles import FIRST_FLEXIBILITY, tyre_forces
     HEADER,
 ) = range(23)
 """Indices in the head of the table: count of all numbers; counts of coordinates, points, springs and bars, tyres, knots
-of a control (three controls), road waves; the chassis' last coordinate; drag (N s^2/m^2) and its point of action from
+of each control, road waves; the chassis' last coordinate; drag (N s^2/m^2) and its point of action from
 there; cells, strips and middle of the tyre patch's grid; where each section begins."""
 STEER, BRAKE, DRIVE, FIRST_PUSH = range(4)
 PUSHED_BY, PUSHED_AT, PUSH_AXIS, PER_PUSH = 0, 1, 4, 7
 """Indices of the numbers of an external push: the last coordinate of the pushed body, the point of action from there
-(m), the direction in the axes of the carrier."""
+(m), the direction in the axes of the carrier. The rows of all pushes, and then their count, stand before the controls,
+the last of which are their forces (N)."""
 (
     KNUCKLE,
     ROTOR,

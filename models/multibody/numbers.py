@@ -44,6 +44,7 @@ class Tyres:
 class Controls:
     """Steering, brake and drive of a vehicle over time, and how they are shared between its axles.
 
+    steer : angle of the front wheels (rad); brake, drive : torque on all wheels together (N m), both 0 or more.
     front_brake : share of the front axle in braking; front_drive : in driving. All axles behind it share the rest
     evenly, those of towed bodies in braking alone, and so do the wheels of an axle.
     """

@@ -57,7 +57,7 @@ DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-
 LARGEST_SPEED = 200.0
 """Largest speed (m/s) of a wheelset."""
 DERAILED_LIMIT = 0.3
-"""Sum of yaw and roll (rad) and displacements (m) from which the wheelset counts as derailed."""
+"""Sum of the magnitudes of yaw and roll (rad) and displacements (m) from which the wheelset counts as derailed."""
 DEEPEST_POSITION = 5e-3
 """Lowest position z (m, down) searched at which the rails carry the load."""
 NO_REPORT = np.empty(0, REPORT)
@@ -70,8 +70,8 @@ TrackVector = tuple[float, float, float]
 
 class Body(NamedTuple):
     """Body and suspension of a wheelset (SI): mass; inertia along and across the axle; half spacing of the springs;
-    springs and dampers of one side; weight of the vehicle on each side; height z at which the springs carry exactly
-    that weight; lean of the track; whether there is a spring or a damper."""
+    springs and dampers of one side; weight of the vehicle on each side; position z (m, down) at which the springs
+    carry exactly that weight; lean of the track; whether there is a spring or a damper."""
 
     mass: float
     spin_inertia: float
@@ -161,18 +161,18 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def march(state, parameters, step_numbers, path, reports):
+def march(state, parameters, time_steps, path, reports):
     """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
 
-    parameters : of ``Equations``; step_numbers : of a length (s), how many, and every so many steps one goes into path
-    and reports."""
+    parameters : of ``Equations``; time_steps : length (s) of a step, count of steps, and after how many steps one
+    goes into path and reports."""
     stages = Stages(np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(0, REPORT))
     speed, body, rails = parameters
     rails_record = rails_from_tuples(rails)
     return _march_with_arrays(
         state,
         (speed, Body(*body), rails_record),
-        step_numbers,
+        time_steps,
         path,
         reports,
         workspace_for(rails_record.profile),
@@ -181,12 +181,12 @@ def march(state, parameters, step_numbers, path, reports):
 
 
 @lean
-def _march_with_arrays(state, parameters, step_numbers, path, reports, workspace, stages):
+def _march_with_arrays(state, parameters, time_steps, path, reports, workspace, stages):
     """Integrate the state over all steps with arrays allocated by the caller. Holding no references to them saves 5 %
     of the time of a bare wheelset."""
     (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = (
         parameters,
-        step_numbers,
+        time_steps,
         stages,
     )
     for i in range(count + 1):
@@ -310,8 +310,8 @@ class Equations:
         start[Y] = lateral_shift
         start[ROLL] = -lateral_shift * w.roll_per_displacement
         if w.profiles:
-            rise, start[ROLL] = w.profiles.first_touch_pose(w.radius, lateral_shift)
-            start[Z] += rise
+            fall, start[ROLL] = w.profiles.first_touch_pose(w.radius, lateral_shift)
+            start[Z] += fall
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
     def _state_in_balance(

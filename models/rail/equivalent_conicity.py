@@ -33,7 +33,7 @@ from models.core.errors import InputError
 from models.rail.rolling_radius_table import RollingRadiusTable
 
 SERIES_LIMIT = 1e-6
-"""Argument z below which arctan z / z is 1 to rounding."""
+"""Argument z below which arctan z / z is taken as 1, with an error below 4e-13."""
 AMPLITUDE_TOLERANCE = 1e-9
 """Share of an amplitude within which two waves count as equal, or an amplitude as that of the table's ends."""
 HARMONIC_PHASES = 720

@@ -71,8 +71,8 @@ class Profiles(Strict):
         )
 
     def first_touch_pose(self, radius: float, lateral_shift: float) -> tuple[float, float]:
-        """Rise (m) of the wheelset from its height in the middle of the track, and roll (rad), at which both wheels
-        just touch at a lateral displacement (m). Raises InputError if they cannot."""
+        """Fall (m, downwards) of the wheelset from its height in the middle of the track, and roll (rad), at which both
+        wheels just touch at a lateral displacement (m). Raises InputError if they cannot."""
         wheel_on_rail = self.wheel_on_rail(radius)
         pose = touching_pose(wheel_on_rail, lateral_shift, 0.0)
         return pose.fall - wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll

@@ -143,11 +143,11 @@ def _node_contact(node, wheel_pose, rail_head, knots, knot):
         knot += 1
     cubic = knots[knot]
     t = y_on_rail - cubic.y
-    height_over_rail = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
-    if height_over_rail < -FAR_HEIGHT:
+    vertical_depth = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
+    if vertical_depth < -FAR_HEIGHT:
         return -1.0, place_x, place_y, place_z, 0.0, knot
     slope = cubic.c1 + t * (2.0 * cubic.c2 + 3.0 * t * cubic.c3)
-    return height_over_rail / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
+    return vertical_depth / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
 
 
 @lean

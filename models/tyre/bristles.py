@@ -56,7 +56,7 @@ def cornering_stiffness_factor(cells: int) -> float:
 @lean
 def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces_out):
     """Fill ``forces_out`` (w, 4) with the creep forces fx, fy (N) and moments mz (N m) on w tyres; the last column has
-    no meaning.
+    no meaning. No array is allocated.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
     sliding_velocities (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the
@@ -89,7 +89,8 @@ def _creepages(sign, patches, sliding_velocities):
 
 @lean
 def _blend_directions(sliding_velocities, backwards, forces_out):
-    """Blend the forces of forward and of backward rolling in ``forces_out``, weighted by the speed of the tread."""
+    """Blend the forces of forward and of backward rolling in ``forces_out``, weighted by the speed of the tread; those
+    of backward rolling are mirror images, whose fx and mz change their sign."""
     for i in range(len(forces_out)):
         share, answer, behind = (
             min(1.0, max(0.0, 0.5 + 0.5 * sliding_velocities[i, 3] / FADING_SPEED)),

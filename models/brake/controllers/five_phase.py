@@ -77,7 +77,7 @@ class _Logic:
         sign, level = end_of_phase(self._phase, self._settings)
         if sign * (relative_acceleration - level) >= 0.0:
             self._phase = self._phase % 5 + 1
-        elif self._gains_no_speed(slip, relative_acceleration):
+        elif self._continues_with_phase_5(slip, relative_acceleration):
             self._phase = 5
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
@@ -85,9 +85,9 @@ class _Logic:
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
 
-    def _gains_no_speed(self, slip: float, relative_acceleration: float) -> bool:
-        """Whether the wheel no longer gains speed in phase 2, or has no brake pressure left and little slip in phase
-        1.
+    def _continues_with_phase_5(self, slip: float, relative_acceleration: float) -> bool:
+        """Whether phase 5 follows: the wheel no longer gains speed in phase 2, or has no brake pressure left and little
+        slip in phase 1.
         """
         if self._phase == 1:
             return self._pressure == 0.0 and slip <= self._settings.deep

@@ -24,7 +24,9 @@ from models.tyre.tyre_table import TableCell, TyreTable, cell_and_share, stacked
 LONGEST_PHASE = 1.0
 """Time (s) after which a phase is taken never to end."""
 CLOSED_CYCLE_TOLERANCE = 1e-9
-"""Relative change of wheel speed and torque from one cycle to the next at which the limit cycle is reached."""
+"""Sum of the relative changes of wheel speed and torque from one cycle to the next below which the limit cycle is
+reached.
+"""
 
 
 class WheelState(NamedTuple):

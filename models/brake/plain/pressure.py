@@ -70,8 +70,8 @@ class Pressures:
         target = np.where(fills, supply, np.where(valves == RELEASE, 0.0, pressures_before))
         slow = chambers.slow if chambers.slow.size else chambers.fill_time
         constants = np.where(valves == RELEASE, chambers.empty_time, np.where(valves == SLOW, slow, chambers.fill_time))
-        decayed_share = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
-        self.air.pressure[:] = target + (pressures_before - target) * decayed_share
+        remaining_share = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
+        self.air.pressure[:] = target + (pressures_before - target) * remaining_share
         self._follow_hysteresis()
         if np.isfinite(chambers.reservoir):
             air_used = float(chambers.volumes @ ((self.air.pressure - pressures_before) * fills))

@@ -60,8 +60,8 @@ class Steps:
         self.vehicle, self.course, self.step = vehicle, course, step
 
     def on(self, moving_vehicle: Moving, torques: np.ndarray) -> tuple[int, float]:
-        """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns the status and the
-        time (s) at its end.
+        """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns how the step
+        ended and the time (s) that passed in it.
         """
         half, (q, v) = 0.5 * self.step, moving_vehicle.state
         surfaces, half_step_torques = (

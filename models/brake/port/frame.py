@@ -36,7 +36,7 @@ from models.brake.controller import Command, Sample
 
 QUESTION_LAYOUT, ANSWER_LAYOUT = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
 MOST_WHEELS = 8
-SWITCH, REQUEST_GIVEN = 1, 2
+SWITCH, SPEED_GIVEN = 1, 2
 """Bits of the question's flags: brake switch closed, speed given."""
 
 
@@ -50,7 +50,7 @@ class WrongFrame(ValueError):
 
 def question_frame(sample: Sample) -> bytes:
     """Frame (104 bytes) that carries one sample to the controller."""
-    flags = SWITCH * sample.brake | REQUEST_GIVEN * (sample.speed == sample.speed)
+    flags = SWITCH * sample.brake | SPEED_GIVEN * (sample.speed == sample.speed)
     return QUESTION_LAYOUT.pack(
         b"TRQ1",
         sample.number,

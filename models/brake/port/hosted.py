@@ -83,7 +83,9 @@ class ProcessController:
             raise ControllerFailed(sample, "crash", lost) from None
 
     def _receive(self, sent: bytes, byte_count: int, begins: bytes, seconds: float) -> bytes:
-        """Bytes that the process sends back within ``seconds`` (s); raises Failed, TimeoutError, OSError, EOFError."""
+        """Bytes that the process sends back within ``seconds`` (s); raises ProcessFailed, TimeoutError, OSError,
+        EOFError.
+        """
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)

@@ -50,7 +50,7 @@ class PlainConstraints:
     def terms(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
         """``ConstraintTerms`` of all constraints at coordinates and rates (n,)."""
         motion = self._bodies.move(q, v)
-        terms = np.hstack((self._point_distances(motion), *(_products(*each).T for each in self._joint_axes(motion))))
+        terms = np.hstack((self._point_vectors(motion), *(_products(*each).T for each in self._joint_axes(motion))))
         rest = np.concatenate((np.zeros(len(self._rows)), terms[BIAS]))
         return ConstraintTerms(np.vstack((self._rows, terms[FIRST_DERIVATIVE:].T)), rest)
 
@@ -58,11 +58,11 @@ class PlainConstraints:
         """Violation of all constraints at coordinates (n,). Between axes it is the rotation vector, which vanishes only
         where the axes coincide."""
         motion = self._bodies.move(q, np.zeros_like(q))
-        apart, turned = self._point_distances(motion), [rotation_gap(*each) for each in self._joint_axes(motion)]
+        apart, turned = self._point_vectors(motion), [rotation_gap(*each) for each in self._joint_axes(motion)]
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
         return Gap(size, np.vstack((self._rows, apart[FIRST_DERIVATIVE:].T, *(each.jacobian for each in turned))))
 
-    def _point_distances(self, motion: PlainMotion) -> np.ndarray:
+    def _point_vectors(self, motion: PlainMotion) -> np.ndarray:
         """Vectors between the two points of each of p constraints, with their rates and derivatives, (3 + n, 3 p), rows
         as in a ``PlainMotion``."""
         ends = motion.at(self._ends)
