@@ -78,7 +78,9 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Co
 
 
 def _check_points(y: Array, z: Array, smoothing: float, file: object) -> None:
-    """Refuse profile points of wrong shape or size, that are not finite, or whose contour does not run along y."""
+    """Refuse profile points of wrong shape or size, that are not finite, or whose contour does not run along y; and a
+    smoothing out of bounds.
+    """
     if y.ndim != 1 or y.shape != z.shape or y.size < 10:
         raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
     if not (np.isfinite(y).all() and np.isfinite(z).all()):

@@ -112,7 +112,9 @@ class FreeSystem:
     """
 
     def __init__(self, operator: SlipOperator, free_directions: Array, stiff: Array) -> None:
-        """free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx)."""
+        """free_directions : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny,
+        nx).
+        """
         self.operator, self.free, self.stiff = operator, free_directions, stiff[..., None]
         self.scale = 1.0 / (
             operator.own_slip.max() + self.stiff

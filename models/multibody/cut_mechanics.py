@@ -18,8 +18,8 @@ LAST, MASS, ARM, INERTIA, PER_BODY = 0, 1, 2, 5, 14
 """Indices of the numbers of a body: the joint that carries it, mass (kg), position of its centre (m) from that joint,
 inertia about its centre (kg m^2)."""
 ROTATION, POSITION, JOINT_AXIS, OMEGA, BIAS, ANGULAR_BIAS, PER_MOTION = 0, 9, 12, 15, 18, 21, 24
-"""Indices of the numbers in a row of ``links``: rotation matrix, position, joint axis, angular velocity, and linear and
-angular acceleration without the q'' terms."""
+"""Indices of the numbers in a row of ``links``: rotation matrix, first as ``rotated`` reads it there, position, joint
+axis, angular velocity, and linear and angular acceleration without the q'' terms."""
 
 
 @lean

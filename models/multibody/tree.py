@@ -75,7 +75,7 @@ def add(numbers, first, a):
 @lean
 def outwards(joints, n, q, v, links):
     """Fill the links (motion of the bodies), body by body, from the table rows of ``joints``; their forces are set to
-    zero."""
+    zero. joints, links : pointers."""
     carrier = row(links, PER_LINK, 2)
     for k in range(PER_LINK):
         carrier[k] = 0.0
@@ -138,7 +138,7 @@ def out(link, local, first):
 @lean
 def locate(points, count, links, spots):
     """Fill the positions and velocities of all force points from the table rows of ``points``; their forces are set to
-    zero."""
+    zero. points, links, spots : pointers."""
     for i in range(count):
         of, spot = row(points, PER_POINT, i), row(spots, PER_SPOT, i)
         link = row(links, PER_LINK, int(of[JOINT]))
