@@ -12,7 +12,9 @@ from models.vehicles.spatial import Freedom, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import slopes_at_rest
 
 LIGHT_BODY_SHARE = 0.2
-"""Largest mass of a light body, divided by the vehicle's mass; the mass of a light body can be left out."""
+"""Largest mass of a light body other than a wheel, divided by the vehicle's mass; the mass of a light body can be left
+out.
+"""
 SIMILAR_STIFFNESS_FACTOR = 2.0
 """Largest ratio of two stiffnesses in a group of bushings that are made rigid together."""
 ALL_WHEELS = "mass of all wheels"
