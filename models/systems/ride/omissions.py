@@ -16,7 +16,9 @@ LIGHT_BODY_SHARE = 0.2
 out.
 """
 SIMILAR_STIFFNESS_FACTOR = 2.0
-"""Largest ratio of two stiffnesses in a group of bushings that are made rigid together."""
+"""Largest ratio of two stiffnesses in a group of bushings that are made rigid together, and ratio of a bushing's to the
+softest stiffness between the same bodies that it must exceed.
+"""
 ALL_WHEELS = "mass of all wheels"
 TYRE_DAMPING = "tyre damping"
 """Names of effects to which other effects refer."""
@@ -28,8 +30,8 @@ reduced_further, on_road = ReducedScene.reduced_further, ReducedScene.on_road
 
 
 def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
-    """Returns all effects of a scene that can be left out, from vehicle, road and tables [effects.NAME], sorted by kind
-    of effect.
+    """Returns all effects of a scene that can be left out, from vehicle, road and tables [effects.NAME], sorted by the
+    names of their kinds.
     """
     system = scene.ride.system
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
@@ -108,7 +110,7 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
 
 def rigid_bushing_effects(scene: ReducedScene) -> list[Effect]:
     """Returns the effects that make bushings at wheels rigid, one per group of similar stiffness. Bushings are springs
-    that are stiffer than the softest spring between the same two bodies.
+    more than SIMILAR_STIFFNESS_FACTOR times as stiff as the softest spring between the same two bodies.
     """
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str | None], list[SpringDamper]](list)
     for spring in scene.vehicle.springs:
