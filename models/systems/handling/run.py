@@ -144,8 +144,8 @@ class Drive:
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
-        """Power (m,) in W of all work on the vehicle: dampers, driver's torques, steering, and creep forces of the
-        tyres.
+        """Power (m,) in W of all work on the vehicle: dampers, drag and pushes, driver's torques, steering, and
+        creep forces of the tyres.
         """
         ledger = self.ledger
         power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
