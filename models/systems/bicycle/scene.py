@@ -37,7 +37,7 @@ class RunTable(Strict):
 
 
 class SpeedsTable(Strict):
-    """[speeds]: forward speeds at which eigenvalues are computed, evenly spaced from start to stop."""
+    """[speeds]: speeds at which eigenvalues are computed, evenly spaced from start to stop (backwards below 0)."""
 
     start: float = quantity("m/s", "first speed", default=0.0, signed=True)
     stop: float = quantity("m/s", "last speed", default=10.0, signed=True)

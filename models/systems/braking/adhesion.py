@@ -216,8 +216,8 @@ def split_adhesion(scene: BrakingScene, name: str) -> SplitAdhesion:
 
 
 def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
-    """Figures of merit of a procedure, by name and unit: response in a turn or J-turn, adhesion utilisation of straight
-    braking. Empty where they have no meaning.
+    """Figures of merit of a procedure, by name and unit: response in a turn or J-turn, braking rate on split friction,
+    adhesion utilisation of straight braking. Empty where they have no meaning.
 
     Figures that need further runs are left out where the port has a client that connects once or a log, and where the
     pressures were measured.

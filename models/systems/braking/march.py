@@ -61,10 +61,10 @@ class StartState(NamedTuple):
 class BrakedVehicle:
     """A vehicle with brakes and tyres on a road, ready to run.
 
-    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in their place steering : such angles by time (s),
+    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s),
     evaluated in the middle of each sample; engine : ``models.engines.braking.EngineChassis`` if an engine is to carry
     the chassis.
-    sprung : ``models.brake.sprung.Sprung`` of a vehicle on their suspension, which their engine then integrates.
+    sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then integrates.
     """
 
     plane: Plane
@@ -101,8 +101,8 @@ class BrakedVehicle:
         """Run the vehicle from a start state, or from steady rolling along x at a speed (m/s), for at most ``duration``
         (s).
 
-        The brake switch closes at ``switch_time``; until then no valve opens, whatever the controller commands. Raises
-        RunFailed, which names the time and whose ``partial`` is the path until then.
+        The brake switch closes at ``switch_time``; until then all valves release, whatever valve states the controller
+        commands. Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
         start_state, wheels = start if isinstance(start, StartState) else self.rolling(start), self.plane.wheels
         check_way(self.road, self.sample / self.substeps * float(np.hypot(*start_state.state[1, :2])))

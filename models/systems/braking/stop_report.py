@@ -153,8 +153,8 @@ class Stop:
         }
 
     def wheel_results(self) -> dict[str, np.ndarray]:
-        """Slips, locks and pressures of each wheel (W,) over a stop, by name and unit. Slips count at speeds above
-        SLOWEST_SLIP_SPEED, or above half of a lower initial speed."""
+        """Slips, locks and pressures of each wheel (W,) over a stop, by name and unit. Slips and mean pressures count
+        at speeds above SLOWEST_SLIP_SPEED, or above half of a lower initial speed."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST_SLIP_SPEED, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports.slip[fast]
         pressures, fast_duration = path.pressures[1:][fast], float(self.lengths[fast].sum())

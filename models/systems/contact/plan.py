@@ -18,7 +18,9 @@ THEORY_TEXTS = {
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Raise InputError, before any file is written, for materials that differ too much for the half-space theories."""
+    """Refuses nothing: reading a scene checks its keys, and the theories refuse materials that differ too much
+    (``MaterialPair.require_likeness``).
+    """
     _ = scene.pair.G
 
 

@@ -135,31 +135,33 @@ def run(
     progress("loading", 0.0)
     shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
-    body = solved_contact(scene)
+    contact = solved_contact(scene)
     steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
         progress("rolling", i / len(motions))
-        steps.append(rolled(body, motion, cells) if error else (body.roll(motion, cells), None))
+        steps.append(rolled(contact, motion, cells) if error else (contact.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun
     if shown is not None:
         steps[-1] = shown
     forces, errors_of_forces = zip(*steps, strict=True)
-    rolls = ContactResults(body, motions, forces, errors_of_forces if error else (), marks[0] - start, np.diff(marks))
-    labelled = with_assumptions(_labelled_result(scene, rolls, seconds), assumptions(scene, body))
-    return with_error(labelled, scene, body, errors_of_forces) if error else labelled
+    rolls = ContactResults(
+        contact, motions, forces, errors_of_forces if error else (), marks[0] - start, np.diff(marks)
+    )
+    labelled = with_assumptions(_labelled_result(scene, rolls, seconds), assumptions(scene, contact))
+    return with_error(labelled, scene, contact, errors_of_forces) if error else labelled
 
 
 def _labelled_result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Result:
-    body, count, power = rolls.contact, len(rolls.motions), CELL_POWER[scene.method.name]
+    contact, count, power = rolls.contact, len(rolls.motions), CELL_POWER[scene.method.name]
     errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in rolls.errors] or [()] * count
     rows = zip(rolls.motions, map(FORCES_OF_ROLLED, rolls.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *errors_of_forces] for motion, forces, errors_of_forces in rows]).T
     doubt = ""
-    if isinstance(body, LinearTheory):
+    if isinstance(contact, LinearTheory):
         with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
             used = np.array([np.linalg.norm(force.force) for force in rolls.rolled])
-            doubt = beyond_friction(used / (body.friction * body.pressing.load))
+            doubt = beyond_friction(used / (contact.friction * contact.pressing.load))
     return result(
         scene,
         {

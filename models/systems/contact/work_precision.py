@@ -53,8 +53,8 @@ class ContactCase:
     """A rolling contact with semi-axes a and b (m), and its exact forces: fx, fy divided by mu N; mz divided by mu N
     sqrt(ab); error of the exact theory's grid, divided by mu N.
 
-    parts : shares of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : size of
-    the creepage; at 1 a single creepage reaches mu N by the linear theory.
+    parts : xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : size of the
+    creepage; at 1 a single creepage reaches mu N by the linear theory.
     """
 
     a: float

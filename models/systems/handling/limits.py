@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 STABILITY_LIMIT = 2.78
 """Stability limit of the classical Runge-Kutta method on the negative real axis: step times decay rate."""
 TURNOVER_ANGLE, JACKKNIFE_ANGLE = 0.5, 1.57
-"""Roll or pitch (rad) beyond which a car or trailer counts as turned over, and yaw (rad) of a towed body relative to
-its towing vehicle beyond which a train jackknifes.
+"""Roll or pitch (rad) beyond which a car or trailer counts as turned over, as its suspension moves along the normal of
+the road's plane; and yaw (rad) of a towed body relative to its towing vehicle beyond which a train jackknifes.
 """
 
 

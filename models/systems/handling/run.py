@@ -144,8 +144,8 @@ class Drive:
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
-        """Power (m,) in W of all work on the vehicle: dampers, driver's torques, steering, and creep forces of the
-        tyres.
+        """Power (m,) in W of all work on the vehicle: dampers, drag and pushes, driver's torques, steering, and
+        creep forces of the tyres.
         """
         ledger = self.ledger
         power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
@@ -266,10 +266,12 @@ class ManoeuvreRerun:
             base, coarse = self.in_double_step, self._series_on_cells(other_cells, 2.0)
         except RunFailed:
             base, coarse = principal_series(self.drive), self._series_on_cells(other_cells, 1.0)
-        creepages, fewer, forces_on_more = (self._creep_forces(count) for count in (cells, other_cells, finer))
+        creep_forces, forces_on_other, forces_on_more = (
+            self._creep_forces(count) for count in (cells, other_cells, finer)
+        )
         force_difference, error = (
-            np.linalg.norm(creepages - fewer),
-            np.linalg.norm(creepages - forces_on_more) / (1.0 - 0.5**CELL_ERROR_ORDER),
+            np.linalg.norm(creep_forces - forces_on_other),
+            np.linalg.norm(creep_forces - forces_on_more) / (1.0 - 0.5**CELL_ERROR_ORDER),
         )
         share, estimates = error / force_difference if force_difference > 0.0 else 0.0, dict[str, Estimate]()
         for name in names:

@@ -252,8 +252,8 @@ def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> N
 def _check_knots(
     scene: HandlingScene, key_path: str, knots: list[TimeValuePair], low: float, high: float, unit: str
 ) -> None:
-    """Raise InputError for knots of a control whose times do not rise, whose values exceed the limits, or that lie
-    closer together than the time step.
+    """Raise InputError for knots of a control whose times do not rise, whose values exceed the limits, or whose
+    value changes within less than a time step.
     """
     (knot_times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(knot_times).all() or (np.diff(knot_times) <= 0.0).any():

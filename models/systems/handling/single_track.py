@@ -25,7 +25,8 @@ class SteadyTurn:
     """Steady turn per rad of steer angle: yaw rate (rad/s) and lateral velocity (m/s) at the common centre of mass.
 
     ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
-    ``towed_headings`` : angles of the towed bodies to the left of the towing vehicle, in the order of ``towed``.
+    ``towed_headings`` : angles of the towed bodies to the left of the towing vehicle, in the order of ``towed``,
+    per rad of steer angle.
     """
 
     yaw_gain: float

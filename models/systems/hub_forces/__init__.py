@@ -1,4 +1,4 @@
-"""A vehicle without wheels, driven by measured forces and moments at its wheel hubs: six components per hub."""
+"""A vehicle without tyres, driven by measured forces and moments at its wheel hubs: six components per hub."""
 
 ENGINES = ("reference", "exudyn", "mujoco")
 ON_REQUEST = ("plain",)

@@ -12,7 +12,7 @@ AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose 
 
 
 def exported(scene: HubScene, engine: str) -> Exported:
-    """Export the vehicle without wheels, hub forces and stabiliser as a model file of "mujoco" or "exudyn"."""
+    """Export the vehicle without tyres, hub forces and stabiliser as a model file of "mujoco" or "exudyn"."""
     vehicle = scene.cut_vehicle()
     omissions = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
     return export_cut_vehicle(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), omissions)
@@ -21,7 +21,7 @@ def exported(scene: HubScene, engine: str) -> Exported:
 def export_cut_vehicle(
     engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]
 ) -> Exported:
-    """Export a vehicle without wheels as a model file of an engine. ``further_omissions`` lists what the file leaves
+    """Export a vehicle without tyres as a model file of an engine. ``further_omissions`` lists what the file leaves
     out besides hub forces and springs that the engine does not have.
     """
     division = divide(vehicle.tree, vehicle.elements, engine)

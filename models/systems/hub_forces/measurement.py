@@ -55,7 +55,7 @@ class Angles:
 def two_tracks(
     vehicle: CutVehicle, left_profile: RoadProfile, right_profile: RoadProfile, speed: float, step: float, steps: int
 ) -> HubInputs:
-    """Road heights (m) and their rates (m/s) under the wheels at half steps, positive downwards. The front axle is at
+    """Road heights (m) and their rates (m/s) under the wheels at half steps, positive upwards. The front axle is at
     the path v t, and axles behind it reach the same point later.
     """
     half_step_times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
@@ -100,5 +100,5 @@ def hub_model(
     duration: float,
     interpolation: Interpolation = "linear",
 ) -> HubModel:
-    """Build the model of a vehicle without wheels under measured hub forces, without a stabiliser."""
+    """Build the model of a vehicle without tyres under measured hub forces, without a stabiliser."""
     return build(engine, vehicle, forces.hub_inputs(step, round(duration / step), interpolation), step, duration)

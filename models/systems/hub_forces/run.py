@@ -230,7 +230,7 @@ def run(
     measurement: Measurement | None = None,
     error: bool = False,
 ) -> Result:
-    """Run the vehicle without wheels under its hub forces; the result's detail is the HubRun. Raises InputError,
+    """Run the vehicle without tyres under its hub forces; the result's detail is the HubRun. Raises InputError,
     Refused or RunFailed.
 
     method : stabiliser of roll and pitch, by default the scene's; measurement : of the scene, if it exists already, as

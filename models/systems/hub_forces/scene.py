@@ -1,4 +1,4 @@
-"""Scenes of hub forces: a vehicle without wheels, measured hub forces or a road for a virtual measurement, and a
+"""Scenes of hub forces: a vehicle without tyres, measured hub forces or a road for a virtual measurement, and a
 stabiliser of roll and pitch.
 """
 
@@ -153,7 +153,7 @@ class HubScene(SceneFile):
         return "compiled" if method == "prescribed" else self.run.forces
 
     def cut_vehicle(self) -> CutVehicle:
-        """Returns the vehicle without its wheels, cut at the hubs, with the scene's effects; raises InputError."""
+        """Returns the vehicle without its tyres, cut at the hubs, with the scene's effects; raises InputError."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
         return cut(extended_by_effects(vehicle, self), self.vehicle.chassis)
 

@@ -114,8 +114,8 @@ class TiltFilter:
                 np.nan_to_num(angles[0]),
                 np.diag(np.where(np.isnan(angles[0]), UNKNOWN_VARIANCE, self.noise.variances)),
             )
-        level = _wrenches_in_level_axes(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
-        turning, filtered = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
+        tilted = _wrenches_in_tilted_axes(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
+        turning, filtered = self.rigid.moments(tilted) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
         state.squared_innovations += march(state.x, state.p, turning, angles, self.noise, state.sums, filtered)
         if not self.normalised_innovation <= INNOVATION_LIMIT:
@@ -237,7 +237,7 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations:
     return Tilt(states, spread, forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
 
 
-def _wrenches_in_level_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def _wrenches_in_tilted_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Transform wrenches (m, 6 h) from axes fixed in space into axes turned by roll and pitch; angles (m, 2 or more) in
     rad.
     """

@@ -7,7 +7,7 @@ from models.systems.measured.scene import MeasuredScene
 
 
 def exported(scene: MeasuredScene, engine: str) -> Exported:
-    """Export the vehicle without wheels as a model file of "mujoco" or "exudyn". Raises InputError for the pitch plane,
+    """Export the vehicle without tyres as a model file of "mujoco" or "exudyn". Raises InputError for the pitch plane,
     which a scene of that system exports.
     """
     vehicle = scene.rig().vehicle

@@ -17,7 +17,7 @@ QUANTITY_OF_NOISE_KEY: dict[str, Quantity] = {
     "angle": "angle",
     "rate": "angular rate",
 }
-"""Keys of the scene's table ``white_noise``, and the quantities that they are of."""
+"""Keys of the scene's table [noise], with the quantity of each."""
 
 
 def stabilisers_of_runs(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:

@@ -31,7 +31,7 @@ class Rig:
     """The vehicle that a recording drives, with the places of its sensors and sections.
 
     name : of the vehicle or the parameter set; chassis : body whose angles are measured; sections : names of sections
-    at which forces can be requested; angles : components of the measured angles; vehicle : without wheels, None in the
+    at which forces can be requested; angles : components of the measured angles; vehicle : without tyres, None in the
     pitch plane.
     """
 

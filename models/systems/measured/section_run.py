@@ -1,4 +1,4 @@
-"""Run of a recording on a spatial vehicle without wheels, block by block; each block ends with a checkpoint.
+"""Run of a recording on a spatial vehicle without tyres, block by block; each block ends with a checkpoint.
 
 Only a block is in memory. The state and the stabiliser's filter are passed from block to block, and inputs do not
 depend on the blocks: a run in blocks, or resumed after an interruption, equals a run in one piece to the last bit.
@@ -63,7 +63,7 @@ class AttitudeHold:
 
 @dataclass(frozen=True)
 class SectionRun:
-    """Settings of a recording's run on a vehicle without wheels. hold : stabiliser; step : time step (s), the
+    """Settings of a recording's run on a vehicle without tyres. hold : stabiliser; step : time step (s), the
     recording's sampling period if None; file : the scene that messages name.
     """
 

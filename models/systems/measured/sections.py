@@ -1,4 +1,4 @@
-"""Section forces and moments of a vehicle without wheels: their names, units, axes and signs.
+"""Section forces and moments of a vehicle without tyres: their names, units, axes and signs.
 
 - a spring, mount, seat or bar, by its name: the force along its axis, positive in compression; of an anti-roll bar the
   moment, positive where the left end is pushed up;

@@ -54,7 +54,7 @@ class Drift:
     """Predicted drift of a free run by the errors of measured hub forces.
 
     mean_errors : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) in s; deviations (n, 3) :
-    standard deviations caused by noise (rad); rates : growth rates of errors (1/s).
+    standard deviations caused by noise (rad); rates (3,) : growth rates of errors (1/s).
     """
 
     times: np.ndarray

@@ -2,9 +2,10 @@
 measured channels with the run.
 
 The concept is that of the pitch plane (``models.drift.score``), with roll and pitch: the artificial moment divided by
-the chassis' inertia term, the size of the angles, and their uncertainty. A true run, which only a virtual measurement
-has, adds damage and angle errors. Measured channels that are no inputs are compared with the run: error by frequency,
-damage, time of trust. A channel that disagrees rejects the run, whatever its other figures are.
+the inertia term (inertia of the rigid vehicle times the chassis' angular acceleration), the size of the angles, and
+their uncertainty. A true run, which only a virtual measurement has, adds damage and angle errors. Measured channels
+that are no inputs are compared with the run: error by frequency, damage, time of trust. A channel that disagrees
+rejects the run, whatever its other figures are.
 """
 
 import math
@@ -34,7 +35,7 @@ from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
 
 RUN_LIMITS = Limits(artificial_share=0.1)
-"""Default limits of the verdict. A stabilising moment of 5 Hz, which is 12 % of the chassis' inertia term, takes 5 %
+"""Default limits of the verdict. A stabilising moment of 5 Hz, which is 12 % of the inertia term, takes 5 %
 off the damage of engine mounts on a rough road; a moment of 0.7 Hz is 2 % of that term and takes 1 % off.
 """
 LARGEST_DISAGREEMENT = 0.15

@@ -18,8 +18,8 @@ class PathStatistics:
 
     moments, covariance : of the errors of all states at each row; fan : percentiles of the size of the pitch error;
     drift_off : tally of drift-off times (s), infinite for a path that never did; lost : number of paths that left all
-    bounds; steepest (rows,) : largest pitch (rad) among the other paths; first : arrays of the first ``saved_paths``
-    paths.
+    bounds; steepest (rows,) : largest magnitude of the pitch (rad) among the other paths; first : arrays of the first
+    ``saved_paths`` paths.
     """
 
     def __init__(self, true_states: np.ndarray, saved_paths: int) -> None:

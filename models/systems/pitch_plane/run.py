@@ -72,8 +72,8 @@ def run(
 
 
 def run_with_drift(scene: Scene, engine: str, error: bool = False) -> Result:
-    """Run a scene of a vehicle that may drift off: a result whose error is as large as its motion is returned, and no
-    RunFailed is raised.
+    """Run a scene of a vehicle that may drift off: a result whose error is as large as its motion is returned. Raises
+    RunFailed only where a run has no result.
     """
     try:
         return run(scene, engine, error=error)

@@ -121,7 +121,8 @@ def compare(
     """Run all stabilisers on all roads. Returns the benches, a row of figures for each run, and reasons of failed runs
     by name.
 
-    The first engine runs all stabilisers; the other engines run, on the scene's road, those that are accepted.
+    The first engine runs all stabilisers; the other engines run, on the scene's road, the free run and
+    those that are accepted.
     """
     options, failed, rows = options_of(scene, engines), dict[str, str](), list[Row]()
     benches = [Bench(on_road, road, options, folder, scene.error) for road, on_road in roads(scene, options).items()]
@@ -207,8 +208,8 @@ class Bench:
     def score(
         self, engine: str, other_engines: tuple[str, ...], failed: dict[str, str], progress: Progress
     ) -> list[Row]:
-        """Run all stabilisers in an engine, and the accepted ones in the other engines. Returns a row of figures per
-        run; reasons of failed runs are added to ``failed``.
+        """Run all stabilisers in an engine, and the free run and the accepted ones in the other engines. Returns a row
+        of figures per run; reasons of failed runs are added to ``failed``.
         """
         rows: list[Row] = []
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it

@@ -206,8 +206,8 @@ class TangentPath:
         return self.step * np.arange(self.steps + 1)
 
 
-def path_of(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> TangentPath:
-    """Returns the path of a free force-excited run, in steps of at most ``longest_duration`` (s). Raises ValueError for
+def path_of(assembly: Assembly, longest_step: float = LONGEST_STEP) -> TangentPath:
+    """Returns the path of a free force-excited run, in steps of at most ``longest_step`` (s). Raises ValueError for
     a run of another kind.
     """
     forces = assembly.input
@@ -215,7 +215,7 @@ def path_of(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> Tange
     if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
         raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
     samples = round(assembly.scene.run.duration / forces.period)
-    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest_duration - 1e-9)), samples)
+    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest_step - 1e-9)), samples)
 
 
 def tilt_error_columns(assembly: Assembly) -> np.ndarray:
@@ -272,14 +272,14 @@ class CovarianceOverTime:
         return np.sqrt(self.matrices[:, i, i])
 
 
-def covariance(assembly: Assembly, deviation: float, longest_duration: float = LONGEST_STEP) -> CovarianceOverTime:
+def covariance(assembly: Assembly, deviation: float, longest_step: float = LONGEST_STEP) -> CovarianceOverTime:
     """Covariance of the state along a free force-excited run under white noise on the wheel forces, of standard
     deviation ``deviation`` (N) per sample.
 
-    longest_duration : longest time step (s). Raises ValueError for any other run, and for spline interpolation of
+    longest_step : longest time step (s). Raises ValueError for any other run, and for spline interpolation of
     samples, as every sample of a spline acts on all periods.
     """
-    path = path_of(assembly, longest_duration)
+    path = path_of(assembly, longest_step)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
     return CovarianceOverTime(path.forces.period * np.arange(path.samples + 1), noise_covariances(path, deviation))

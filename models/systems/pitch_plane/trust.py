@@ -129,14 +129,14 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation_error_curve(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> GrowthCurve:
+def interpolation_error_curve(assembly: Assembly, longest_step: float = LONGEST_STEP) -> GrowthCurve:
     """Pitch error over time from the interpolation between force samples alone; 0 for a run with too few samples."""
-    path = path_of(assembly, longest_duration)
+    path = path_of(assembly, longest_step)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
 
 def model_error_curve(
-    assembly: Assembly, wrong_parameters: Parameters, longest_duration: float = LONGEST_STEP
+    assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_STEP
 ) -> GrowthCurve:
     """Pitch error over time of a run with ``wrong_parameters`` instead of the assembly's parameters.
 
@@ -148,9 +148,7 @@ def model_error_curve(
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _growth_by_parameters(
-        path_of(replace(assembly, parameters=mean), longest_duration), wrong_parameters=shifted
-    )
+    return _growth_by_parameters(path_of(replace(assembly, parameters=mean), longest_step), wrong_parameters=shifted)
 
 
 def _growth_by_parameters(

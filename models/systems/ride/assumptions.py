@@ -208,7 +208,7 @@ def _wave_assumptions(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Ass
 
 def tyre_mode_frequencies(vehicle: SpatialVehicle) -> tuple[float, float]:
     """Highest natural frequency (Hz) of motions that deform mostly the tyres, 0 if there are none, and lowest natural
-    frequency (Hz) of all motions, infinite if there are none.
+    frequency (Hz) of all oscillations, infinite if there are none.
     """
     still = replace(vehicle, side_forces=(), drags=(), limits=NO_LIMITS, gravity=0.0)
     linear, motion = linearise(still), Kinematics(still)

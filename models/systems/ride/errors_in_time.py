@@ -35,8 +35,8 @@ SPEED_BY_SPEED = ", each speed by itself"
 COPIES_ORDER = 4
 """Order of convergence of the copies' standard deviations, in the time step."""
 LEAST_ERROR_OF_NEGLECTED_SHARE = 0.25
-"""Least error of a standard deviation by statistical linearisation, divided by the share of its variance that gains
-neglect.
+"""Least relative error of a standard deviation by statistical linearisation, divided by the share of its variance that
+gains neglect.
 """
 
 DeviationsAtConstantSpeed = Callable[[int], np.ndarray]
@@ -53,7 +53,8 @@ def with_error_of_drive(
     quasi_stationary_of: DeviationsAtConstantSpeed,
 ) -> Result:
     """Returns the result of a drive with the errors of its standard deviations. They are estimated by the same drive in
-    longer steps, and by fewer speeds between which quasi-stationary deviations are interpolated.
+    longer steps, and by fewer speeds between which quasi-stationary deviations are interpolated
+    linearly.
 
     Longer steps end at ends of the drive's steps. Relative errors refer to the deviations, not to their change, which
     is 0 along a drive of constant speed. A drive of one step has no estimate.
@@ -127,7 +128,7 @@ def with_error_of_copies(
 
     Copies: the error of their time steps, from longer steps of some copies on the same roads, and the statistical
     error. Statistical linearisation: the difference from the copies at the same speeds, less the statistical error of
-    this difference, or a share of the variance that gains neglect where that is more.
+    this difference, or LEAST_ERROR_OF_NEGLECTED_SHARE of the variance that gains neglect where that is more.
     """
     first = next(iter(copies.values()))
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))

@@ -12,9 +12,13 @@ from models.vehicles.spatial import Freedom, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import slopes_at_rest
 
 LIGHT_BODY_SHARE = 0.2
-"""Largest mass of a light body, divided by the vehicle's mass; the mass of a light body can be left out."""
+"""Largest mass of a light body other than a wheel, divided by the vehicle's mass; the mass of a light body can be left
+out.
+"""
 SIMILAR_STIFFNESS_FACTOR = 2.0
-"""Largest ratio of two stiffnesses in a group of bushings that are made rigid together."""
+"""Largest ratio of two stiffnesses in a group of bushings that are made rigid together, and ratio of a bushing's to the
+softest stiffness between the same bodies that it must exceed.
+"""
 ALL_WHEELS = "mass of all wheels"
 TYRE_DAMPING = "tyre damping"
 """Names of effects to which other effects refer."""
@@ -26,8 +30,8 @@ reduced_further, on_road = ReducedScene.reduced_further, ReducedScene.on_road
 
 
 def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
-    """Returns all effects of a scene that can be left out, from vehicle, road and tables [effects.NAME], sorted by kind
-    of effect.
+    """Returns all effects of a scene that can be left out, from vehicle, road and tables [effects.NAME], sorted by the
+    names of their kinds.
     """
     system = scene.ride.system
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
@@ -106,7 +110,7 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
 
 def rigid_bushing_effects(scene: ReducedScene) -> list[Effect]:
     """Returns the effects that make bushings at wheels rigid, one per group of similar stiffness. Bushings are springs
-    that are stiffer than the softest spring between the same two bodies.
+    more than SIMILAR_STIFFNESS_FACTOR times as stiff as the softest spring between the same two bodies.
     """
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str | None], list[SpringDamper]](list)
     for spring in scene.vehicle.springs:

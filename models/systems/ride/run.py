@@ -112,12 +112,12 @@ def _deviations_by_speed(
     )
     if not error:
         return labelled
-    digit = (
+    matrix_accuracy = (
         MATRIX_ACCURACY
         if engine == "reference" or not any(spring.is_nonlinear for spring in vehicle.springs)
         else CORNERED_LAW_ACCURACY
     )
-    return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, digit)
+    return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, matrix_accuracy)
 
 
 def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:

@@ -30,15 +30,15 @@ TURNING_SLIP_WIDTH = 0.02
 class Axle(NamedTuple):
     """Tyres of an axle. stiffness : cornering stiffness divided by load (1/rad); friction : largest side force divided
     by load, mu; bend_sharpness : exponent n of the bend; side : share by which friction is larger in left turns and
-    smaller in right turns; downforce_coefficient : upward air force divided by speed squared (N s^2/m^2), above 0 it
-    lifts; rise : share e of the stiffness that remains beyond the bend.
+    smaller in right turns; lift_coefficient : upward air force divided by speed squared (N s^2/m^2), negative for
+    downforce; rise : share e of the stiffness that remains beyond the bend.
     """
 
     stiffness: float
     friction: float
     bend_sharpness: float
     side: float
-    downforce_coefficient: float
+    lift_coefficient: float
     rise: float
 
 
@@ -80,8 +80,8 @@ def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive
     base = car.front_arm + car.rear_arm
     weight, transferred_load, pressure = car.mass * GRAVITY, car.mass * rate * car.height / base, speed * speed
     load_f, load_r = weight * car.rear_arm / base, weight * car.front_arm / base
-    load_f = max(load_f - transferred_load - front.downforce_coefficient * pressure, LEAST_LOAD * load_f)
-    load_r = max(load_r + transferred_load - rear.downforce_coefficient * pressure, LEAST_LOAD * load_r)
+    load_f = max(load_f - transferred_load - front.lift_coefficient * pressure, LEAST_LOAD * load_f)
+    load_r = max(load_r + transferred_load - rear.lift_coefficient * pressure, LEAST_LOAD * load_r)
     forward = car.mass * rate + car.drag * pressure
     forward_front = (car.front_driving_share if forward > 0.0 else car.front_braking_share) * forward
     angle_f = (motion[0] + car.front_arm * motion[1]) / speed - steer
@@ -106,8 +106,8 @@ def motion_rates(
     car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]
 ) -> tuple:
     """Rates of the lateral velocity (m/s^2) and of the yaw rate (rad/s^2) of the single-track car."""
-    loads = forces(car, front, rear, motion, drive)
-    return loads[0] / car.mass - drive[1] * motion[1], loads[1] / car.inertia
+    resultants = forces(car, front, rear, motion, drive)
+    return resultants[0] / car.mass - drive[1] * motion[1], resultants[1] / car.inertia
 
 
 @compiled
@@ -141,7 +141,7 @@ def motion_reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion
     """
     table = np.empty((len(inputs), 7))
     for i in range(len(inputs)):
-        loads = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (inputs[i, 0], inputs[i, 1], inputs[i, 2]))
-        table[i, 0] = loads[0] / car.mass
-        table[i, 1:] = loads[2:]
+        resultants = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (inputs[i, 0], inputs[i, 1], inputs[i, 2]))
+        table[i, 0] = resultants[0] / car.mass
+        table[i, 1:] = resultants[2:]
     return table

@@ -8,9 +8,7 @@ from models.systems.wheel_rail.scene import WheelRailScene
 
 
 def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
-    """Raise InputError, before any file is written, for profile files that contain no profile and for materials that
-    differ too much.
-    """
+    """Raise InputError, before any file is written, for profile files that contain no profile."""
     for case in scene.cases.values():
         _ = scene.contact(case).material_pair.G
 

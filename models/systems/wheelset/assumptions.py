@@ -26,7 +26,7 @@ LARGEST_YAW = 0.05
 CLIMBING_DISTANCE = 2e-3
 """Distance (m) of a contact from the flange's tip at which a wheel has climbed, as in the table of contacts."""
 LEAST_FRICTION = 0.02
-"""Coefficient of friction below which creep forces are too small for eigenvalues to mean anything."""
+"""Coefficient of friction below which wheels slide instead of creep, so that eigenvalues mean nothing."""
 
 
 def assumptions(equations: Equations) -> list[Assumption]:

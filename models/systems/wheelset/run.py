@@ -230,8 +230,8 @@ def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
-    """Returns a speed (m/s) just above the bifurcation at which the branch begins, at most the scene's last speed;
-    without a branch that last speed.
+    """Returns 1.1 times the speed (m/s) at which the branch begins, at most the scene's last speed; without a branch
+    that last speed.
     """
     last_speed = float(scene.speeds.all().max())
     return min(last_speed, round(SPEED_SHARES[1] * orbits[0].speed, 2)) if orbits else last_speed

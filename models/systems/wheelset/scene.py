@@ -61,8 +61,8 @@ class RunTable(Strict):
 class ConicityTable(Strict):
     """[conicity]: amplitudes at which the equivalent conicity is computed, and the profiles of the wheels.
 
-    A table of rolling radius differences replaces the scene's cones or profiles. Without a table the right wheel has
-    the scene's shape and radius, and so has the left wheel unless it is named here.
+    A table of rolling radius differences replaces the scene's cones or profiles. Without a table both wheels have
+    the scene's shape and radius, except a radius of either wheel, or a left wheel or rail, that is named here.
     """
 
     amplitudes: list[float] = Field(

@@ -72,8 +72,8 @@ filter has 1; a filter that trusts a model with 5 % wrong inertia has 1.1 to 1.3
 
 
 class Parameters(Strict):
-    """[effects.kalman_filter]: measured pitch and pitch rate, deviations of their noise, and bandwidth of the moment
-    towards the estimate.
+    """[effects.kalman_filter]: measured pitch, pitch rate or both, deviation of the noise of each measured column,
+    and bandwidth of the moment towards the estimate.
     """
 
     file: str = Field(
