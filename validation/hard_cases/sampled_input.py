@@ -46,9 +46,9 @@ def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_p
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
     impulse_so_far = np.concatenate(([0.0], np.cumsum(total[:-1] * sample_period)))
-    noise_impulse_error = impulse_so_far if forces.held else impulse_so_far + sample_period * (total - total[0]) / 2
-    truth = masses.sum() * p.g * sample_period * np.arange(len(values)) - noise_impulse_error
-    return largest_magnitude(path.states[::stride, 4:7] @ masses - truth) / largest_magnitude(noise_impulse_error)
+    impulse = impulse_so_far if forces.held else impulse_so_far + sample_period * (total - total[0]) / 2
+    truth = masses.sum() * p.g * sample_period * np.arange(len(values)) - impulse
+    return largest_magnitude(path.states[::stride, 4:7] @ masses - truth) / largest_magnitude(impulse)
 
 
 def ramp_momentum_error(engine: str, folder: Path) -> float:
