@@ -72,8 +72,8 @@ def ramp_naive(folder: Path) -> str:
 
 
 def noise_impulse_error(engine: str, folder: Path) -> float:
-    """Case: noisy wheel forces, held or interpolated between samples, with two steps per sample. Error: of the momentum
-    that the forces give the body, see ``momentum_error``."""
+    """Case: noisy wheel forces, held or interpolated between samples, with two steps per sample. Error: the larger
+    ``momentum_error`` of the two."""
     values = 3800.0 + 800.0 * np.random.default_rng(3).standard_normal((251, 2))
     return max(momentum_error(engine, rule, values, 2e-3, 1e-3) for rule in ("held", "linear"))
 
