@@ -119,8 +119,8 @@ def _error_row(
     compute_error: Callable[[], float],
     independence: Independence,
 ) -> Row:
-    """Row that compares the value of ``error`` with its bound; if the check raises, the row is failed and holds the
-    message of the exception."""
+    """Row that compares the value of ``compute_error`` with its bound; if the check raises, the row is failed and holds
+    the message of the exception."""
     try:
         return Observed(id, SYSTEM, quantity, compute_error(), unit).at_most(bound, tolerance_reason, independence)
     except (InputError, RunFailed) as reason:

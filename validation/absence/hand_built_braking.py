@@ -394,7 +394,8 @@ def tyre_forces(path: BrakingPath) -> np.ndarray:
 
 def largest_difference(stop: BrakingPath, by_hand: BrakingPath) -> float:
     """Largest difference between two stops among states (m, rad, m/s, rad/s), wheel speeds (rad/s), and tyre forces,
-    pressures and torques. Forces, pressures and torques are divided by their largest values by hand."""
+    pressures and torques. Forces, pressures and torques are divided by their largest values in the hand-written
+    stop."""
     shares = [
         np.abs(values - other_values).max() / np.abs(other_values).max()
         for values, other_values in (

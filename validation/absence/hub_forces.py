@@ -57,10 +57,11 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
     hub_inputs = measurement.hub_inputs(scene.stabilise.method, step, STEP_COUNT)
     model = build(engine, measurement.vehicle, hub_inputs, step, scene.run.duration)
     head = model.numbers
-    sample_inputs = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
+    # One sample period in half steps.
+    period_inputs = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]
     curved = (
         not hub_inputs.constant_in_step
-        and np.abs(np.diff(sample_inputs, n=2, axis=0)).max() > 1e-9 * np.abs(sample_inputs).max()
+        and np.abs(np.diff(period_inputs, n=2, axis=0)).max() > 1e-9 * np.abs(period_inputs).max()
     )
     noisy_forces, noisy_angles = _noisy_columns(measurement)
     counts = {

@@ -23,7 +23,7 @@ from validation.adams_joints.spring_kernel import set_spring_forces, spring_forc
 LEAST_COSINE = 0.05
 """Least cosine of the second hinge's angle, of three hinges in a row, anywhere on the path."""
 START_VELOCITY_TOLERANCE = 1e-9
-"""Largest start velocity (m/s, rad/s) that the joint does not allow."""
+"""Largest component (m/s, rad/s) of the start velocity that may remain outside the joints' freedom."""
 BODY_NAME = "body"
 
 

@@ -64,13 +64,13 @@ def mirrored_truck_error(implementation: str, folder: Path) -> float:
 
 
 def lifting_truck_error(implementation: str, folder: Path) -> float:
-    """Case: a truck as high as it is long brakes on dry road; the run must be refused. Error: infinite if it is not."""
+    """Case: a truck as high as it is long brakes on dry road; the run must fail. Error: infinite if it does not."""
     AdvancedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0).advance_with(np.full((101, 4), 2e4))
     return np.inf
 
 
 def overturning_truck_error(implementation: str, folder: Path) -> float:
-    """Case: a truck twice as high as it is wide steers on dry road; the run must be refused. Error: infinite if it is
+    """Case: a truck twice as high as it is wide steers on dry road; the run must fail. Error: infinite if it does
     not."""
     AdvancedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).advance_with(np.zeros((201, 4)))
     return np.inf

@@ -287,10 +287,10 @@ def _same_pendulum_rows(family: str, mechanism: Mechanism, output: OutputFile, r
     """
     hinge, back = read_output(revolute_file), Rotation.from_euler("z", -REVOLUTE_ANGLES[family], degrees=True)
     motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
-    position_error, force = hinge.columns["Pos"], hinge.columns["Rforce"]
-    off = float((np.abs(back.apply(motion.position) - position_error) - hinge.rounding_error("Pos")).max())
+    file_position, force = hinge.columns["Pos"], hinge.columns["Rforce"]
+    off = float((np.abs(back.apply(motion.position) - file_position) - hinge.rounding_error("Pos")).max())
     pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding_error("Rforce")).max())
-    files = np.abs(back.apply(output.columns["Pos"]) - position_error).max(axis=1)
+    files = np.abs(back.apply(output.columns["Pos"]) - file_position).max(axis=1)
     since = output.times[np.argmax(files > POSITION_BOUND)]
     why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
     hinged = f"{family}: %s beside the other code's file of the same pendulum on a hinge, reference"

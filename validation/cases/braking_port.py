@@ -97,7 +97,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     told = [_process_outcome(kind, folder) for kind in (QUICK_FAULTS if quick else PROCESS_FAULTS)]
     told += [_class_outcome(kind, folder) for kind in (("catches everything",) if quick else CLASS_FAULTS)]
     told += [] if quick else [_fmu_outcome(kind, folder) for kind in FMU_FAULTS]
-    return rows + [row for way_name in told for row in _fault_rows(way_name)], {"costs": costs, "faults": told}
+    return rows + [row for outcome in told for row in _fault_rows(outcome)], {"costs": costs, "faults": told}
 
 
 def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:

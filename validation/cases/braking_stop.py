@@ -104,9 +104,7 @@ def _errors_over_step(surface: str, slip: float, speed: float, steps: tuple[floa
     return {
         "exact": true,
         "steady": steadily / (FRONT_WHEEL.mass * speed**2 / (2.0 * force)) - 1.0,
-        "errors": {
-            key: [(scheme_name / true - 1.0, left) for scheme_name, left in ends] for key, ends in distances.items()
-        },
+        "errors": {key: [(distance / true - 1.0, left) for distance, left in ends] for key, ends in distances.items()},
         "at": steps.index(PAPER_STEP),
     }
 

@@ -60,7 +60,8 @@ class JudgedChoice:
 
     @property
     def is_honest(self) -> bool:
-        """False if the choice claims to keep the tolerance although frequency responses show that it does not."""
+        """False if the choice claims to keep the tolerance although frequency responses or, without them, its own
+        confirmed changes show that it does not."""
         changes = self.choice.confirmed_change if self.frequency_changes is None else self.frequency_changes
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 

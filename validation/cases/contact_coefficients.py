@@ -219,7 +219,10 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     rows = tuple(
         (
             f"{node[0]:.4g}",
-            *(f"{value:.4g} ({100 * part_name:+.2f} %)" for value, part_name in zip(node[2:], parts, strict=True)),
+            *(
+                f"{value:.4g} ({100 * relative_error:+.2f} %)"
+                for value, relative_error in zip(node[2:], parts, strict=True)
+            ),
         )
         for node, parts in zip(some, relative_deviations(some), strict=True)
     )
@@ -237,7 +240,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
     c = coefficients(ratio, 0.25)
-    solved = np.array([row for part_name in case_data.values() for row in part_name])
+    solved = np.array([row for solved_rows in case_data.values() for row in solved_rows])
     quarter = solved[np.abs(solved[:, 1] - 0.25) < 0.04]
     for i, (name, curve) in enumerate(zip(COEFFICIENT_NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
         left.loglog(ratio, curve, color=f"C{i}", label=name)

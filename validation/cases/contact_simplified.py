@@ -313,13 +313,13 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     rows = tuple(
         (
             name,
-            fitting_options,
+            variant,
             *(signed(100.0 * errors[key]) for key in ("approach", "area", "peak")),
             f"{errors['force']:.1f}",
             f"{errors['force_max']:.1f}",
         )
         for name, case in case_data["shapes"].items()
-        for fitting_options, errors in case["ways"].items()
+        for variant, errors in case["ways"].items()
     )
     note = (
         f"Errors against the exact contact on {EXACT_CELLS} x {EXACT_CELLS} cells. Forces: mean and largest over "
@@ -407,13 +407,10 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         }.items(),
         strict=True,
     ):
-        for fitting_options, mark in (("elliptic", "o"), ("paper", "x")):
+        for variant, mark in (("elliptic", "o"), ("paper", "x")):
             scale = 1.0 if key == "force" else 100.0
             axis.plot(
-                [scale * case["ways"][fitting_options][key] for case in shapes.values()],
-                shape_positions,
-                mark,
-                label=fitting_options,
+                [scale * case["ways"][variant][key] for case in shapes.values()], shape_positions, mark, label=variant
             )
         axis.axvline(0.0, color="0.7", linewidth=0.8)
         axis.set_xlabel(label)

@@ -267,7 +267,7 @@ def _engine_rows_and_times(
     engine."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
-    seconds_by_method: dict[str, Callable[[], Arrays]] = {
+    jobs_by_method: dict[str, Callable[[], Arrays]] = {
         "mujoco, 1 thread": lambda: run_paths(single, path_count),
         "mujoco, 2 threads": lambda: run_paths(two, path_count),
         "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(
@@ -275,7 +275,7 @@ def _engine_rows_and_times(
         ),
     }
     rows, prices = [], {}
-    for method_name, job in seconds_by_method.items():
+    for method_name, job in jobs_by_method.items():
         start = time.perf_counter()
         paths = job()
         prices[method_name] = (time.perf_counter() - start) / (path_count * (len(truth) - 1))

@@ -82,9 +82,9 @@ def _consistency_rows(folder: Path, run_count: int, duration: float, filter_name
         {name: np.concatenate([consistent[j] for consistent in some]) for name, some in by_filter.items()}
         for j in (0, 1)
     )
-    run_scores, every = f"{run_count} runs, once a second", f"{run_count} runs, all innovations"
+    runs_text, every = f"{run_count} runs, once a second", f"{run_count} runs, all innovations"
     rows = [
-        _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, run_scores),
+        _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, runs_text),
         _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
         *_inconsistency_rows([consistent[2] for consistent in by_filter["right"]]),
     ]

@@ -59,12 +59,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
     data: dict[str, Any] = {
-        "A-2": [_table_of_patches(position_seconds) for position_seconds in placed],
+        "A-2": [_table_of_patches(placement) for placement in placed],
         "published": published.tolist(),
     }
     if not quick:
         static, each_still = _timed_positions("A-1", PUBLISHED_CONTACT[::2, 0])
-        data["A-1"] = [_table_of_patches(position_seconds) for position_seconds in static]
+        data["A-1"] = [_table_of_patches(placement) for placement in static]
         rows += [
             *_first_contact_rows(static),
             *_load_share_rows(placed[10]),
@@ -254,7 +254,7 @@ def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
             f"manchester.files.{name}",
             SYSTEM,
             f"{name}: largest difference of {words}",
-            max(placement[k] for placement in off),
+            max(differences[k] for differences in off),
             unit,
         ).at_most(bound, "the bound asked for", "published")
         for name, (unit, bound, k) in names.items()

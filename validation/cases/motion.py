@@ -352,8 +352,8 @@ def _symmetric_part_rows(curves: Saved, quick: bool) -> list[Row]:
         NOISE_DEVIATION * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
     )
     late, early = (
-        float(np.sqrt(np.mean(covariance_part)))
-        for covariance_part in (squares[-count // 3 :], squares[count // 6 : count // 3])
+        float(np.sqrt(np.mean(squares_part)))
+        for squares_part in (squares[-count // 3 :], squares[count // 6 : count // 3])
     )
     why = (
         f"{paths} paths of {SAMPLE_PERIOD * (count - 1):g} s, {NOISE_DEVIATION:g} m/s^2 at 100 Hz; filterpy's extended "

@@ -98,9 +98,7 @@ def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
         "real time": speed.real_time_factors(road, duration, twice, least),
     }
     settings = dict.fromkeys(
-        _setting_at_1_ms(problem_rows)
-        for problem_rows in road_excited.settings(quick)
-        if problem_rows.method != "DVERK6"
+        _setting_at_1_ms(setting) for setting in road_excited.settings(quick) if setting.method != "DVERK6"
     )
     return rows + split.rows(data["split"]) + _force_call_rows([*settings], road) + _speed_rows(data), data
 
@@ -176,7 +174,7 @@ def _force_call_rows(settings: list[Setting], assembly: Assembly) -> list[Row]:
                 f"price.road.counts.{engine}",
                 SYSTEM,
                 what,
-                max(abs(outside - quantity) for outside, quantity in pairs),
+                max(abs(outside - stated) for outside, stated in pairs),
                 "calls",
             ).within(
                 0,

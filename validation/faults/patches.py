@@ -47,7 +47,8 @@ def _owner_and_name(path: str) -> tuple[Any, str]:
 
 
 def with_globals(function: Callable[..., Any], **other_globals: Any) -> Callable[..., Any]:
-    """A copy of a function in which some of its module's global names are replaced."""
+    """A copy of a function in which some of its module's global names are replaced. Raises AttributeError for a name
+    that the module does not have."""
     if unknown := other_globals.keys() - function.__globals__.keys():
         raise AttributeError(f"{function.__module__} has no {', '.join(sorted(unknown))}")
     return FunctionType(function.__code__, function.__globals__ | other_globals, function.__name__)

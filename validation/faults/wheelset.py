@@ -193,17 +193,17 @@ def contact_point_patch(change: Callable[[Any], None]) -> Patch:
     return plain_python_patch(contact_points=contact_points)
 
 
-def multiplied_field(name: str, factor: float, field_index: int = 0) -> Callable[..., None]:
-    """Returns a function that multiplies a field of its argument number ``field_index``, an array of records, by a
+def multiplied_field(name: str, factor: float, argument_index: int = 0) -> Callable[..., None]:
+    """Returns a function that multiplies a field of its argument number ``argument_index``, an array of records, by a
     factor."""
 
     def change(*arrays: Any) -> None:
-        arrays[field_index][name] *= factor
+        arrays[argument_index][name] *= factor
 
     return change
 
 
-spin_reversed = multiplied_field("turn", -1.0, field_index=1)
+spin_reversed = multiplied_field("turn", -1.0, argument_index=1)
 
 
 def _mean_load_on_both_wheels(contacts: Any, slip: Any) -> None:

@@ -37,10 +37,10 @@ def released_wheelset_case(speed: float = 60.0, yaw: float = 0.0, **changed: flo
     and yaw (m, rad) from a run with a quarter of the step."""
 
     def error(implementation: str, folder: Path) -> float:
-        released_wheelset_case = built_wheelset(implementation, CHOSEN_WHEELSET.changed(**changed), speed)
-        start = released_wheelset_case.displaced_state(5e-3)
+        equations = built_wheelset(implementation, CHOSEN_WHEELSET.changed(**changed), speed)
+        start = equations.displaced_state(5e-3)
         start[3] = yaw
-        ends = [released_wheelset_case.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
+        ends = [equations.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
         return float(np.abs(ends[1] - ends[0])[[0, 3]].max())
 
     return error

@@ -38,8 +38,8 @@ Change = Callable[[dict[str, Any]], object]
 
 
 def damped_tyre_error(implementation: str, folder: Path) -> float:
-    """Error of the body's variances with a damped tyre, against quadrature; infinite unless the tyre force is reported
-    as infinite."""
+    """Relative error of the first two outputs' variances with a damped tyre, against quadrature; infinite unless only
+    the tyre force is reported as infinite."""
     vehicle, road = (
         linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), implementation),
         one_track((0.0,), 0.3),

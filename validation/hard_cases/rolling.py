@@ -27,7 +27,7 @@ HEAVY_WHEELSET = FREE_WHEELSET.changed(mass=8000.0, spin_inertia=2500.0, yaw_ine
 """Wheelsets without suspension, the second so heavy that it is stable at standstill in steps of 0.08 ms."""
 STEEP_WHEELSET = CHOSEN_WHEELSET.changed(conicity=0.5)
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
-"""Signs of a state's entries in the mirror image of a wheelset."""
+"""Signs of a state's entries in the mirror image of a wheelset, left and right exchanged; its spin does not change."""
 
 
 def built_wheelset(
