@@ -3,9 +3,9 @@
 Two kinds of figures are kept apart, because an engineer has only one of them.
 
 `RunFigures` needs the run alone: the artificial moment, that is the part of I pitch'' that no suspension force
-explains, and what the run cost. `Errors` needs the true run, which only a virtual measurement has: pseudo-damage of the
-body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among them as a
-warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good."""
+explains, and what the run cost. `RunErrors` needs the true run, which only a virtual measurement has: pseudo-damage of
+the body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among them
+as a warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -329,7 +329,8 @@ def _answers_of_blocks(
 def _may_begin(
     i: int, waiting: dict[Future, tuple[int, T]], single_blocks: Collection[tuple[int, T]], ahead: int
 ) -> bool:
-    """Whether a block may be started now: fewer than ``ahead`` are running, and it is not too far ahead."""
+    """Whether block ``i`` may be started now: fewer than ``ahead`` are running, and it is less than ``ahead`` after the
+    first unfinished one."""
     first = min((other_index for other_index, _ in (*waiting.values(), *single_blocks)), default=i)
     return len(waiting) < ahead and i < first + ahead
 

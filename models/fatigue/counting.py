@@ -59,7 +59,7 @@ def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Number of upward crossings of each level (l,), in any order, by a load (n,) or its turning points; raises
-    InputError for a level that is NaN."""
+    InputError for a level that is NaN, and as ``counted_load``."""
     load, given_levels = checked_load(load), np.asarray(levels, float)
     if np.isnan(given_levels).any():
         raise InputError("", "levels", None, "must be numbers")
