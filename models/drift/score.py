@@ -91,9 +91,9 @@ class RunErrors:
 
     Attributes
     ----------
-    damage : pseudo-damage by the true one, per body-frame section force (models/drift/section_forces.py), with the
+    damage : pseudo-damage divided by the true one, per body-frame section force (``section_forces``), with the
         exponent and the residue convention of models/fatigue/damage.py
-    force_rms : rms error of each in N
+    force_rms : rms error of each section force in N
     vertical_damage : the same ratio for the vertical forces f3, f4: blind to the pitch, never judged
     pitch_max, pitch_rms : pitch error in rad; heave_max : error of the chassis' heave in m
     """

@@ -174,7 +174,7 @@ def each_block(
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
-    (``process_pool``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
+    (``process_pool``), a Dask cluster (``dask_workers``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
     that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement : (paths,
     reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.

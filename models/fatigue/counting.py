@@ -22,8 +22,8 @@ value."""
 class CountedLoad:
     """Results of fatigue counting of one load: pseudo-damage, level crossings, range pairs.
 
-    damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
-    least that range; smallest_load, largest_load : the load's extremes; mean.
+    damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs_of_range (r,)
+    with at least that range; smallest_load, largest_load : the load's extremes; mean.
     """
 
     damage: dict[float, float]
