@@ -298,7 +298,7 @@ def _answers_of_blocks(
     job: Callable[[T], Arrays], unfinished_blocks: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
 ) -> Generator[tuple[int, T, Arrays | _Failure]]:
     """Generator of blocks and their results or failures, in order of completion; at most ``ahead`` blocks are computed
-    at once, and none is begun more than ``ahead`` after the first unfinished one."""
+    at once, and none is begun ``ahead`` or more after the first unfinished one."""
     if executor is None:
         yield from ((i, block, _compute_block(job, block)) for i, block in unfinished_blocks)
         return
