@@ -60,8 +60,8 @@ class Assumption:
 
 @dataclass(frozen=True)
 class BrokenAssumption:
-    """A violated assumption: ``where`` (wheel, strut or joint), the share of time, the time of the first violation (s),
-    and the worst value.
+    """A violated assumption: ``where`` (such as a wheel, strut or joint), the share of time, the time of the first
+    violation (s), and the worst value.
 
     law : by which the share is told where no values over time are known; the worst value then is three deviations off.
     """

@@ -179,10 +179,10 @@ def _head_in_line(
         if not (len(cells) >= len(names) >= len(without_empty_end(cells))):
             return None
         if is_number(cells[first_known]) or CLOCK_TIME_PATTERN.fullmatch(cells[first_known]):
-            cells_above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
+            lines_above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
             first = lines[j]
             return TableHead(
-                lines[i], separator, tuple(names), len(cells), cells_above, between, first.first_byte, first.number - 1
+                lines[i], separator, tuple(names), len(cells), lines_above, between, first.first_byte, first.number - 1
             )
         if any(is_number(cell) or is_known_heading(cell) for cell in cells):
             return None

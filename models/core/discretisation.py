@@ -393,7 +393,7 @@ def with_sampling_error(run: Result, estimates: Mapping[str, Estimate], samples:
 
 
 def sampling_error(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
-    """The standard error of an ensemble mean as an ``Estimate``; its ``step`` is the number of samples that would
+    """The standard error of an ensemble's result as an ``Estimate``; its ``step`` is the number of samples that would
     reduce the share to WARNED_SHARE."""
     share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = samples * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf

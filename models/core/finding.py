@@ -47,7 +47,7 @@ def finding_lines(findings: Iterable[Finding]) -> list[str]:
 
 def merged_findings(findings: Iterable[Finding]) -> list[Finding]:
     """The findings, but where more than LISTED_FINDINGS share check and severity, only the one of largest size, with
-    the number of all of them."""
+    the number of channels or places concerned."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)

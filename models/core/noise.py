@@ -54,7 +54,7 @@ def _whole_number(name: str, number: int) -> int:
 
 def normal_samples(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
     """Standard normal samples (count, channels) of the noise stream (seed, path, source), from sample ``first`` on;
-    raises InputError for negative counts."""
+    raises InputError for negative counts, and as ``normal_block``."""
     if min(count, first) < 0:
         raise InputError("", "count, first", (count, first), "must be 0 or more")
     start, end = first // SAMPLES_PER_BLOCK, -(-(first + count) // SAMPLES_PER_BLOCK)

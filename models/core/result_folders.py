@@ -31,7 +31,7 @@ def new_folder(requested_folder: Path | None, name: str) -> Path:
 
 
 def check_unused(requested_folder: Path) -> None:
-    """InputError if the path is a file, or a folder that holds anything or cannot be read; nothing is made."""
+    """Raise InputError if the path is a file, or a folder that holds anything or cannot be read; nothing is made."""
     try:
         if requested_folder.exists() and not requested_folder.is_dir():
             raise InputError("--out", "", str(requested_folder), "is a file: name a folder")

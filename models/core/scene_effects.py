@@ -9,7 +9,7 @@ of its ``TABLE``; an effect with physics or code of its own has a file, which no
 
 A scene names it in one of two ways. Either by a table [effects.NAME]: then the file has ``Parameters``, ``EXAMPLE``, a
 table of usual values, and ``extend(built, parameters)``, which puts it into what its system builds. Or by the system's
-own tables: then the file has ``PLACE``, the key that names it, ``named_effects(scene)``, and two edits of the scene's
+own tables: then the file has ``PLACE``, the key that names it, ``named(scene)``, and two edits of the scene's
 table, ``leave_out(table, scene)`` and, if there are usual values, ``put_in(table, scene)``; both raise InputError with
 the remedy where it cannot be. Where an effect is a choice of method, to leave it out is the next cheaper one.
 """
@@ -344,7 +344,8 @@ def _dependency_depth(name: str, system: str) -> int:
 
 
 def with_effects(scene: Any, *added_effects: str) -> Any:
-    """The scene with the given effects added at their usual values; InputError if an effect cannot be added."""
+    """The scene with the given effects added at their usual values; InputError if an effect cannot be added, or takes
+    no part with these values."""
     table = table_without_defaults(scene)
     for name in added_effects:
         _put_in(table, name, scene)

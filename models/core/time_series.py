@@ -39,8 +39,8 @@ def read_time_series(
 
 
 def wrong_time_unit_hint(duration: float, needed_duration: float) -> str:
-    """Hint that the times of a file may be in milliseconds, if the file lasts (s) a hundredth of the needed time (s) or
-    less; else empty."""
+    """Hint that a file's times may be in seconds, not in milliseconds as their heading says, if the file lasts (s) less
+    than a hundredth of the needed time (s); else empty."""
     wrong = duration < needed_duration / SHORT_TIME_SHARE
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 

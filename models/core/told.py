@@ -23,7 +23,8 @@ def message_lines(results: Results) -> list[str]:
 
 
 def _error_lines(results: Results) -> list[str]:
-    """Printed lines on the errors of results: one by one for few results, else the largest error only."""
+    """Printed lines on the errors of results: one by one for few results, else the largest error, the names of
+    the results with a warning, and the lines of those without an estimate."""
     if len(results) <= LISTED_RESULTS:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
     results_without_estimate: dict[str, list[str]] = {}

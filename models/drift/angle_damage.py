@@ -21,14 +21,14 @@ EVEN_SPACING_ANGLE = 1e-3
 """Angle error (rad) below which the nodes are evenly spaced; above it their spacing grows with the angle."""
 
 UnitErrorPaths = tuple[np.ndarray, np.ndarray]
-"""Angle error paths (samples, seconds + 1) with a value per second: of a random walk of 1 rad per sqrt(s), and of a
+"""Angle error paths (paths, seconds + 1) with a value per second: of a random walk of 1 rad per sqrt(s), and of a
 gyro bias of 1 rad/s."""
 
 
 def unit_angle_error_paths(
     path_count: int, rate: int, length: int, correlation_time: float, seed: int
 ) -> UnitErrorPaths:
-    """Random angle error paths of a gyro of unit grade, two arrays (samples, length + 1) with a value per second: by
+    """Random angle error paths of a gyro of unit grade, two arrays (path_count, length + 1) with a value per second: by
     white noise and by bias. They sum ``rate`` noise samples per second over ``length`` (s); the bias has a correlation
     time (s).
 
@@ -76,7 +76,7 @@ def rotated_to_maximum(load: np.ndarray) -> np.ndarray:
 
 
 def damage_errors(curve: CubicSpline, angles: np.ndarray) -> np.ndarray:
-    """Relative error (samples, 4) of the damage of each section force, averaged over angle error paths (samples, n) in
+    """Relative error (paths, 4) of the damage of each section force, averaged over angle error paths (paths, n) in
     rad; ``curve`` is from ``log_damage_over_pitch_error``."""
     reach = curve.x[-1]
     return np.expm1(curve(np.clip(angles, -reach, reach))).mean(axis=1)

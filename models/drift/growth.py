@@ -131,8 +131,8 @@ def sinh_law_rate(
     times = sample_period * np.arange(len(pitch_rate))
     squares = rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff))
 
-    def weighted(rates: np.ndarray) -> np.ndarray:
-        second, third, fourth = (np.cumsum(rates * times**power) for power in (2, 3, 4))
+    def weighted(samples: np.ndarray) -> np.ndarray:
+        second, third, fourth = (np.cumsum(samples * times**power) for power in (2, 3, 4))
         return 3 * times**2 * second - 4 * times * third + fourth
 
     scaled = np.zeros(len(times))

@@ -3,9 +3,9 @@
 Two kinds of figures are kept apart, because an engineer has only one of them.
 
 `RunFigures` needs the run alone: the artificial moment, that is the part of I pitch'' that no suspension force
-explains, and what the run cost. `Errors` needs the true run, which only a virtual measurement has: pseudo-damage of the
-body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among them as a
-warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good."""
+explains, and what the run cost. `RunErrors` needs the true run, which only a virtual measurement has: pseudo-damage of
+the body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among them
+as a warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -91,9 +91,9 @@ class RunErrors:
 
     Attributes
     ----------
-    damage : pseudo-damage by the true one, per body-frame section force (models/drift/section_forces.py), with the
+    damage : pseudo-damage divided by the true one, per body-frame section force (``section_forces``), with the
         exponent and the residue convention of models/fatigue/damage.py
-    force_rms : rms error of each in N
+    force_rms : rms error of each section force in N
     vertical_damage : the same ratio for the vertical forces f3, f4: blind to the pitch, never judged
     pitch_max, pitch_rms : pitch error in rad; heave_max : error of the chassis' heave in m
     """

@@ -56,7 +56,7 @@ class Assembly:
         return PRESCRIBED_COORDINATES.get(self.mode, ())
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
-        """A copy of the assembly in another ``mode`` that is driven by ``signal``."""
+        """A copy of the assembly in the mode ``mode``, driven by ``signal``."""
         return replace(self, mode=mode, input=signal)
 
     def with_moment(self, signal: Signal) -> "Assembly":

@@ -8,10 +8,10 @@ positions and rates in, forces added, one compiled function that finds all numbe
 nowhere.
 
 Speed
-    Creepages are the velocity of slip by |V|, or by REGULAR = 0.1 m/s where |V| is less, zero included: a wheel at
-    rest is held by friction as by a damper. A wheel that rolls backwards is the mirror image of one that rolls
-    forwards; from REGULAR to -REGULAR the two are mixed, so that the forces are continuous through V = 0 and have no
-    power of their own.
+    Creepages are the velocity of slip by |V|, or by REGULARISED_SPEED = 0.1 m/s where |V| is less, zero included: a
+    wheel at rest is held by friction as by a damper. A wheel that rolls backwards is the mirror image of one that rolls
+    forwards; from REGULARISED_SPEED to -REGULARISED_SPEED the two are mixed, so that the forces are continuous through
+    V = 0 and have no power of their own.
 Steps
     Creep forces damp like G a b C / V by mass: 10^4 1/s at 1 m/s, 10^5 1/s at 0.1 m/s and below. Explicit methods need
     steps shorter than about 2 by that, and a longer one is refused before the run, as friction keeps its nonsense
@@ -136,7 +136,8 @@ class Wheels:
         return replace(self, theory="linear").numbers
 
     def state(self, seed: int = 8) -> tuple[Array, Array]:
-        """Random positions and rates (size,) with creepages at which the wheels begin to slide."""
+        """Random positions and rates (size,) with creepages about as large as those at which the wheels begin to
+        slide."""
         draw = np.random.default_rng(seed)
         q = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [1e-4, 1e-4, 5e-6, 1e-3]
         v = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [0.02, 0.02, 1e-3, 0.5]

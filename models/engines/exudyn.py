@@ -208,8 +208,8 @@ def _add_load(build: PitchPlaneBuild, coordinate: tuple[str, str], function: Any
 
 
 def _add_body_fixed_force(build: PitchPlaneBuild, wheel: str, x: float, force: Reader) -> None:
-    """Apply a wheel force f along the chassis' vertical axis: f cos(pitch) on the wheel, f x sin(pitch)^2 on the
-    chassis."""
+    """Apply a wheel force f (up) along the chassis' vertical axis: the force f cos(pitch) on the wheel, and the pitch
+    moment f x sin(pitch)^2 on the chassis."""
     node = build.nodes["chassis"]
 
     def pitch(mbs: Any) -> float:

@@ -83,8 +83,8 @@ def item_counts(mbs: Any) -> Sequence[str]:
 
 
 def items_with_functions(mbs: Any) -> tuple[str, ...]:
-    """Names of the items that an exported script lacks because their law is a function, or whose added force it
-    lacks."""
+    """Names of the items that an exported script lacks because their law is a function, and of those whose added force
+    it lacks."""
     writer, data = _Writer(mbs), mbs.systemData
     places = [("object", i) for i in range(data.NumberOfObjects())] + [("load", i) for i in range(data.NumberOfLoads())]
     acting = (

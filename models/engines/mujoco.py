@@ -209,7 +209,8 @@ def _compiled_model(
 
 
 class MujocoModel:
-    """Model of one pitch-plane assembly in MuJoCo; a second model computes the moment of a prescribed pitch."""
+    """Model of one pitch-plane assembly in MuJoCo; a second model, with all joints, computes the force and moment of a
+    prescribed motion."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings

@@ -54,11 +54,7 @@ def register(name: str) -> None:
     missing = (
         []
         if integrates
-        else [
-            constrained
-            for constrained in ("run", "acceleration")
-            if not callable(getattr(outside_class, constrained, None))
-        ]
+        else [method for method in ("run", "acceleration") if not callable(getattr(outside_class, method, None))]
     )
     if missing:
         raise _unusable_engine(

@@ -193,7 +193,8 @@ def _on_curve(pairs, size, argument):
 
 @register_jitable
 def _more(law, travel, rate, q):
-    """Nonlinear terms of an element's force law (N, or N m), at a travel, its rate and the joint coordinates q."""
+    """Nonlinear terms of an element's force law (N, or N m) at a travel, its rate and the joint coordinates q: the
+    force less that of the law's straight line."""
     force = 0.0
     if law[FRICTION] != 0.0:
         force += law[FRICTION] * np.tanh(rate / law[FRICTION_RATE])

@@ -109,8 +109,8 @@ def _verlet(step: float, linear: LinearMatrices) -> np.ndarray:
 
 
 def _semi_implicit(step: float, linear: LinearMatrices, implicit: np.ndarray) -> np.ndarray:
-    """Matrix (2n, 2n) of one step of MuJoCo's single-step integrators: new velocities, with the damping ``implicit``
-    implicit, then positions from these."""
+    """Matrix (2n, 2n) of one step of MuJoCo's single-step integrators: new velocities, with the part ``implicit``
+    (n, n) of the damping taken implicitly, then positions from these."""
     mass, damping, stiffness, *_ = linear
     n = len(mass)
     q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]

@@ -174,7 +174,7 @@ def each_block(
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
-    (``process_pool``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
+    (``process_pool``), a Dask cluster (``dask_workers``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
     that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement : (paths,
     reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.
@@ -298,7 +298,7 @@ def _answers_of_blocks(
     job: Callable[[T], Arrays], unfinished_blocks: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
 ) -> Generator[tuple[int, T, Arrays | _Failure]]:
     """Generator of blocks and their results or failures, in order of completion; at most ``ahead`` blocks are computed
-    at once, and none is begun more than ``ahead`` after the first unfinished one."""
+    at once, and none is begun ``ahead`` or more after the first unfinished one."""
     if executor is None:
         yield from ((i, block, _compute_block(job, block)) for i, block in unfinished_blocks)
         return
@@ -329,7 +329,8 @@ def _answers_of_blocks(
 def _may_begin(
     i: int, waiting: dict[Future, tuple[int, T]], single_blocks: Collection[tuple[int, T]], ahead: int
 ) -> bool:
-    """Whether a block may be started now: fewer than ``ahead`` are running, and it is not too far ahead."""
+    """Whether block ``i`` may be started now: fewer than ``ahead`` are running, and it is less than ``ahead`` after the
+    first unfinished one."""
     first = min((other_index for other_index, _ in (*waiting.values(), *single_blocks)), default=i)
     return len(waiting) < ahead and i < first + ahead
 

@@ -49,7 +49,7 @@ def quantile_with_interval(values: np.ndarray, probability: float) -> tuple[floa
     """Quantile of values (n,), some of which may be infinite, and the ends of the quantile's 95 % interval.
 
     Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial. Raises
-    InputError without a value, for one that is no number, and for a level that is not between 0 and 1.
+    InputError without a value, for one that is no number, and for a probability that is not between 0 and 1.
     """
     if not len(values) or np.isnan(values).any():
         raise InputError("", "values", None, "must be numbers, one or more; infinite ones are allowed")
@@ -64,10 +64,10 @@ def quantile_ranks(value_count: int, probability: float) -> tuple[int, int, int]
     if not 0.0 < probability < 1.0:
         raise InputError("", "level", probability, "must be between 0 and 1")
     half = STANDARD_ERRORS_95 * math.sqrt(value_count * probability * (1 - probability))
-    rank_bounds = (
+    unrounded_ranks = (
         value_count * probability,
         math.floor(value_count * probability - half),
         value_count * probability + half,
     )
-    middle, low, high = (min(max(math.ceil(rank) - 1, 0), value_count - 1) for rank in rank_bounds)
+    middle, low, high = (min(max(math.ceil(rank) - 1, 0), value_count - 1) for rank in unrounded_ranks)
     return middle, low, high

@@ -101,8 +101,8 @@ class ValueCounts:
         ``statistics.quantile_with_interval``."""
         upto = np.cumsum(self.counts)
         ranks = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), probability)), side="right")
-        low, high, upper = (float(self.values[rank]) for rank in ranks)
-        return low, high, upper
+        quantile, low, high = (float(self.values[rank]) for rank in ranks)
+        return quantile, low, high
 
 
 class MagnitudeQuantiles:

@@ -179,7 +179,7 @@ def dask_workers(address: str, *paths: Path) -> Iterator[Executor]:
     be installed there.
 
     Certificates of a ``tls://`` address are those of Dask's configuration. Raises InputError where the extra
-    ``dask_workers`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
+    ``cluster`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
     sources, with several threads (engines share their callbacks within a process), or without sight of ``paths``.
     """
     let_in("dask")

@@ -22,8 +22,8 @@ value."""
 class CountedLoad:
     """Results of fatigue counting of one load: pseudo-damage, level crossings, range pairs.
 
-    damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
-    least that range; smallest_load, largest_load : the load's extremes; mean.
+    damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs_of_range (r,)
+    with at least that range; smallest_load, largest_load : the load's extremes; mean.
     """
 
     damage: dict[float, float]
@@ -59,7 +59,7 @@ def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Number of upward crossings of each level (l,), in any order, by a load (n,) or its turning points; raises
-    InputError for a level that is NaN."""
+    InputError for a level that is NaN, and as ``counted_load``."""
     load, given_levels = checked_load(load), np.asarray(levels, float)
     if np.isnan(given_levels).any():
         raise InputError("", "levels", None, "must be numbers")

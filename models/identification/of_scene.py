@@ -80,7 +80,7 @@ def _value_at_key(container: Any, name: str, key: str) -> Any:
         return container[name]
     if isinstance(container, BaseModel) and name in type(container).model_fields:
         return getattr(container, name)
-    names = _channel_names(container)
+    names = _key_names(container)
     if isinstance(container, Mapping) and not suggestion_phrase(name, names):
         raise InputError(
             PARAMETERS_OPTION, key, None, f"is not in the scene: --set {key}=VALUE gives it a value to start from"
@@ -88,7 +88,7 @@ def _value_at_key(container: Any, name: str, key: str) -> Any:
     raise InputError(PARAMETERS_OPTION, key, None, f"is no key of the scene: there is no {name!r}", names)
 
 
-def _channel_names(container: Any) -> tuple[str, ...]:
+def _key_names(container: Any) -> tuple[str, ...]:
     """Names of the keys of a table or model."""
     if isinstance(container, BaseModel):
         return tuple(name for name, field in type(container).model_fields.items() if not field.exclude)
@@ -99,7 +99,7 @@ class SceneModel:
     """Model of a scene for identification: its channels over time as a function of the values of some keys, computed by
     an engine.
 
-    table, file, folder : of the scene; ``channels_of`` gives name -> (unit, times, values) of a result.
+    table, file, folder : of the scene; keys : scene keys of the parameters; engine : name of the engine.
     """
 
     def __init__(self, scene: Any, keys: Sequence[str], engine: str) -> None:

@@ -105,7 +105,8 @@ def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
 
 
 def paired_ratio(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Ratio a / b of paired times: the median of the log ratios within the rounds, with its bootstrap 95 % interval."""
+    """Ratio a / b of paired times, by the median of the log ratios within the rounds, with its bootstrap 95 %
+    interval."""
     logs = np.log(np.asarray(a) / np.asarray(b))
     _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
     return math.exp(float(np.median(logs))), math.exp(low), math.exp(high)

@@ -50,8 +50,8 @@ class AxleForces:
     their signals and the vehicle's parameters.
 
     duration : s, of the run that they drive. remedies : what to do about a wrong sign, unit or factor, None for those
-    of a channel map. starts_at_rest : whether the run starts from the static equilibrium; turn : whether the forces
-    turn with the chassis.
+    of a channel map. starts_at_rest : whether the run starts from the static equilibrium; turns_with_chassis :
+    whether the forces turn with the chassis.
     """
 
     forces: np.ndarray

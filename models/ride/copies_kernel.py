@@ -101,7 +101,7 @@ def fill_missing_tyre_force(tyre_index, x, road, tyres, pressed, rate, missing_f
 @lean
 def fill_rates(x, road, laws, force, state_rate, workspace):
     """Fill the time derivatives (2 n, copies) of the states (positions, then rates) on roads (2 w, copies), and the
-    nonlinear forces (s + u, copies) in N."""
+    nonlinear forces (s + u, copies) in N; workspace (2, copies) is overwritten."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.travel_rows.shape[0]
     for s in range(springs):
         travel, slip, bent = workspace[0], workspace[1], force[s]

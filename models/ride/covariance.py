@@ -287,9 +287,8 @@ def variance_verdicts(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Status of every output's variance (finite, infinite or diffusing), and the reason for it.
 
-    White noise that comes through D counts if, up to the ``fastest_rate`` rate of the system (1/s), it carries more
-    than rounding could of the output's variance without it; ``rounding_floor`` (p,) is what rounding makes of a
-    variance of zero."""
+    White noise that comes through D counts if, up to the system's ``fastest_rate`` (1/s), it carries more than rounding
+    could of the output's variance without it; ``rounding_floor`` (p,) is what rounding makes of a variance of zero."""
     direct = sum((d**2).sum(axis=1) for d in D) * fastest_rate
     white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + rounding_floor
     verdicts = [_variance_verdict(*output, split) for output in zip(white, growth.rate, growth.power, strict=True)]

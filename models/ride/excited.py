@@ -100,7 +100,7 @@ class VehicleStates:
     """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, coordinates q = Q x + direct g.
 
     The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
-    massless_part, integrated_part: a and b by q.
+    massless_part, integrated_part: matrices from q to a and from q to b.
     """
 
     A: np.ndarray

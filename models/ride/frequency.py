@@ -166,8 +166,8 @@ def _halve_panels(
     panel_integrals: np.ndarray,
     largest_change: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) of the integral over all panels, and the changes by the last halving; panels are halved until that
-    changes each sum by at most ``largest_change`` (p,)."""
+    """Sums (p,) of the integral over all panels, their changes by the last halving, and the number of panels; panels
+    are halved until that changes each of their integrals by at most ``largest_change`` (p,)."""
     variance, error = np.zeros_like(largest_change), np.zeros_like(largest_change)
     panels_used, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):

@@ -273,7 +273,8 @@ def _growth_by_zeros(
     upper_bound: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Growth rates and powers (p,) of the variances due to zero eigenvalues, from the response sum of C N^l G t^l / l!,
-    whose highest power dominates; only rates above ``upper_bound`` count."""
+    whose highest power dominates. A term counts above ``lower_bound`` times its size; at power 1 it also counts
+    where its rate is above ``upper_bound`` (p,)."""
     rate, power = np.zeros(len(C)), np.zeros(len(C), int)
     step, step_size = G, G_size
     for level in range(len(N)):
@@ -297,7 +298,8 @@ def _growth_by_undamped(
     upper_bound: np.ndarray,
 ) -> np.ndarray:
     """Growth rates (p,) of the variances due to undamped oscillations: the mean square of the response C e^(T t) G,
-    summed over the frequencies; only those above ``upper_bound`` count."""
+    summed over the frequencies. An amplitude counts above ``lower_bound`` times its size, or where its rate is above
+    ``upper_bound`` (p,)."""
     rate = np.zeros(len(C))
     values, vectors = np.linalg.eig(T)
     right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G

@@ -21,7 +21,7 @@ def exceedance_rate(deviation: float, rate_deviation: float, threshold: float) -
     """Number of times per second that abs(x) exceeds a threshold, from the standard deviations of x and of its rate x'
     (per s).
 
-    Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
+    Rice's formula, both sides together: (sd x' / sd x) exp(-threshold^2 / (2 sd^2)) / pi.
     """
     _check_value(deviation=deviation, rate_deviation=rate_deviation, limit=threshold)
     if deviation == 0.0:

@@ -79,7 +79,7 @@ def variances_along_drive(
     the instants (s).
 
     The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
-    ``weighting.weighted``. Raises InputError for a standstill: a cell would take for ever.
+    ``weighting.system_with_weightings``. Raises InputError for a standstill: a cell would take for ever.
     """
     slowest = float(profile.speeds.min())
     if slowest == 0.0:

@@ -30,9 +30,9 @@ from models.vehicles.linear_vehicle import LinearVehicle
 @dataclass(frozen=True)
 class RoadInPath:
     """Equations of a vehicle on a road, with vehicle states y and road filter states f of each axle: y' = A y + sum_i
-    inputs_i f_i, and outputs (C + v C_per_speed) (y, f) at speed v, plus possibly white noise from the road.
+    N_i f_i, and outputs (C + v C_per_speed) (y, f) at speed v, plus possibly white noise from the road.
 
-    A (n, n); inputs (n, a, m) over axles and filter states; ``basis`` turns (y, f) into the states of
+    A (n, n); noise_inputs (n, a, m) : N_i over axles and filter states; ``basis`` turns (y, f) into the states of
     ``vehicle_with_road``, weightings included; C, C_per_speed (p, n + a m).
     """
 

@@ -83,7 +83,8 @@ class StatisticallyLinear:
 
     @property
     def contraction(self) -> float:
-        """Largest ratio of a gain change to that of the iteration before, among changes above rounding."""
+        """Largest ratio of a gain change to that of the iteration before, in the later half of the changes above
+        rounding."""
         ratios = [
             change_after / change_before
             for change_before, change_after in pairwise(self.gain_changes)

@@ -66,8 +66,8 @@ def variance_sweep(
 ) -> Sweep:
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
 
-    filters : weightings by output, as ``weighted`` takes them. fast : False sends every point the direct way.
-    Raises Unstable.
+    filters : weightings by output, as ``system_with_weightings`` takes them. fast : False sends every point the direct
+    way. Raises Unstable.
     """
     shared, direct, points = SharedModes(), Counter[str](), []
     for speed in speeds:

@@ -83,7 +83,7 @@ def varying_speed(
 
     Parameters
     ----------
-    weightings : weighted outputs to add, as in ``weighting.weighted``
+    weightings : weighted outputs to add, as in ``weighting.system_with_weightings``
     instants : times (s) within the drive that shall be among those of the result
     accuracy : of the vehicle's matrices, relative, as in ``stationary_covariance``
     largest_rate_times_step : fastest rate times step; the change at half of it tells the error

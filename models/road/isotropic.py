@@ -82,8 +82,8 @@ class IsotropicRoad:
 
 
 def isotropic_road_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
-    """Isotropic road with the same spectrum as the two-track road has on its track at y (m); both roads must be of
-    first order."""
+    """Isotropic road with the same spectrum as the two-track road has on its track at y (m). Raises InputError
+    unless both processes of that road are of first order."""
     if road.mean.cutoff is not None or road.roll.cutoff is not None:
         raise InputError("", "cutoff", road.mean.cutoff or road.roll.cutoff, "is not known to isotropic roads")
     shares = ((road.mean, 1.0), (road.roll, y * y))

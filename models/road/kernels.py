@@ -18,7 +18,7 @@ rounding fell the same way, and the exact values then cost 1/128 of what direct 
 """
 
 VECTOR_LANES = 16
-"""Number of waves is filled up to a multiple of this with waves of amplitude 0, so that all vector registers are
+"""The number of waves is filled up to a multiple of this with waves of amplitude 0, so that all vector registers are
 full."""
 
 

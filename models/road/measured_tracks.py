@@ -58,7 +58,7 @@ class TrackSpectra:
     @property
     def coherency(self) -> np.ndarray:
         """Coherency |S_lr| / sqrt(S_l S_r) of left and right track, biased up: pure chance gives about sqrt(2 /
-        freedom)."""
+        degrees_of_freedom)."""
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
     def confidence_factors(self, probability: float = 0.95) -> tuple[float, float]:

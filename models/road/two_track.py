@@ -161,8 +161,8 @@ def input_covariance(
 
 
 def _both_filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Filter matrices F, G of both processes together, and the rows that read z_M and theta; a process of zero
-    intensity is left out."""
+    """Filter matrices F, G of both processes together, and the rows that read z_M and theta; a roll process of
+    zero intensity is left out."""
     parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
     F, G, H = (block_diag(*matrices) for matrices in zip(*(process.matrices() for process in parts), strict=True))
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
@@ -177,7 +177,7 @@ def _height_row(
     height = mean + wheel.y * roll
     if left_right == "modelled":
         return height
-    if wheel.y == 0.0 and any(zeros_of_other.y for zeros_of_other in wheels):
+    if wheel.y == 0.0 and any(other_wheel.y for other_wheel in wheels):
         allowed = f"wheel {wheel.name!r} stands at y = 0, neither left nor right"
         raise InputError("", "left_right", left_right, allowed)
     zeros_of_other = np.zeros(len(height))

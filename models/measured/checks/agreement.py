@@ -136,7 +136,8 @@ class Agreement:
 
     @property
     def weights(self) -> np.ndarray:
-        """Weights (f, k) of the frequencies: inverse of the smoothed unexplained power."""
+        """Weights (f, k) of the frequencies: inverse of the smoothed unexplained power, so that a line that no force
+        explains counts little."""
         kernel = np.ones(SMOOTHED_LINES) / SMOOTHED_LINES
         known = VEHICLE_ERROR**2 * np.maximum(self.predicted_powers, 1e-3 * self.predicted_powers.mean(axis=0))
         padded = np.pad(self.residual_powers + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
@@ -326,8 +327,8 @@ class Agreement:
                     yield pair, self._with_channels_exchanged(pair)
 
     def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
-        """Fall of chi square from this agreement to the corrected one; 0 if it is not significant or the fault is
-        small."""
+        """Fall of chi square from this agreement to the corrected one; 0 if it is not significant or explains too
+        little of every reading."""
         fall = float((weights * (self.residual_powers - corrected.residual_powers)).sum())
         return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
@@ -349,7 +350,8 @@ class Agreement:
         )
 
     def detectable_sizes(self) -> dict[str, tuple[float, float]]:
-        """By signal name: smallest detectable delay (s) and smallest detectable relative error of the factor."""
+        """By signal name: smallest detectable delay (s) and smallest detectable relative error of the factor of this
+        signal alone."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
         rest, smallest = EXPLAINED_SHARE * self._unexplained_power(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -373,7 +375,7 @@ class Agreement:
         return np.maximum((weights * (self.residual_powers - self.noise)).sum(axis=0), 0.0)
 
     def _is_worth_correcting(self, corrected: "Agreement", weights: np.ndarray) -> bool:
-        """Whether a correction removes much of the residual of at least one reading, not only little of each."""
+        """Whether a correction removes much of the residual of at least one reading, not only a little of every one."""
         return bool(
             np.any(
                 ((self.residual_powers - corrected.residual_powers) * weights).sum(axis=0)
