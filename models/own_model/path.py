@@ -52,8 +52,8 @@ class PathReport:
     the file's model has them; energy : what the balance of kinetic energy and work leaves, as a share of the largest
     kinetic energy; has_soft_constraints : whether MuJoCo has soft constraints, or dry friction that sticks at the
     start, so that its path differs and the file's is compared with it; has_dry_friction : if so, paths are compared as
-    long as it slides; struck_limit : the name of the joint whose limit, which is not built, ends the comparison, "" if
-    none does; controls : name of their file, "" where they are constant.
+    long as it slides; struck_limit : name of the joint or tendon whose limit, which is not built, ends the comparison,
+    "" if none does; controls : name of their file, "" where they are constant.
     """
 
     step: float
