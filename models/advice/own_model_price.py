@@ -1,4 +1,4 @@
-"""Cost of accuracy for a user's own MuJoCo model: the engine, integrator and step that keep a coordinate within a
+"""Cost of accuracy for a user's own model: the engine, integrator and step that keep a coordinate within a
 tolerance.
 
 The search is that of ``models.advice.price``. Exudyn marches the description, MuJoCo the file's own model, so that what

@@ -35,7 +35,12 @@ class Mass(NamedTuple):
 
 @dataclass(frozen=True)
 class CarBodies:
-    """Bodies of a car in the description of a vehicle, and where the file's bodies and joints are in it."""
+    """Bodies of a car in the description of a vehicle, and where the file's bodies and joints are in it.
+
+    bodies : parents before children; chassis : its name; body_names : for each body of the file, by number, the name of
+    the body that contains it; coordinates : of the suspension's joints, by number, with the signs of their axes;
+    spin_inertia : inertia about the axle (kg m^2) of every spinning wheel, by the name of its tyre.
+    """
 
     bodies: tuple[Body, ...]
     chassis: str

@@ -45,7 +45,16 @@ START_COUNT = 20
 
 @dataclass(frozen=True)
 class PathReport:
-    """Comparison of the paths of all builds over time."""
+    """Comparison of the paths of all builds over time.
+
+    step : s; comparison_horizon : time (s) until which a disturbance of 1e-14 stays below 1e-10; distances : relative
+    distance of each other build from the first up to there; failed : what stopped a build; has_quaternions : whether
+    the file's model has them; energy : what the balance of kinetic energy and work leaves, as a share of the largest
+    kinetic energy; has_soft_constraints : whether MuJoCo has soft constraints, or dry friction that sticks at the
+    start, so that its path differs and the file's is compared with it; has_dry_friction : if so, paths are compared as
+    long as it slides; struck_limit : name of the joint or tendon whose limit, which is not built, ends the comparison,
+    "" if none does; controls : name of their file, "" where they are constant.
+    """
 
     step: float
     comparison_horizon: float

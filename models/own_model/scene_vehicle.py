@@ -17,7 +17,7 @@ def scene_vehicle(
     allows_reduced: bool = False,
     allows_towing: bool = False,
 ) -> SpatialVehicle:
-    """The unloaded vehicle of a scene, by its name or by a file relative to ``folder``. Raises InputError.
+    """The unloaded vehicle of a scene, by its name or by a file relative to ``folder``.
 
     ``file`` and ``place`` say who asked for it, for the message if there is none. allows_reduced, allows_towing : may a
     vehicle file have [reduced], and may it tow? Raises InputError."""

@@ -93,11 +93,16 @@ def mean_error(
 ) -> np.ndarray:
     """Mean rotation matrix E[E] (3, 3) of the attitude error, for unequal noise on a turning body.
 
-    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis i,
-    and therefore d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T, turned by the true motion S; or, for the measured
-    attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2 G_i^2). The latter has constant coefficients over
-    each period and is stepped by its matrix exponential: exact for rates that are held. angle_random_walks : (3,) in
-    rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,)."""
+    From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis
+    i, and therefore
+        d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T,
+    turned by the true motion S; or, for the measured attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2
+    G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
+    rates that are held.
+
+    angle_random_walks : (3,) in rad per sqrt(s); rates : (n, 3) in rad/s, local; sample_period : s; start_attitude :
+    unit quaternion (4,).
+    """
     mean = rotation_matrix(start_attitude)
     for step in _matrix_exponentials((skew_matrix(rates) + noise_decay_matrix(angle_random_walks)) * sample_period):
         mean = mean @ step

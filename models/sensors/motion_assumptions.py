@@ -70,7 +70,8 @@ def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
 
 
 def _rigid_body_assumption(quality: Quality) -> Assumption:
-    """Assumption that the sensors move with a single rigid body."""
+    """Assumption that the sensors move with a single rigid body. A single sensor that does not is left out, without an
+    assumption about it."""
     size = float(np.sqrt(np.mean(quality.misfit**2))) / quality.share if quality.share > 0.0 else 1.0
     return Assumption(
         "rigid body",

@@ -183,8 +183,8 @@ def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
 
 
 def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
-    """Angular rates (n, 3) in rad/s without their signs, from sensors in a plane (axes e1, e2), whose matrix is (w.w) I
-    - (w1, w2) (w1, w2)^T with w3^2 as its smaller eigenvalue."""
+    """Angular rates (n, 3) in rad/s up to two signs, of w3 and of (w1, w2) together, from sensors in a plane (axes e1,
+    e2), whose matrix is (w.w) I - (w1, w2) (w1, w2)^T with w3^2 as its smaller eigenvalue."""
     flat = m[:, :2, :2]
     sizes, directions = np.linalg.eigh(-0.5 * (flat + np.swapaxes(flat, 1, 2)))
     about_normal = np.sqrt(np.maximum(sizes[:, :1], 0.0))
@@ -299,9 +299,10 @@ def recovered_motion(
     """Motion of the body's reference point and axes from accelerometer readings, steps 1 to 6 of the paper.
 
     readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``gravity_corrected`` set to zero at rest on
-    level ground, as sensors with a correction for gravity give it (17); sample_period : s rates : (n, 3) in rad/s,
-    local, from a gyro or a filter, in the place of the integrated ones Raises InputError for unusable readings,
-    GimbalLock if angles are filtered where they are not defined."""
+    level ground, as sensors with a correction for gravity give it (17); sample_period : s
+    rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
+    Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
+    """
     start_state, cut_offs = start_state or StartState(), cut_offs or CutOffs()
     spins = spin_from_readings(array, readings)
     w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates

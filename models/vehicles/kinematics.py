@@ -13,7 +13,7 @@ SpringEnd = tuple[str | None, Vector]
 UNIT_AXES = np.eye(3)
 """Unit matrix, whose rows are the axes x, y, z."""
 ROTATION_GENERATORS = np.array([np.cross(unit, UNIT_AXES).T for unit in UNIT_AXES])
-"""Generators (3, 3, 3) of rotations about the axes: e_i x v = TURN[i] @ v."""
+"""Generators (3, 3, 3) of rotations about the axes: e_i x v = ROTATION_GENERATORS[i] @ v."""
 
 
 class Kinematics:

@@ -123,8 +123,8 @@ def _failed_record(reason: object) -> Record:
 
 @contextmanager
 def complete_folder(folder: Path) -> Iterator[Path]:
-    """Context that yields a temporary folder to write into; at the end it gets its final name, and replaces an older
-    folder of this name."""
+    """Context that yields a temporary folder to write into. It gets its final name only when it is complete, and then
+    replaces an older folder of this name."""
     partial_folder = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     partial_folder.mkdir(parents=True)
     try:

@@ -113,8 +113,7 @@ def main(settings: dict[str, Any]) -> None:
 
 
 def start_counting() -> None:
-    """Make valgrind count instructions from here on; earlier code is not run_marked_marches and runs several times as
-    fast."""
+    """Make valgrind count instructions from here on; earlier code is not counted and runs several times as fast."""
     asking = subprocess.Popen(
         ["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

@@ -105,7 +105,7 @@ def deviations_on_grid(
     ride: PricedRide, frequency_count: int, highest_frequency: float, evenly_spaced: bool = False
 ) -> np.ndarray:
     """Standard deviations (p,) of the outputs by the trapezoidal rule on a frequency grid up to ``highest_frequency``
-    (Hz), evenly spaced in frequency if ``even``, else in its logarithm."""
+    (Hz), evenly spaced in frequency if ``evenly_spaced``, else in its logarithm."""
     frequency = (
         np.linspace(highest_frequency / frequency_count, highest_frequency, frequency_count)
         if evenly_spaced

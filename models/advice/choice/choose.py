@@ -306,7 +306,10 @@ class Chooser:
         return self.ended
 
     def change_with_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
-        """Predicted relative changes (quantities,) if effects are left out and steps lengthened as well."""
+        """Predicted relative changes (quantities,) if effects are left out and steps lengthened as well.
+
+        The change by the longer step comes from a comparison with a shorter step.
+        """
         screen, runs = self.reporting_screen, self.whole.variants
         change = screen.predicted_difference(omitted_effects) if omitted_effects else None
         if step_factor == 1:

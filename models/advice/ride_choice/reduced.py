@@ -175,7 +175,7 @@ class Vehicles:
         return self._linear[key]
 
     def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
-        """The reduced vehicle of a scene at a speed (m/s), newly computed."""
+        """The reduced vehicle of a scene at a speed (m/s), newly computed; InputError where no freedom is left."""
         N = self._free_directions(scene)
         left = reduced_vehicle(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
         states = vehicle_states(left)
