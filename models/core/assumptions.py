@@ -118,6 +118,14 @@ def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | N
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
+def _violation(
+    assumption: Assumption, where: str, share: float, first: float, worst: float, law: str = ""
+) -> BrokenAssumption:
+    """The violation of an assumption at ``where`` for a share of the time, with its first time (s) and worst value."""
+    named = assumption.name, assumption.says, where, share, first, worst
+    return BrokenAssumption(*named, assumption.unit, assumption.allowed, assumption.remedy, law)
+
+
 def _sampled_violation(run: Result, assumption: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
     """The violation of an assumption by values sampled over a run; None if all lie within the limits."""
     beyond = (values < assumption.lower_limit) | (values > assumption.upper_limit)
@@ -127,17 +135,7 @@ def _sampled_violation(run: Result, assumption: Assumption, where: str, values: 
     timed = "time" in run.data.coords and len(values) == len(run.times)
     first = float(run.times[np.argmax(beyond)]) if timed else math.nan
     worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
-    return BrokenAssumption(
-        assumption.name,
-        assumption.says,
-        where,
-        share,
-        first,
-        worst,
-        assumption.unit,
-        assumption.allowed,
-        assumption.remedy,
-    )
+    return _violation(assumption, where, share, first, worst)
 
 
 def _gaussian_violation(run: Result, assumption: Assumption, where: str, values: Gaussian) -> BrokenAssumption | None:
@@ -158,19 +156,7 @@ def _gaussian_violation(run: Result, assumption: Assumption, where: str, values:
     first = float(run.times[np.argmax((shares > ALLOWED_TIME_SHARE).any(axis=0))]) if timed else math.nan
     worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
     value_name = f"{where} {values.rows[row]}" if values.rows else where
-    share, law = float(shares[side, row]), " by the normal law"
-    return BrokenAssumption(
-        assumption.name,
-        assumption.says,
-        value_name,
-        share,
-        first,
-        worst,
-        assumption.unit,
-        assumption.allowed,
-        assumption.remedy,
-        law,
-    )
+    return _violation(assumption, value_name, float(shares[side, row]), first, worst, " by the normal law")
 
 
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
