@@ -10,9 +10,10 @@ rise. What it takes must hold:
 - effect by effect: each one left out alone, and all but each one. An error that lives because two larger ones cancel
   holds until one of them changes.
 
-Where a set does not hold, the step of the path that breaks it is found by halving, taken back for good, and the choice
-goes on without it. At last every effect comes back whose absence saves no calls at equal accuracy: of runs by the
-classical Runge-Kutta method, each in the longest steps that keep the tolerance. What is reported was confirmed, always.
+No effect is tried whose absence alone breaks the tolerance. Where a set does not hold, the step of the path that breaks
+it is found by halving, taken back for good, and the choice goes on without it. At last every effect comes back whose
+absence saves no calls at equal accuracy: of runs by the classical Runge-Kutta method, each in the longest steps that
+keep the tolerance. What is reported was confirmed, always.
 """
 
 from collections.abc import Callable
@@ -90,6 +91,23 @@ class Chooser(Candidates):
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
+    @cached_property
+    def sets_to_search(self) -> list[EffectSet]:
+        """The sets of ``single_effect_sets`` that the search tries: all but those whose absence alone breaks the
+        tolerance, since a larger set could only keep it by errors that cancel.
+        """
+        return [effect_set for effect_set in self.single_effect_sets if not self._breaks_alone(effect_set)]
+
+    def _breaks_alone(self, omitted_effects: EffectSet) -> bool:
+        """Whether finite changes without these effects alone break the tolerance at some speed of the range.
+
+        Changes without end do not count: white noise that passes is nothing that another change could make up for.
+        """
+        if not omitted_effects or refusal_reason(omitted_effects):
+            return False
+        changes = self.changes_between_speeds(omitted_effects)
+        return bool(np.isfinite(changes).all()) and not self.holds(changes)
+
     def within_tolerance(self, omitted_effects: EffectSet) -> bool:
         """Whether the tolerance holds without these effects: at all speeds of the range, with parameters off, and
         without errors that cancel each other.
@@ -114,20 +132,14 @@ class Chooser(Candidates):
     def _cancellation_text(self, omitted_effects: EffectSet) -> str:
         """Text on an effect whose removal alone, or return alone, breaks the tolerance that the whole set keeps, since
         errors cancel; "" if there is none.
-
-        Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
         single_removals = zip(self.effects, self.single_effect_sets, strict=True)
         parts = {f"{effect.name} alone changes": step for effect, step in single_removals if step < omitted_effects}
         parts |= {f"all but {effect.name} change": omitted_effects - {effect} for effect in omitted_effects}
         for step_text, effect_set in parts.items():
-            changes = (
-                np.zeros(len(self.rows))
-                if not effect_set or refusal_reason(effect_set)
-                else self.changes_between_speeds(effect_set)
-            )
-            if np.isfinite(changes).all() and not self.holds(changes):
-                return f"holds by errors that cancel: {step_text} {self.largest_change_text(changes)}"
+            if self._breaks_alone(effect_set):
+                changes_text = self.largest_change_text(self.changes_between_speeds(effect_set))
+                return f"holds by errors that cancel: {step_text} {changes_text}"
         return ""
 
     @cached_in_object
@@ -283,9 +295,9 @@ class Chooser(Candidates):
         """
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
         white = [
-            step for step in self.single_effect_sets if damping and not np.isfinite(self.predicted_changes(step)).all()
+            step for step in self.sets_to_search if damping and not np.isfinite(self.predicted_changes(step)).all()
         ]
-        return self.single_effect_sets + [step | damping for step in white]
+        return self.sets_to_search + [step | damping for step in white]
 
     def _best_step(self, omitted_effects: EffectSet, refused_steps: set[EffectSet], saving: SavingOfStep) -> EffectSet:
         """The set of effects that saves the most for what it adds to the predicted error; empty if none keeps the

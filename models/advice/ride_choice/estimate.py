@@ -14,10 +14,9 @@ from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
-EIGENVALUE_PROBLEMS = 4.0
-"""Cost of a choice per effect, per state and for SCREENED_SPEEDS speeds, in eigenvalue problems: the proportion is
-fitted to 14 scenes of 7 to 26 effects and 10 to 42 states, all within a factor of two, and the size to the largest
-scene.
+SMALLEST_COST, EIGENVALUE_PROBLEMS = 200.0, 2.4
+"""Cost of a choice in eigenvalue problems: of any choice, and what is added per effect, per state and for
+SCREENED_SPEEDS speeds. Fitted to scenes of 2 to 26 effects and 6 to 42 states, nearly all within a factor of two.
 """
 FURTHER_SPEED_SHARE = 0.05
 """Ratio of the cost of a speed at which effects are only confirmed to that of a speed at which they are screened."""
@@ -47,7 +46,8 @@ def estimate(ride: RideScene) -> Estimate:
         )
     screened = min(speeds, SCREENED_SPEEDS)
     share = (1 + screened + FURTHER_SPEED_SHARE * (speeds - screened)) / (1 + SCREENED_SPEEDS)
-    return Estimate(effects, speeds, states, EIGENVALUE_PROBLEMS * effects * states * share * _eigenvalue_problem())
+    problems = SMALLEST_COST + EIGENVALUE_PROBLEMS * effects * states * share
+    return Estimate(effects, speeds, states, problems * _eigenvalue_problem())
 
 
 def _count_of_states(scene: ReducedScene, road: Excitation) -> int:
