@@ -21,6 +21,8 @@ from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 from numba.core.types import unliteral
 
+from models.machine.alone import KernelLock, load_after_others
+
 ROOT = Path(__file__).parents[2]
 COMMON = tuple(ROOT / "models" / name for name in ("vehicles", "engines", "contact", "machine"))
 """Folders whose functions are compiled into kernels of other folders."""
@@ -58,22 +60,35 @@ def inlined(function: Callable) -> Any:
 
 
 def _kept_apart(compiled: Any) -> Any:
-    """The numba function, compiled once for all literal numbers of its callers, with cache files that are safe from
-    other processes."""
+    """The numba function, compiled once for all literal numbers of its callers, and by one process at a time, with
+    cache files that are safe from other processes."""
     _without_literals(compiled)
-    _make_safe(compiled._cache, compiled.py_func)
+    compiled.compile = _compile_alone(compiled._cache, compiled.py_func, compiled.compile)
     return compiled
 
 
-def _make_safe(function_cache: Any, function: Callable) -> None:
-    """Make the cache of a numba function safe: file names that do not depend on a shared counter, and stamps of the
-    sources."""
+def _compile_alone(function_cache: Any, function: Callable, compile_function: Callable) -> Callable:
+    """A numba function's method that compiles it, which waits where another process compiles the same one.
+
+    The cache is made safe: file names that do not depend on a shared counter, and stamps of the sources.
+    """
     file = getattr(function_cache, "_cache_file", None)  # there is none where nothing is kept
-    if file is not None:
-        stem = file._index_name.removesuffix(".nbi")
-        file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
-        file._source_stamp = stamp(*_files(function))
-        file._load_index = _or_none(file._load_index)
+    if file is None:
+        return compile_function
+    stem = file._index_name.removesuffix(".nbi")
+    file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
+    file._source_stamp = stamp(*_files(function))
+    file._load_index = _or_none(file._load_index)
+    lock = KernelLock(Path(function_cache.cache_path) / f"{stem}.lock")
+    load_after_others(function_cache, lock)
+
+    def compile_alone(*signature: Any) -> Any:
+        try:
+            return compile_function(*signature)
+        finally:
+            lock.give_back()
+
+    return compile_alone
 
 
 def callback(function: Callable, signature: Any) -> Any:
@@ -81,8 +96,7 @@ def callback(function: Callable, signature: Any) -> Any:
     globals."""
     law: Any = CFunc(function, normalize_signature(signature), {}, {})
     law.enable_caching()
-    _make_safe(law._cache, function)
-    law.compile()
+    _compile_alone(law._cache, function, law.compile)()
     return law
 
 

@@ -1,7 +1,9 @@
 """A second process that compiles the kernels of a scene's last engine while the first engines run.
 
-It runs the scene in that engine, with results in a temporary folder. It starts when kernels are missing, once after an
-installation, if a user waits at a terminal and a core is idle.
+It runs the scene in that engine, with results in a temporary folder. It starts as soon as a kernel is compiled, once
+after an installation, if a user waits at a terminal and a core is idle. Both processes need mostly the same kernels, in
+the same order, and wait for one another (``models.machine.alone``); so it begins with one that the first process needs
+late.
 """
 
 import json
@@ -14,15 +16,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from studies.command.asked import load_scene, needs_no_extras, study_of
 from studies.command.waiting import CompilationTimer
 
-COMPILATION_SECONDS = 1.0
-"""Compilation time (s) above which kernels are taken to be missing: loading a scene's compiled kernels takes less."""
-
 
 class SecondCompiler(CompilationTimer):
-    """Observer of compilation that starts a command once, when this process has compiled for COMPILATION_SECONDS."""
+    """Observer of compilation that starts a command once, when this process compiles a kernel that it did not load."""
+
+    EVENT = "numba:compile"
 
     def __init__(self, command: list[str]) -> None:
         super().__init__()
@@ -30,8 +33,7 @@ class SecondCompiler(CompilationTimer):
         self.process: subprocess.Popen[bytes] | None = None
 
     def _start(self, *event: Any) -> None:
-        super()._start(*event)
-        if self.process is None and self.compilation_seconds() > COMPILATION_SECONDS:
+        if self.process is None:
             nowhere = subprocess.DEVNULL
             self.process = subprocess.Popen(self.command, stdin=nowhere, stdout=nowhere, stderr=nowhere)
 
@@ -69,7 +71,29 @@ def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, fol
     the first process.
     """
     scene = load_scene(name, changes).model_copy(update={"error": error})
+    if scene.system in LATE_KERNELS:
+        LATE_KERNELS[scene.system]()
     study_of(scene).run(scene, (engine,), Path(folder), lambda text, share: None)
+
+
+def compile_fastsim() -> None:
+    """Compile FASTSIM for many contacts, which a wheelset's equations call."""
+    from models.contact.fastsim_many import forces
+    from models.contact.fastsim_records import CONTACT, FORCES, Cells, Strips
+
+    strip_values, cell_values = np.empty((4, 0)), np.empty((5, 0))
+    forces(np.empty(0, CONTACT), Strips(*strip_values), Cells(*cell_values, 1.0), 0, 0, np.empty(0, FORCES))
+
+
+def compile_free_vehicle_forces() -> None:
+    """Compile the forces of a vehicle that moves freely, which engines call."""
+    from models.multibody.forces import set_forces
+
+    set_forces.compile("(int64, float64, int64)")
+
+
+LATE_KERNELS = {"wheelset": compile_fastsim, "handling": compile_free_vehicle_forces}
+"""By system, the function that compiles a kernel that takes seconds and that the first process needs late."""
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from models.core.waiting import PROGRESS_FUNCTIONS
 
@@ -30,8 +30,6 @@ COMPILE_SECONDS = {
     "braking": 40.0,
 }
 """Processor time (s) for the compilation of the kernels of a system's scenes; an upper bound, as some may exist."""
-COMPILER_LOCK_EVENT = "numba:compiler_lock"
-"""Name of numba's event that lasts from the beginning to the end of each compilation."""
 ReportProgress = Callable[[str, float], None]
 """Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
@@ -39,6 +37,9 @@ ReportProgress = Callable[[str, float], None]
 class CompilationTimer:
     """Timer of numba's compilations: their total time (s), and the start time of a running one; numba's events call
     ``_start`` and ``_end_compilation``."""
+
+    EVENT: ClassVar[str] = "numba:compiler_lock"
+    """Name of numba's event that is observed: it lasts as long as a kernel is compiled or loaded."""
 
     def __init__(self) -> None:
         self.depth, self.total, self.since, self.attached = 0, 0.0, 0.0, False
@@ -50,8 +51,8 @@ class CompilationTimer:
             return
         event: Any = sys.modules["numba.core.event"]
         listener = type("Listener", (event.Listener,), {"on_start": self._start, "on_end": self._end_compilation})()
-        event.register(COMPILER_LOCK_EVENT, listener)
-        self.attached, self._remove = True, lambda: event.unregister(COMPILER_LOCK_EVENT, listener)
+        event.register(self.EVENT, listener)
+        self.attached, self._remove = True, lambda: event.unregister(self.EVENT, listener)
 
     def detach(self) -> None:
         """Stop listening to numba's compilation events."""
