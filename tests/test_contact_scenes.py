@@ -113,10 +113,19 @@ def test_show_names_units_and_only_what_the_theory_reads(twinrig, capsys):
     assert "march" not in said and not Path("results").exists()
 
 
-def test_too_unlike_materials_are_refused_before_anything_is_written(twinrig, capsys):
+@pytest.mark.parametrize("command", ["run", "show"])
+@pytest.mark.parametrize("scene", ["c.toml", "manchester"])
+def test_too_unlike_materials_are_refused_before_anything_is_written(command, scene, twinrig, capsys):
     Path("c.toml").write_text(ELLIPSE)
-    assert twinrig("run", "c.toml", "--set", "bodies.wheel={E=1e9, nu=0.3}") == 2
-    assert "unlike" in capsys.readouterr().err and not Path("results").exists()
+    assert twinrig(command, scene, "--set", "bodies.wheel={E=1e9, nu=0.1}") == 2
+    said = capsys.readouterr().err
+    assert f"{scene.removesuffix('.toml')}.toml with --set: bodies: materials too unlike" in said
+    assert not Path("results").exists()
+
+
+def test_unlike_materials_may_be_pressed_without_friction(twinrig, capsys):
+    cases = "cases={pressed={yaw=0.0, friction=0.0}}"
+    assert twinrig("show", "manchester", "--set", "bodies.wheel={E=1e9, nu=0.1}", "--set", cases) == 0
 
 
 def test_radii_curvatures_ellipse_and_approach_name_the_same_contact():

@@ -87,14 +87,14 @@ class MaterialPair:
         """
         return 2.0 * abs(self.mismatch) / friction
 
-    def require_likeness(self) -> None:
+    def require_likeness(self, file: str = "") -> None:
         """Raise InputError if the materials differ so much that the mismatch K must not be neglected where there is
-        friction (see LARGEST_MISMATCH).
+        friction (see LARGEST_MISMATCH). file : of the scene that names the bodies, for the message.
         """
         if abs(self.mismatch) > LARGEST_MISMATCH:
             raise InputError(
-                "",
-                "pair",
+                file,
+                "bodies",
                 None,
                 f"materials too unlike for a theory that takes them as quasi-identical: "
                 f"Kalker's K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure "

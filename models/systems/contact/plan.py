@@ -18,10 +18,8 @@ THEORY_TEXTS = {
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuses nothing: reading a scene checks its keys, and the theories refuse materials that differ too much
-    (``MaterialPair.require_likeness``).
-    """
-    _ = scene.pair.G
+    """Raise InputError for bodies that are too unlike for every theory (``MaterialPair.require_likeness``)."""
+    scene.pair.require_likeness(scene.file)
 
 
 def findings(scene: ContactScene) -> tuple[Finding, ...]:

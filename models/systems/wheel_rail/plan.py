@@ -8,9 +8,13 @@ from models.systems.wheel_rail.scene import WheelRailScene
 
 
 def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
-    """Raise InputError, before any file is written, for profile files that contain no profile."""
+    """Raise InputError, before any file is written, for profile files that contain no profile, and for bodies that are
+    too unlike for a theory of friction (``MaterialPair.require_likeness``).
+    """
     for case in scene.cases.values():
-        _ = scene.contact(case).material_pair.G
+        material_pair = scene.contact(case).material_pair
+        if case.friction:
+            material_pair.require_likeness(scene.file)
 
 
 def describe(scene: WheelRailScene) -> str:
