@@ -160,35 +160,19 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
         moment[2] += ax * fy - ay * fx
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def march(state, parameters, time_steps, path, reports):
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+def march(state, parameters, time_steps, path, reports, workspace, stages):
     """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
 
     parameters : of ``Equations``; time_steps : length (s) of a step, count of steps, and after how many steps one
-    goes into path and reports."""
-    stages = Stages(np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(0, REPORT))
-    speed, body, rails = parameters
-    rails_record = rails_from_tuples(rails)
-    return _march_with_arrays(
-        state,
-        (speed, Body(*body), rails_record),
-        time_steps,
-        path,
-        reports,
-        workspace_for(rails_record.profile),
-        stages,
-    )
-
-
-@lean
-def _march_with_arrays(state, parameters, time_steps, path, reports, workspace, stages):
-    """Integrate the state over all steps with arrays allocated by the caller. Holding no references to them saves 5 %
-    of the time of a bare wheelset."""
-    (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = (
+    goes into path and reports; workspace, stages : arrays of the caller, to which no reference is held, which saves
+    5 % of the time of a bare wheelset."""
+    (speed, plain_body, plain_tuples), (step, count, stride), (total, rate, stage_state, no_report) = (
         parameters,
         time_steps,
         stages,
     )
+    body, rails = Body(*plain_body), rails_from_tuples(plain_tuples)
     for i in range(count + 1):
         row = i // stride
         for stage in range(4):  # one call of the rates, or it is compiled four times
@@ -363,10 +347,18 @@ class Equations:
         """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
         row_count = step_count // stride + 1
         states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
-        steps_done = march(state, self.parameters, (step, step_count, stride), states, contacts)
+        steps_done = self.march(state, (step, step_count, stride), states, contacts)
         if steps_done < step_count:
             raise RunFailed("wheelset", "leaves the track", steps_done * step)
         return states, contacts
+
+    def march(self, state: Array, time_steps: tuple[float, int, int], states: Array, contacts: Array) -> int:
+        """Number of steps that the compiled ``march`` makes before the wheelset leaves the track; ``state`` (10,) is
+        modified, ``states`` and ``contacts`` are filled."""
+        stages = Stages(*np.empty((3, STATE_COUNT)), NO_REPORT)
+        return int(
+            march(state, self.parameters, time_steps, states, contacts, workspace_for(self.rails.profile), stages)
+        )
 
     def check(self, path: WheelsetPath, step: float, stride: int) -> None:
         """Raise RunFailed if the step was too large for the contact loads or, where every step is stored, for the
