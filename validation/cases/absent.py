@@ -52,7 +52,7 @@ def required_effects(effect: str) -> dict[str, Any]:
     return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
-def scene(effects: dict[str, Any], step_count: int, folder: Path, prescribed: bool = False) -> Scene:
+def scene(effects: dict[str, Any], step_count: int, work_folder: Path, prescribed: bool = False) -> Scene:
     """Scene of the asymmetric vehicle with the given effects, released from a tilted position unless its pitch is
     prescribed."""
     start = {} if prescribed else START_MOTION
@@ -66,19 +66,19 @@ def scene(effects: dict[str, Any], step_count: int, folder: Path, prescribed: bo
             "engines": {"exudyn": PRESCRIBED_SETTINGS} if prescribed else {},
         },
         "absent",
-        folder,
+        work_folder,
     )
 
 
-def write_files(folder: Path) -> None:
+def write_files(work_folder: Path) -> None:
     """Write CSV files with two seconds of wheel forces, of pitch, and of heave and pitch, all of which start
     smoothly."""
     t = STEP * np.arange(2001)
     wave = np.sin(np.pi * t) ** 2
-    write_time_series(folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
+    write_time_series(work_folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
     pitch = {"pitch": ("rad", 0.02 * wave)}
-    write_time_series(folder / "pitch.csv", pitch, STEP)
-    write_time_series(folder / "motion.csv", {"z3": ("m", 0.06 + 0.01 * wave), **pitch}, STEP)
+    write_time_series(work_folder / "pitch.csv", pitch, STEP)
+    write_time_series(work_folder / "motion.csv", {"z3": ("m", 0.06 + 0.01 * wave), **pitch}, STEP)
 
 
 def model(simulated_scene: Scene, engine: str) -> Model:
@@ -86,17 +86,17 @@ def model(simulated_scene: Scene, engine: str) -> Model:
     return build(engine, assembly_of_scene(simulated_scene), settings_of(simulated_scene, engine))
 
 
-def scenes_without_and_with(effect: str, step_count: int, folder: Path) -> tuple[Scene, Scene]:
+def scenes_without_and_with(effect: str, step_count: int, work_folder: Path) -> tuple[Scene, Scene]:
     """Two scenes that differ by one effect: the first without the effect, the second with the effect."""
     needed, prescribed, module = (
         required_effects(effect),
         effect.startswith("prescribed"),
         module_of(DEFAULT_SYSTEM, effect),
     )
-    scene_below = scene(needed, step_count, folder, prescribed)
+    scene_below = scene(needed, step_count, work_folder, prescribed)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
         return scene_without(scene_below, effect), scene_below
-    return scene_below, scene({**needed, effect: module.EXAMPLE}, step_count, folder, prescribed)
+    return scene_below, scene({**needed, effect: module.EXAMPLE}, step_count, work_folder, prescribed)
 
 
 def counts_of_scene(simulated_scene: Scene, engine: str) -> dict[str, int]:
@@ -104,10 +104,10 @@ def counts_of_scene(simulated_scene: Scene, engine: str) -> dict[str, int]:
     return {**model(simulated_scene, engine).plan(), "channels": len(run(simulated_scene, engine).data.data_vars)}
 
 
-def count_changes(effect: str, engine: str, folder: Path) -> dict[str, int]:
+def count_changes(effect: str, engine: str, work_folder: Path) -> dict[str, int]:
     """Changes of the numbers of components in an engine's model when an effect is added; unchanged numbers are left
     out."""
-    before, after = (counts_of_scene(bare, engine) for bare in scenes_without_and_with(effect, 20, folder))
+    before, after = (counts_of_scene(bare, engine) for bare in scenes_without_and_with(effect, 20, work_folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
@@ -119,7 +119,7 @@ def declared_changes(effect: str, engine: str) -> dict[str, int]:
 
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: an effect that a scene does not name adds no computation, and an effect that it names changes the declared
     numbers of components. A quick run tests each effect of the vehicle in one engine (the engines take turns), every
     third effect of other systems, and the imports of one process."""
@@ -155,17 +155,17 @@ def _import_rows() -> list[Row]:
     ]
 
 
-def _absence_rows(engine: str, folder: Path) -> list[Row]:
+def _absence_rows(engine: str, work_folder: Path) -> list[Row]:
     """Rows: Python function calls, memory and callbacks that 1,980 more steps of a scene without effects need. All must
     be zero."""
-    for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
+    for bare in (scene({}, steps, work_folder) for steps in (20, 20)):  # wrappers cache on their first calls
         counted_march(engine, model(bare, engine))
     short, long = (
-        march_with_least_memory(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000)
+        march_with_least_memory(engine, partial(model, scene({}, steps, work_folder), engine)) for steps in (20, 2000)
     )
     callbacks = max(short.callbacks, installed_callbacks())
     if engine == "exudyn":
-        callbacks += user_functions(model(scene({}, 20, folder), engine))
+        callbacks += user_functions(model(scene({}, 20, work_folder), engine))
     why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
     return [
         Observed(
@@ -188,10 +188,10 @@ def _absence_rows(engine: str, folder: Path) -> list[Row]:
     ]
 
 
-def _positive_control_row(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
+def _positive_control_row(effect: str, work_folder: Path, engines: Sequence[str] = ENGINES) -> Row:
     """Row of a positive control: the effect changes the numbers of components in each engine's model exactly as it
     declares."""
-    changed = {engine: count_changes(effect, engine, folder) for engine in engines}
+    changed = {engine: count_changes(effect, engine, work_folder) for engine in engines}
     wanted = {engine: declared_changes(effect, engine) for engine in engines}
     return behaviour_row(
         f"absent.present.{effect}",

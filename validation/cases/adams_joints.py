@@ -64,7 +64,7 @@ FIT_SECONDS = 1.0
 """First part (s) of an output file to which spring constants are fitted if the model file describes another case."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of every joint family; a quick run takes two families and one second."""
     data = data_folder()
     rows: list[Row] = []
@@ -79,7 +79,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         mechanism, notes = _mechanism_of_output(read_mechanism(model), output)
         rows += [*fitted_constant_rows(family, notes), *family_rows(family, mechanism, output, quick)]
         if mechanism.kind != "distance":
-            rows += mjcf_rows(family, mechanism, folder, 1.0 if quick else DURATION)
+            rows += mjcf_rows(family, mechanism, work_folder, 1.0 if quick else DURATION)
         if family in REVOLUTE_ANGLES:
             rows += _same_pendulum_rows(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
         saved[family] = {
@@ -167,11 +167,11 @@ def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bo
     return rows
 
 
-def mjcf_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) -> list[Row]:
+def mjcf_rows(family: str, mechanism: Mechanism, work_folder: Path, duration: float) -> list[Row]:
     """Rows for the joint as an MJCF model: the certificate of ``twinrig twin``, and positions compared with those by
     constraint equations."""
     step, every = STEP / MJCF_STEP_RATIO, MJCF_STEP_RATIO * STEPS_PER_ROW
-    accelerations, paths = build_differences(mechanism, folder, round(duration / step), step)
+    accelerations, paths = build_differences(mechanism, work_folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
     tolerance_reason = "rounding; the bound asked for"

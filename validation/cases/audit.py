@@ -35,7 +35,7 @@ def acceleration_difference(engine: str, parameter_set_name: str, geometry: str 
     )
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for each engine, vehicle and geometry; a quick run is the same."""
     rows = [
         Observed(

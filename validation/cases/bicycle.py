@@ -33,7 +33,7 @@ TRAIL_FACTOR = 1.001
 """Factor on the trail in the planted fault."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: published figures, the limit of ideal rolling, energy, and the measured bicycle. A quick run simulates half
     a second, and omits the predictions with one speed left out."""
     benchmark = load_bicycle("benchmark")

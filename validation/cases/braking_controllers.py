@@ -42,7 +42,7 @@ CONTROLLER_NAMES = tuple(CONTROLLERS)[1:]
 """Names of the anti-lock controllers, without the first entry of CONTROLLERS, which applies the brakes fully."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of hysteresis, supply and limit cycle; a full run also has stops of the truck, substeps, and an ensemble of
     stops."""
     rows = [*_hysteresis_rows(), _air_supply_row(), *_limit_cycle_rows("shallow")]

@@ -38,7 +38,7 @@ STIFF_TYRE_SLOPE = 100.0
 """Slope (1/rad) of the lateral friction of the trailer's tyres, so steep that the wheels nearly roll without slip."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the braked turn in engines, by hand-written equations and mirrored, of straight braking, and of the
     trailer. A quick run brakes down to 10 m/s only."""
     until = 10.0 if quick else LAST_SPEED

@@ -40,7 +40,7 @@ LONG_RELEASE_CONTROLLER = FivePhase(
 
 
 @allowing_breaches("stops at the limits, and random ones: that they end, or say why not, is judged")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all limits. A quick run takes three of the random stops, and one speed of the slow stops on split
     friction."""
     ends = [ending_text(number) for number in range(STOP_COUNTS[quick])]

@@ -79,11 +79,11 @@ QUICK_FAULTS = ("NaN", "too few wheels", "silence", "died")
 
 
 @allowing_breaches("both sides are cut off after the same few samples", "stop")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of equal bits, costs and faults; a quick run brakes for half a second and plants few faults."""
-    tables_by_connection = _port_tables(folder, with_python_process=not quick)
-    rows = _equal_bits_rows(tables_by_connection, folder, 0.5 if quick else 4.0)
-    costs = _exchange_times(tables_by_connection, folder, 5 if quick else 40)
+    tables_by_connection = _port_tables(work_folder, with_python_process=not quick)
+    rows = _equal_bits_rows(tables_by_connection, work_folder, 0.5 if quick else 4.0)
+    costs = _exchange_times(tables_by_connection, work_folder, 5 if quick else 40)
     rows += [
         Observed(
             f"braking_port.cost.{_row_id(name)}",
@@ -94,13 +94,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ).beside("", f"median of rounds of {ROUND_EXCHANGES} in which all ways have their turn", "none")
         for name, (cost, low, high) in costs.items()
     ]
-    told = [_process_outcome(kind, folder) for kind in (QUICK_FAULTS if quick else PROCESS_FAULTS)]
-    told += [_class_outcome(kind, folder) for kind in (("catches everything",) if quick else CLASS_FAULTS)]
-    told += [] if quick else [_fmu_outcome(kind, folder) for kind in FMU_FAULTS]
+    told = [_process_outcome(kind, work_folder) for kind in (QUICK_FAULTS if quick else PROCESS_FAULTS)]
+    told += [_class_outcome(kind, work_folder) for kind in (("catches everything",) if quick else CLASS_FAULTS)]
+    told += [] if quick else [_fmu_outcome(kind, work_folder) for kind in FMU_FAULTS]
     return rows + [row for outcome in told for row in _fault_rows(outcome)], {"costs": costs, "faults": told}
 
 
-def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
+def _scene(work_folder: Path, duration: float, table: dict[str, Any]) -> Any:
     straight = {"straight": {"kind": "straight", "speed": 11.11}}
     return build(
         {
@@ -111,11 +111,11 @@ def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
             "port": {"timeout": LONG_TIMEOUT, "start": LONG_TIMEOUT} | table,
         },
         "port.toml",
-        folder,
+        work_folder,
     )
 
 
-def _port_tables(folder: Path, with_python_process: bool) -> dict[str, dict[str, Any] | str]:
+def _port_tables(work_folder: Path, with_python_process: bool) -> dict[str, dict[str, Any] | str]:
     """Scene tables of all kinds of connection of a controller, by name; for a kind that is not available, the reason as
     text."""
     tables_by_connection: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
@@ -123,31 +123,31 @@ def _port_tables(folder: Path, with_python_process: bool) -> dict[str, dict[str,
         tables_by_connection["second process in Python"] = {
             "command": [sys.executable, "-m", "models.brake.port.client", EXAMPLE, "{port}"]
         }
-    tables_by_connection["second process in C"] = _table_of_c_client(folder)
-    tables_by_connection["FMU"] = _table_of_fmu(folder)
+    tables_by_connection["second process in C"] = _table_of_c_client(work_folder)
+    tables_by_connection["FMU"] = _table_of_fmu(work_folder)
     return tables_by_connection
 
 
-def _table_of_c_client(folder: Path) -> dict[str, Any] | str:
+def _table_of_c_client(work_folder: Path) -> dict[str, Any] | str:
     compiler, source = shutil.which("cc"), Path(port.__path__[0]) / "client_example.c"
     if compiler is None:
         return "no C compiler here"
-    subprocess.run([compiler, "-O2", "-ffp-contract=off", "-o", str(folder / "client"), str(source)], check=True)
-    return {"command": [str(folder / "client"), "{port}"]}
+    subprocess.run([compiler, "-O2", "-ffp-contract=off", "-o", str(work_folder / "client"), str(source)], check=True)
+    return {"command": [str(work_folder / "client"), "{port}"]}
 
 
-def _table_of_fmu(folder: Path) -> dict[str, Any] | str:
+def _table_of_fmu(work_folder: Path) -> dict[str, Any] | str:
     try:
         from pythonfmu import FmuBuilder
     except ImportError:
         return "needs pythonfmu and fmpy: pip install 'twinrig[test]'"
-    return {"fmu": FmuBuilder.build_FMU(Path(port.__path__[0]) / "example_slave.py", dest=folder).name}
+    return {"fmu": FmuBuilder.build_FMU(Path(port.__path__[0]) / "example_slave.py", dest=work_folder).name}
 
 
-def _equal_bits_rows(tables_by_connection: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
+def _equal_bits_rows(tables_by_connection: dict[str, dict[str, Any] | str], work_folder: Path, duration: float) -> list[Row]:
     """Rows: runs with every kind of connection, and a replay of the log, compared bit by bit with a run that calls the
     controller directly."""
-    first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
+    first = run(_scene(work_folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
     for name, table in {**tables_by_connection, "replay": {"replay": "port.log"}}.items():
         key, what = (
@@ -157,7 +157,7 @@ def _equal_bits_rows(tables_by_connection: dict[str, dict[str, Any] | str], fold
         if isinstance(table, str):
             rows.append(not_run(key, SYSTEM, what, table))
             continue
-        ended = _differing_fields(first, run(_scene(folder, duration, table)).detail)
+        ended = _differing_fields(first, run(_scene(work_folder, duration, table)).detail)
         rows.append(behaviour_row(key, SYSTEM, what, ended, "same bits", "doubles pass every way whole", "none"))
     return [*rows, _pressure_changes_row(first)]
 
@@ -182,10 +182,10 @@ def _differing_fields(first_run: BrakingPath, other_run: BrakingPath) -> str:
 
 
 def _exchange_times(
-    tables_by_connection: dict[str, dict[str, Any] | str], folder: Path, round_count: int
+    tables_by_connection: dict[str, dict[str, Any] | str], work_folder: Path, round_count: int
 ) -> dict[str, list[float]]:
     """Time of one exchange in microseconds for each kind of connection: median of the rounds with its 95 % interval."""
-    facts, seconds = ControllerRun(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
+    facts, seconds = ControllerRun(np.full(4, 0.5), SAMPLE, folder=work_folder), dict[str, list[float]]()
     with ExitStack() as stack:
         tables = {
             name: PortTable(timeout=LONG_TIMEOUT, start=LONG_TIMEOUT, **table)
@@ -212,20 +212,20 @@ def _round_seconds(controller: Controller, first_number: int) -> float:
     return time.perf_counter() - start
 
 
-def _process_outcome(misbehaviour: str, folder: Path) -> dict[str, Any]:
+def _process_outcome(misbehaviour: str, work_folder: Path) -> dict[str, Any]:
     words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), misbehaviour, "{port}"]
-    return _outcome_of_run(f"second process: {misbehaviour}", PROCESS_FAULTS[misbehaviour], {"command": words}, folder)
+    return _outcome_of_run(f"second process: {misbehaviour}", PROCESS_FAULTS[misbehaviour], {"command": words}, work_folder)
 
 
-def _class_outcome(misbehaviour: str, folder: Path) -> dict[str, Any]:
+def _class_outcome(misbehaviour: str, work_folder: Path) -> dict[str, Any]:
     name, does = CLASS_FAULTS[misbehaviour]
     well = f"        if given.number < {misbehaving_client.GOOD_SAMPLES}: return Command(valves=np.ones(4))\n"
-    (folder / "fails.py").write_text(
+    (work_folder / "fails.py").write_text(
         "import ctypes, os, signal, time\nimport numpy as np\nfrom models.brake.controller import Command\n"
         "class Fails:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n" + well + f"        {does}\n"
     )
-    return _outcome_of_run(f"class that {misbehaviour}", name, {"callable": "fails.py:Fails"}, folder)
+    return _outcome_of_run(f"class that {misbehaviour}", name, {"callable": "fails.py:Fails"}, work_folder)
 
 
 FMU_FAULTS = {
@@ -239,7 +239,7 @@ FMU_FAULTS = {
 code."""
 
 
-def _fmu_outcome(misbehaviour: str, folder: Path) -> dict[str, Any]:
+def _fmu_outcome(misbehaviour: str, work_folder: Path) -> dict[str, Any]:
     from pythonfmu import FmuBuilder
 
     name, does = FMU_FAULTS[misbehaviour]
@@ -249,16 +249,16 @@ def _fmu_outcome(misbehaviour: str, folder: Path) -> dict[str, Any]:
         f"         {does}\n"
     )
     source = (Path(port.__path__[0]) / "example_slave.py").read_text().replace(line, well + line)
-    (folder / "fails_slave.py").write_text(source)
+    (work_folder / "fails_slave.py").write_text(source)
     return _outcome_of_run(
         f"FMU that {misbehaviour}",
         name,
-        {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name},
-        folder,
+        {"fmu": FmuBuilder.build_FMU(work_folder / "fails_slave.py", dest=work_folder).name},
+        work_folder,
     )
 
 
-def _outcome_of_run(misbehaviour: str, expected_error: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _outcome_of_run(misbehaviour: str, expected_error: str, table: dict[str, Any], work_folder: Path) -> dict[str, Any]:
     """How a run with a failing controller ends, and the time (s) from the start of the last exchange to that end."""
     watched, timeout = _ExchangeClock(), TIMEOUT if expected_error == "silence" else LONG_TIMEOUT
     outcome = {
@@ -271,7 +271,7 @@ def _outcome_of_run(misbehaviour: str, expected_error: str, table: dict[str, Any
     }
     try:
         with watched:
-            run(_scene(folder, 1.0, {**table, "timeout": timeout}))
+            run(_scene(work_folder, 1.0, {**table, "timeout": timeout}))
     except ControllerFailed as error:
         samples_kept = 0 if error.partial is None else len(error.partial.times) - 1
         outcome |= {"name": error.name, "number": error.number, "kept": samples_kept, "message": str(error)}

@@ -44,7 +44,7 @@ compared quantity."""
 ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the force laws, accelerations, steady circles and stops. A quick run has the car in one engine and a
     short stop; a full run has all vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)

@@ -24,7 +24,7 @@ BRAKE_TORQUES = (200.0, 200.0, 100.0, 100.0)
 """Brake torques (N m) of the four wheels, at which no wheel locks."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of relaxing tyres. A quick run has the car in Exudyn only, whose steps need no compiling; a full run also
     has MuJoCo and the limit of a stiff suspension."""
     engines = ENGINES[1:] if quick else ENGINES

@@ -64,7 +64,7 @@ STANDSTILL_SECONDS = 2.0
 """Time (s) for which the simulation goes on after a stop, to see that the vehicle stays at rest."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all stops. A quick run has the four headline cases, and a sweep with two steps on two surfaces."""
     steps = tuple(step for step in SWEEP_STEPS[quick] if step >= SMALLEST_FIGURE_STEP)
     curves = {

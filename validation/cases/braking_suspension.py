@@ -36,7 +36,7 @@ TURN_TORQUES, HARD_TURN_TORQUES = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 2
 """Brake torques (N m) of the four wheels in J-turns; no wheel locks."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of stops with locked wheels, and of a J-turn and its mirror image; a full run also compares Exudyn and
     MuJoCo, the limit of a stiff suspension, and ice."""
     wet = table_of_surface("wet")

@@ -26,7 +26,7 @@ mrad moves the centre of mass, half a metre above the ball, forward by 5e-4 of i
 ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of axle loads, and of accelerations and stops. A quick run has one engine; a full run also has locked
     wheels, slip control, planted faults, and more vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)

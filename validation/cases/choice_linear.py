@@ -84,7 +84,7 @@ def judged_choice_of(scene: LinearRide, by_frequency: bool) -> JudgedChoice:
     )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of forty scenes of random vehicles and speed ranges, and of the published half car. A quick run has two
     random scenes and the half car."""
     seeds = QUICK_SEEDS if quick else range(SCENE_COUNT)

@@ -73,7 +73,7 @@ def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.
 
 
 @allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of random scenes of four systems; a quick run has three scenes of the pitch plane."""
     seeds = {"pitch-plane": QUICK_SEEDS} if quick else {system: range(count) for system, count in SCENE_COUNTS.items()}
     choices = [judge_choice(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]

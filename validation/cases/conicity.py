@@ -27,7 +27,7 @@ LATERAL_SHIFTS = np.linspace(-8.0, 8.0, 161)
 """Lateral displacements (mm) of the wheelset in the tables of the closed forms."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the closed forms and of the standard's profiles; a full run also has a wheelset with wheels of unequal
     radii."""
     rows = [*_closed_form_rows(), _cubic_difference_row(), _refusal_row()]

@@ -94,7 +94,7 @@ class Setup:
         return Wheels(self.wheel_count, cast(Theory, theory), cells or 21)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on equal results of threads and engines, and on low speeds; a full run also has the cost of every contact
     law and bridge.
 

@@ -87,7 +87,7 @@ def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cells: int) -
     return np.array([-fx / area, -fy / area, (turn - side) / 2.0 / area**1.5, -moment / area**2])
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the nodes of the table and for a planted misprint; a full run also compares between and beyond the
     nodes."""
     ratios, nus = (QUICK_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), POISSON_RATIOS)

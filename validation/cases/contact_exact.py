@@ -45,7 +45,7 @@ DISCRETISATION_ERROR = 0.0075
 """Stated bound of the force error with 40 cells along each axis, divided by mu N; it halves with 80 cells."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the normal and the rolling problem compared with closed forms, finer grids, symmetries, and the sample
     if it exists. A quick run has two cases up to 32 cells instead of all up to 80, and every fourth contact of the
     sample with half the cells."""

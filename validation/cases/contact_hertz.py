@@ -32,7 +32,7 @@ BOUND_REASON = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for axes, pressure, approach and load over all axis ratios, for one published contact, and for refusals; a
     quick run is the same."""
     errors = _largest_errors((*AXIS_RATIOS, *NEAR_CIRCLE_RATIOS))

@@ -72,7 +72,7 @@ SLENDER_REASON = (
 TABLE_ROWS, SEED = 100_000, 41
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on whether the stated errors hold; a full run also compares Kalker's two programs, and times a long table of
     contacts."""
     cases = read_contacts()
@@ -82,7 +82,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, {}
     programs = compare_programs(cases[::2])
-    return [*rows, *_program_rows(programs), _long_table_row(folder)], {"programs": programs}
+    return [*rows, *_program_rows(programs), _long_table_row(work_folder)], {"programs": programs}
 
 
 def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
@@ -235,11 +235,11 @@ def _program_rows(program_times: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _long_table_row(folder: Path) -> Row:
+def _long_table_row(work_folder: Path) -> Row:
     """Row: computing time of a long table of contacts."""
     rng = np.random.default_rng(SEED)
     low, high = np.array([2.0, 2.0, 1.0, 0.1, -0.5, -0.5, -1.0]), np.array([9.0, 9.0, 150.0, 0.5, 0.5, 0.5, 1.0])
-    path, out = folder / "contact_cases.csv", folder / "contact_forces.csv"
+    path, out = work_folder / "contact_cases.csv", work_folder / "contact_forces.csv"
     np.savetxt(
         path,
         rng.uniform(low, high, (TABLE_ROWS, 7)),

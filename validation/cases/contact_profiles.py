@@ -42,7 +42,7 @@ FLANGE_SHIFT = 6.5
 """Lateral displacement (mm) from which the benchmark's flange touches the rail."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on the built-in profiles and on the contact points; a full run has every lateral displacement, also with
     yaw."""
     shifts = QUICK_SHIFTS if quick else LATERAL_SHIFTS

@@ -58,7 +58,7 @@ APPROACH_REASON = "the figure set for the theory"
 NO_CLAIM_REASON = "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on Hertz's ellipses and on the continuity of the load; a full run has all shapes, variants and net sizes,
     and computing times."""
     hertz = {

@@ -82,21 +82,21 @@ COMBINATIONS = (
 
 @on_paper_road()
 @allowing_breaches("that runs drift off is what is shown", "upright")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each combination; a quick run has the first one with few noise paths."""
     combinations = [
-        _drift_off_figures(combination, folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
+        _drift_off_figures(combination, work_folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
     ]
     return [_drift_off_row(figures) for figures in combinations], {"combinations": combinations}
 
 
-def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> Saved:
+def _drift_off_figures(combination: Combination, work_folder: Path, quick: bool) -> Saved:
     """Statistics of the predicted and measured drift-off times of a combination's ensemble; the time is infinite for
     runs that never drift off."""
     members = {"noise": _drift_by_noise, "interpolation": _drift_by_sampling, "model": _drift_by_model_error}[
         combination.source
     ]
-    predicted, measured = members(combination, folder, QUICK_PATH_COUNT if quick else PATH_COUNT)
+    predicted, measured = members(combination, work_folder, QUICK_PATH_COUNT if quick else PATH_COUNT)
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile_with_interval(np.array(measured), 0.5)
     inner = [quantile_with_interval(np.array(measured), level)[0] for level in (0.25, 0.75)]
@@ -118,18 +118,18 @@ def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> S
     }
 
 
-def _drift_by_noise(combination: Combination, folder: Path, path_count: int) -> tuple[list[float | None], list[float]]:
+def _drift_by_noise(combination: Combination, work_folder: Path, path_count: int) -> tuple[list[float | None], list[float]]:
     """Predicted drift-off time (s), and the drift-off time of every noise path."""
-    true = virtual_drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
+    true = virtual_drive(work_folder, combination.duration, 1 / combination.rate, road=combination.road)
     effects = {"force_noise": {"deviation": combination.noise_deviation, "seed": SEED}}
-    scene = force_scene(folder, duration=combination.duration, effects=effects)
+    scene = force_scene(work_folder, duration=combination.duration, effects=effects)
     times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), path_count)["drift_off"]
-    quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
+    quiet = assembly_of_scene(force_scene(work_folder, duration=combination.duration))
     return [noise_error_curve(quiet, combination.noise_deviation).passing_time()], times.tolist()
 
 
 def _drift_by_sampling(
-    combination: Combination, folder: Path, path_count: int
+    combination: Combination, work_folder: Path, path_count: int
 ) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) on similar roads, which have other speeds or other seeds."""
     speed = combination.road["speed"]
@@ -139,9 +139,9 @@ def _drift_by_sampling(
     ]
     predicted, measured = [], []
     for road in roads:
-        true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=road)
+        true = virtual_drive(work_folder, combination.duration, 1 / combination.rate, STEP, road=road)
         assembly = assembly_of_scene(
-            force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
+            force_scene(work_folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
         )
         predicted.append(interpolation_error_curve(assembly).passing_time())
         measured.append(_drift_off_time(assembly, true))
@@ -149,12 +149,12 @@ def _drift_by_sampling(
 
 
 def _drift_by_model_error(
-    combination: Combination, folder: Path, path_count: int
+    combination: Combination, work_folder: Path, path_count: int
 ) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) of vehicles with random parameters, all started from the true
     state."""
-    true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
-    assembly = assembly_of_scene(force_scene(folder, step=STEP, duration=combination.duration))
+    true = virtual_drive(work_folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
+    assembly = assembly_of_scene(force_scene(work_folder, step=STEP, duration=combination.duration))
     p, other_vehicles = assembly.parameters, list[Parameters]()
     for i in range(MODEL_COUNT):
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))

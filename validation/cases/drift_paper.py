@@ -93,7 +93,7 @@ COMPARED_FIGURES = (
 
 @allowing_breaches("that runs drift off is what the paper shows", "upright")
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments and inertia term of the hand-written reference; a quick run has 15 s
     and one sampling rate."""
     scene = load(STUDY_SCENE, QUICK_CHANGES if quick else ())

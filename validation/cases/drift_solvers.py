@@ -75,25 +75,25 @@ DAMAGE_SECONDS = 5.0
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on the drift-off times of solvers and interpolations, and on growth and damage with smoothing and
     integration schemes; a quick run has four solvers."""
-    solvers = _drift_by_solver(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
+    solvers = _drift_by_solver(work_folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
     if quick:
         return rows, {"solvers": solvers, "smoothing": []}
-    smoothing = _treatment_records(folder)
+    smoothing = _treatment_records(work_folder)
     return rows + _smoothing_rows(smoothing), {"solvers": solvers, "smoothing": smoothing}
 
 
-def _drift_by_solver(folder: Path, solvers: Any) -> list[Saved]:
+def _drift_by_solver(work_folder: Path, solvers: Any) -> list[Saved]:
     """Drift-off time (s) and final pitch error (rad) of each solver under three inputs: linear samples, smooth samples,
     and noisy linear samples.
 
     Every solver takes the undisturbed linear samples. Only the half with the tighter tolerances takes the smooth ones,
     and only fixed-step solvers of this half take the noise.
     """
-    true = virtual_drive(folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
+    true = virtual_drive(work_folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
     drifted = []
     tight = solvers[1::2]
@@ -104,7 +104,7 @@ def _drift_by_solver(folder: Path, solvers: Any) -> list[Saved]:
         ("noisy", "linear", noise, fixed),
     )
     for name, rule, effects, chosen in inputs:
-        scene = force_scene(folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
+        scene = force_scene(work_folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
         assembly = assembly_of_scene(scene)
         for engine, method, value in chosen:
             solver = {"engine": engine, "method": method, "value": value, "input": name}
@@ -125,11 +125,11 @@ def _drift_of_run(
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
-def _treatment_records(folder: Path) -> list[Saved]:
+def _treatment_records(work_folder: Path) -> list[Saved]:
     """For each smoothing filter and each integration scheme, with the same noise: growth rate of the pitch's standard
     deviation, and damage ratio of the section forces."""
-    true = virtual_drive(folder, NOISY_SECONDS, 1 / NOISE_SAMPLING_RATE, 2.5e-4)
-    quiet = assembly_of_scene(force_scene(folder, step=1e-3, duration=NOISY_SECONDS))
+    true = virtual_drive(work_folder, NOISY_SECONDS, 1 / NOISE_SAMPLING_RATE, 2.5e-4)
+    quiet = assembly_of_scene(force_scene(work_folder, step=1e-3, duration=NOISY_SECONDS))
     treatments = [
         _treatment_record(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
         for cutoff in LOW_PASS_CUTOFFS

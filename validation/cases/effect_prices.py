@@ -64,7 +64,7 @@ EFFECT_STEP_COUNT = 500
 
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of the computing times divided by those of hand-built models, and the price list of effects. A quick run
     simulates 2 s instead of 4 s, takes a tenth of the rounds, and each effect in one of the three engines, in turn."""
     with tempfile.TemporaryDirectory() as name:
@@ -95,13 +95,13 @@ def hand_built(engine: str, bare_scene: Scene) -> Any:
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio_to_hand_built(engine: str, folder: Path, step_count: int, round_count: int) -> Saved:
+def _ratio_to_hand_built(engine: str, work_folder: Path, step_count: int, round_count: int) -> Saved:
     """Ratio of the computing time of twinrig's model of a scene without effects to that of the hand-built model, and
     the largest difference of their states.
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
-    bare = scene({}, step_count, folder)
+    bare = scene({}, step_count, work_folder)
     ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(step_count + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
@@ -293,11 +293,11 @@ def _choice_row() -> Row:
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price_of_effect(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
+def _price_of_effect(effect: str, engine: str, work_folder: Path, round_count: int) -> Saved:
     """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the numbers of
     components that the effect changes."""
     seconds = interleave(
-        [_timed_run(bare, engine) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, folder)],
+        [_timed_run(bare, engine) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, work_folder)],
         round_count,
         5e-3,
     )
@@ -305,7 +305,7 @@ def _price_of_effect(effect: str, engine: str, folder: Path, round_count: int) -
     return {
         "effect": effect,
         "engine": engine,
-        "adds": changes_text(count_changes(effect, engine, folder)) or "nothing",
+        "adds": changes_text(count_changes(effect, engine, work_folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),

@@ -35,14 +35,14 @@ BEST_SETTINGS = {
 }
 
 
-def write_manoeuvre(folder: Path, parameter_set_name: str, abrupt: bool = False) -> None:
+def write_manoeuvre(work_folder: Path, parameter_set_name: str, abrupt: bool = False) -> None:
     """Write pitch and wheel forces of a manoeuvre with frequencies up to 2.7 Hz, the range of a car's pitch and heave
     motion.
 
     The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``abrupt`` one with
     4.4 rad/s^2 at once.
     """
-    p = parameter_set(parameter_set_name, "", folder)
+    p = parameter_set(parameter_set_name, "", work_folder)
     rest = equilibrium(p)
     t = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
@@ -53,8 +53,8 @@ def write_manoeuvre(folder: Path, parameter_set_name: str, abrupt: bool = False)
     pitch = pitch + rest[3]
     front = p.k1 * rest[0] + rise * (900 * np.sin(2 * np.pi * 1.4 * t) + 300 * np.sin(2 * np.pi * 2.3 * t))
     rear = p.k2 * rest[1] + rise * 700 * np.sin(2 * np.pi * 1.7 * t + 1)
-    write_wheel_forces(folder, front, rear, SAMPLE_PERIOD)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
+    write_wheel_forces(work_folder, front, rear, SAMPLE_PERIOD)
+    write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
 
 
 def enforced_moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
@@ -76,7 +76,7 @@ def relative_rms_error(computed_values: np.ndarray, true_moment: np.ndarray) -> 
 
 @on_paper_road()
 @allowing_breaches("the moment is compared, and its size is another matter", "little artificial")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for both vehicles in Exudyn and in MuJoCo, the ringing after an abrupt start, and the study road; a quick
     run has one vehicle and no study road."""
     with TemporaryDirectory() as name:
@@ -89,11 +89,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows + ringing + rough, {"table": table, "ringing": paths}
 
 
-def _manoeuvre_rows(folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
+def _manoeuvre_rows(work_folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
     rows = []
     for parameter_set_name in vehicles:
-        write_manoeuvre(folder, parameter_set_name)
-        scene = force_scene(folder, parameter_set_name, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
+        write_manoeuvre(work_folder, parameter_set_name)
+        scene = force_scene(work_folder, parameter_set_name, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
         true = exact_moment(scene)
         if parameter_set_name == vehicles[0]:
             rows.append(_uncertainty_row(scene, true))
@@ -130,11 +130,11 @@ def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
     ).at_most(MOMENT_TOLERANCE / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
-def _ringing_rows(folder: Path) -> CaseAnswer:
+def _ringing_rows(work_folder: Path) -> CaseAnswer:
     """Rows and data on an abrupt start: error of Exudyn's multiplier over the first 0.1 s, with and without consistent
     initial accelerations."""
-    write_manoeuvre(folder, "itwm_drift", abrupt=True)
-    scene = force_scene(folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH)
+    write_manoeuvre(work_folder, "itwm_drift", abrupt=True)
+    scene = force_scene(work_folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH)
     true = exact_moment(scene)
     first = slice(1, 101)
     paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
@@ -181,13 +181,13 @@ def _inconsistent_multiplier(scene: Scene, settings: Settings) -> np.ndarray:
     return multiplier
 
 
-def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
+def _study_road_rows(work_folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """Rows and table on the paper's run with prescribed pitch on the study road: error of the enforced moment at each
     step, divided by the rms of the moment."""
-    virtual_drive(folder, ROUGH_ROAD_SECONDS + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
+    virtual_drive(work_folder, ROUGH_ROAD_SECONDS + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
     paper = perturbed_parameters(PARAMETERS)
     scene = force_scene(
-        folder,
+        work_folder,
         step=SAMPLE_PERIOD,
         duration=ROUGH_ROAD_SECONDS,
         interpolation="smooth",

@@ -41,7 +41,7 @@ TABLE_TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 SAME_BITS = "the same bits"
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on equal bits by path, workers and interruption, and on the agreement of engines; a full run also has the
     large ensemble and computing times."""
     with TemporaryDirectory() as name:

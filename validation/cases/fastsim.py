@@ -62,7 +62,7 @@ INVARIANT_TOLERANCES = {
 GRID_REASON = "the same model with 321 cells per strip; a fifth of the model's own error"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the discretisation, the invariants and the derivatives; a full run also has the model's error and the
     computing time.
 

@@ -53,34 +53,34 @@ LAW_REASON = "the averaged law holds to its next order in growth rate over frequ
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on the growth rate, the standard deviation by noise, and the differences between steps and between engines;
     a quick run has one road and no Monte Carlo."""
-    true = virtual_drive(folder, MONTE_CARLO_SECONDS)
-    spread = _deviations_by_method(true, folder, quick)
+    true = virtual_drive(work_folder, MONTE_CARLO_SECONDS)
+    spread = _deviations_by_method(true, work_folder, quick)
     if quick:
-        roads = {STUDY_ROAD: _growth_rates(folder, ROADS[STUDY_ROAD], 2)}
+        roads = {STUDY_ROAD: _growth_rates(work_folder, ROADS[STUDY_ROAD], 2)}
         return _deviation_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
-    roads = {name: _growth_rates(folder, road) for name, road in ROADS.items()}
-    roads["asymmetric twin"] = _growth_rates(folder, ROADS[STUDY_ROAD], parameter_set_name="asymmetric_twin")
-    rows = [*_deviation_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
-    return [*rows, _step_row(folder), _linear_row(folder)], {"spread": spread, "roads": roads}
+    roads = {name: _growth_rates(work_folder, road) for name, road in ROADS.items()}
+    roads["asymmetric twin"] = _growth_rates(work_folder, ROADS[STUDY_ROAD], parameter_set_name="asymmetric_twin")
+    rows = [*_deviation_rows(spread), *_growth_rows(roads), _twin_row(work_folder), *_engine_rows(work_folder)]
+    return [*rows, _step_row(work_folder), _linear_row(work_folder)], {"spread": spread, "roads": roads}
 
 
-def _noisy_scene(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
+def _noisy_scene(work_folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
     noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": path}}
-    return force_scene(folder, step=step, duration=duration, effects=noise)
+    return force_scene(work_folder, step=step, duration=duration, effects=noise)
 
 
-def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
+def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> Saved:
     """Standard deviations of pitch and heave at 1 to 10 s by three methods: Monte Carlo (full run only), covariance
     along the path, and closed laws."""
     times, assembly = (
         np.arange(1, MONTE_CARLO_SECONDS + 1),
-        assembly_of_scene(_noisy_scene(folder, MONTE_CARLO_SECONDS)),
+        assembly_of_scene(_noisy_scene(work_folder, MONTE_CARLO_SECONDS)),
     )
     at = np.rint(times * SAMPLING_RATE).astype(int)
-    p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=MONTE_CARLO_SECONDS))
+    p, quiet = assembly.parameters, assembly_of_scene(force_scene(work_folder, duration=MONTE_CARLO_SECONDS))
     q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
     carried = covariance(quiet, NOISE_DEVIATION)
     alone = pitch_rate_of_forces(_force_samples(quiet).values, 1 / SAMPLING_RATE, p)
@@ -97,7 +97,7 @@ def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
         "heave covariance": carried.deviation("z3")[at],
     }
     if not quick:
-        job = noise_paths(_noisy_scene(folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
+        job = noise_paths(_noisy_scene(work_folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
         off = run_paths(job, PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
@@ -118,12 +118,12 @@ def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, 
 
 
 def _growth_rates(
-    folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
+    work_folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
 ) -> Saved:
     """Growth rates (1/s) of the error on one road by four methods: from the run's pitch rate, from its forces, with
     other cut-off frequencies, and measured in time windows with forces in both frames."""
-    true = virtual_drive(folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road)
-    assembly = assembly_of_scene(force_scene(folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
+    true = virtual_drive(work_folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road)
+    assembly = assembly_of_scene(force_scene(work_folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
     p, rate = assembly.parameters, true["pitch_rate"]
     alone = pitch_rate_of_forces(_force_samples(assembly).values, 1 / SAMPLING_RATE, p)
     starts = np.rint(np.arange(window_count) * WINDOW_SECONDS * SAMPLING_RATE).astype(int)
@@ -265,11 +265,11 @@ def _body_force_row(row_id: str, title: str, road: Saved) -> Row:
     )
 
 
-def _twin_row(folder: Path) -> Row:
+def _twin_row(work_folder: Path) -> Row:
     """Row: growth law of a vehicle with unequal front and rear, whose lever arms count from the common centre of
     mass."""
-    true = virtual_drive(folder, 5.0, parameters="asymmetric_twin")
-    assembly = assembly_of_scene(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
+    true = virtual_drive(work_folder, 5.0, parameters="asymmetric_twin")
+    assembly = assembly_of_scene(force_scene(work_folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * SAMPLING_RATE)
     q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
     expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / SAMPLING_RATE, p)[at], q)))
@@ -281,12 +281,12 @@ def _twin_row(folder: Path) -> Row:
     return Observed("growth.twin", SYSTEM, what, float(deviation / expected), "").within(1.0, 0.05, why, "closed form")
 
 
-def _engine_rows(folder: Path) -> list[Row]:
+def _engine_rows(work_folder: Path) -> list[Row]:
     """Rows: largest difference between the engines' states under the same noise, until the pitch error reaches 0.05
     rad."""
-    true = virtual_drive(folder, MONTE_CARLO_SECONDS)
+    true = virtual_drive(work_folder, MONTE_CARLO_SECONDS)
     runs = {
-        engine: simulate(_noisy_scene(folder, MONTE_CARLO_SECONDS), engine)
+        engine: simulate(_noisy_scene(work_folder, MONTE_CARLO_SECONDS), engine)
         for engine in ("reference", "exudyn", "mujoco")
     }
     base = runs["reference"]
@@ -308,13 +308,13 @@ def _engine_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _step_row(folder: Path) -> Row:
+def _step_row(work_folder: Path) -> Row:
     """Row: change of the pitch by half the step under the same noise, divided by the standard deviation of the
     pitch."""
     runs = {
         step: np.array(
             [
-                simulate(_noisy_scene(folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1]
+                simulate(_noisy_scene(work_folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1]
                 for path in range(20)
             ]
         )
@@ -328,13 +328,13 @@ def _step_row(folder: Path) -> Row:
     return Observed("growth.step", SYSTEM, what, gap, "").at_most(1e-4, "noise belongs to the samples", "closed form")
 
 
-def _linear_row(folder: Path) -> Row:
+def _linear_row(work_folder: Path) -> Row:
     """Row: if vehicle and measurement are linearised, even the perturbed vehicle does not drift off."""
     linear = {"geometry": "linear"}
     true = simulate(changed_scene(road_scene(duration=60.0), vehicle=linear), "reference")
-    write_measurement(true, folder, 1 / SAMPLING_RATE)
+    write_measurement(true, work_folder, 1 / SAMPLING_RATE)
     start = dict(zip(STATES, true.states[0, :4].tolist(), strict=True))
-    wrong = force_scene(folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
+    wrong = force_scene(work_folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
     run = simulate(changed_scene(wrong, vehicle=linear, start=start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
     what = "largest pitch error of the perturbed model, linearised, in 60 s"

@@ -119,7 +119,7 @@ def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
     return "; ".join(unexpected) or expected
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for each engine; a quick run has all of them, over fewer unstable steps and durations."""
     rows: list[Row] = []
     endings: Saved = {}
@@ -139,7 +139,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             )
         )
     rows += [_explicit_solver_row(engine) for engine in ("reference", "mujoco")]
-    return [*rows, *_outside_engine_rows(), _disk_row(folder)], {"unstable": endings}
+    return [*rows, *_outside_engine_rows(), _disk_row(work_folder)], {"unstable": endings}
 
 
 def _outside_engine_rows() -> list[Row]:
@@ -168,14 +168,14 @@ def _outside_engine_rows() -> list[Row]:
     ]
 
 
-def _disk_row(folder: Path) -> Row:
+def _disk_row(work_folder: Path) -> Row:
     """Row: number of moments at which a full disk leaves an incomplete file or is not reported."""
     return Observed(
         "guards.full_disk",
         SYSTEM,
         f"number of moments (of {full_disk.MOMENTS_TRIED}) at which a full disk leaves an incomplete "
         "file or is not reported",
-        full_disk.damaged_moments(folder),
+        full_disk.damaged_moments(work_folder),
         "",
     ).at_most(0.0, "files are written whole or not at all", "none")
 

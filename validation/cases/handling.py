@@ -45,7 +45,7 @@ def lane_change(**changes: Any) -> Handling:
     return Handling(R19, controls=LANE_CHANGE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**changes)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on tyre forces, engines and mirror image; a full run also has turns, stops, slopes, energy, planted faults
     and computing time."""
     duration = 0.3 if quick else 1.0

@@ -24,7 +24,7 @@ QUICK_SPACING = 24
 
 
 @allowing_breaches("hard cases go beyond what is taken for granted: that they stay stable, or say so, is judged")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each case and implementation; a quick run has the last case of each family and every twenty-fourth
     before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()

@@ -72,10 +72,10 @@ class FreeRuns:
 
 @allowing_breaches("a spring that is too soft lets the run drift off, which is what is shown", "upright")
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: in each setting, a spring of 0.6 of the predicted stiffness fails and one of 1.2 holds; a full run also has
     the smallest stiffness by bisection. A quick run has one setting."""
-    measured = _prepared_runs(folder)
+    measured = _prepared_runs(work_folder)
     settings = JUDGED_SETTINGS[2:3] if quick else JUDGED_SETTINGS
     rows = [row for setting in settings for row in _limit_rows(setting, measured, "reference")]
     smallest: list[Any] = []
@@ -91,12 +91,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"law": measured.predicted_stiffness, "found": smallest}
 
 
-def _prepared_runs(folder: Path) -> FreeRuns:
-    true = virtual_drive(folder, DURATION, STEP, STEP)
+def _prepared_runs(work_folder: Path) -> FreeRuns:
+    true = virtual_drive(work_folder, DURATION, STEP, STEP)
     noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
-    quiet = assembly_of_scene(force_scene(folder, step=STEP, duration=DURATION))
+    quiet = assembly_of_scene(force_scene(work_folder, step=STEP, duration=DURATION))
     noisy = assembly_of_scene(
-        force_scene(folder, step=STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise)
+        force_scene(work_folder, step=STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise)
     )
     predicted_stiffness = holding_stiffness(quiet.parameters, pitch_error_growth(quiet).rate)
     return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness)

@@ -38,7 +38,7 @@ STEP = 1e-3
 
 
 @allowing_breaches("runs that nothing holds drift off, which is what is shown")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of engines and closed forms; a full run also has measurements, error growth, stabilisers, the asymmetric
     twin and planted faults."""
     car = r19()

@@ -77,7 +77,7 @@ class MeasuredDrive:
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of pitch gaps after a start off the constraint, by formulation, and of drift by noise with and without
     prescribed pitch. A quick run has short runs."""
     with TemporaryDirectory() as name:
@@ -101,13 +101,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _measured_drive(folder: Path, duration: float) -> MeasuredDrive:
+def _measured_drive(work_folder: Path, duration: float) -> MeasuredDrive:
     """Make a virtual measurement on the study road; write its forces, its pitch, and the pitch integrated from a noisy
     gyro."""
-    measured = virtual_drive(folder, duration, STEP, STEP)
+    measured = virtual_drive(work_folder, duration, STEP, STEP)
     walk = RATE_WALK * np.sqrt(STEP) * np.cumsum(normal_samples(SEED, 0, len(measured.times), 1)[:, 0])
-    write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
-    return MeasuredDrive(folder, duration, measured["pitch"])
+    write_time_series(work_folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
+    return MeasuredDrive(work_folder, duration, measured["pitch"])
 
 
 def _pitch_errors(assembly: Assembly, drive: MeasuredDrive) -> dict[str, np.ndarray]:

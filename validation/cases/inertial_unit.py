@@ -59,7 +59,7 @@ SAMPLE_PERIOD, RUN_SECONDS = 5e-3, 2.0
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for exact rates, the laws, the ten-minute example, gyro bias and the recording; a full run also has the
     section forces."""
     paths = 200 if quick else 4000

@@ -49,14 +49,14 @@ PROCESS_TIMEOUT = 900
 CASE_ID, CASE_QUANTITY = "instruction_counts", f"instructions of {len(ENGINE_METHODS)} methods counted in two processes"
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of instruction counts of every method in two processes under valgrind; a quick run has none."""
     if quick:
         return [], {"instructions": {}}
     if shutil.which("valgrind") is None:
         return [not_run(CASE_ID, SYSTEM, CASE_QUANTITY, "valgrind is not installed")], {"instructions": {}}
     try:
-        first, second = _instruction_counts(folder / "instructions")
+        first, second = _instruction_counts(work_folder / "instructions")
     except (subprocess.SubprocessError, OSError) as error:
         reason = f"valgrind failed: {str(error).splitlines()[0][:120]}"
         return [not_run(CASE_ID, SYSTEM, CASE_QUANTITY, reason)], {"instructions": {}}
@@ -80,9 +80,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"instructions": dict(zip(ENGINE_METHODS, per_step.tolist(), strict=True))}
 
 
-def _instruction_counts(folder: Path) -> np.ndarray:
+def _instruction_counts(work_folder: Path) -> np.ndarray:
     """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler writes them between the runs."""
-    folder.mkdir()
+    work_folder.mkdir()
     mass, damping, stiffness, *_ = linearised(assembly_of_scene(road_scene()).vehicle)
     march = {
         "masses": np.diag(mass).tolist(),
@@ -97,7 +97,7 @@ def _instruction_counts(folder: Path) -> np.ndarray:
         "--tool=callgrind",
         "--instr-atstart=no",
         f"--dump-before={instructions_run.MARKING_SYSTEM_CALL}",
-        f"--callgrind-out-file={folder}/count.%p",
+        f"--callgrind-out-file={work_folder}/count.%p",
         sys.executable,
         instructions_run.__file__,
         json.dumps(march),
@@ -106,10 +106,10 @@ def _instruction_counts(folder: Path) -> np.ndarray:
     marches = len(ENGINE_METHODS) * len(STEP_COUNTS)
     counts = [
         [_count_of_dump(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
-        for path in folder.glob("count.*")
+        for path in work_folder.glob("count.*")
         if path.with_name(f"{path.name}.{marches + 1}").exists()
     ]
-    shutil.rmtree(folder)
+    shutil.rmtree(work_folder)
     return np.array(counts, float).reshape(2, -1, len(STEP_COUNTS))
 
 

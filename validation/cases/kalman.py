@@ -49,10 +49,10 @@ SENSORS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, P
     "models and deviations are wrong on purpose: the filter is to hold the run all the same", "innovations"
 )
 @allowing_breaches("without a measured pitch a run is lost, which is what is shown", "upright")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on consistency, measurement gaps and a short stabilised run; a full run also has covariances, damage, and a
     filter with a gyro alone."""
-    run_folder = folder / "kalman"
+    run_folder = work_folder / "kalman"
     run_folder.mkdir(exist_ok=True)
     if quick:
         rows = _consistency_rows(run_folder, 2, 4.0, ("right",)) + _gap_rows(run_folder, 4.0, None, ("angle",))
@@ -70,13 +70,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
 
 
-def _consistency_rows(folder: Path, run_count: int, duration: float, filter_names: tuple[str, ...]) -> list[Row]:
+def _consistency_rows(work_folder: Path, run_count: int, duration: float, filter_names: tuple[str, ...]) -> list[Row]:
     """Rows: mean normalised squares of estimation errors (NEES) and innovations (NIS) per degree of freedom. Filters
     with a wrong noise level take a quarter of the runs."""
     by_filter: dict[str, list[Any]] = {name: [] for name in filter_names}
     for i in range(run_count):
         scales = {name: VARIANCE_FACTORS[name] for name in filter_names if name == "right" or i < run_count // 4}
-        for name, consistent in runs.filter_consistency(folder, duration, SEED + i, scales).items():
+        for name, consistent in runs.filter_consistency(work_folder, duration, SEED + i, scales).items():
             by_filter[name].append(consistent)
     errors, surprises = (
         {name: np.concatenate([consistent[j] for consistent in some]) for name, some in by_filter.items()}
@@ -160,12 +160,12 @@ def _band_row(row_name: str, quantity: str, values: np.ndarray, degrees_of_freed
     ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 
-def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
+def _gap_rows(work_folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
     """Rows: pitch error and count of missing samples if the file of the angle, of the rate, or of both has missing
     samples."""
     rows = []
     for name in sensors:
-        gaps = run_with_missing_samples(folder, duration, SEED, SENSORS[name], LOST_SHARE, outage)
+        gaps = run_with_missing_samples(work_folder, duration, SEED, SENSORS[name], LOST_SHARE, outage)
         gaps_text = f"{LOST_SHARE:.0%} of the samples lost" + (
             f", none from {outage[0]:g} to {outage[1]:g} s" if outage else ""
         )
@@ -184,19 +184,19 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     return rows
 
 
-def _short_run_rows(folder: Path) -> list[Row]:
-    error = scores_of_stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
+def _short_run_rows(work_folder: Path) -> list[Row]:
+    error = scores_of_stabilised(work_folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
     what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
     return [Observed("kalman.short", SYSTEM, what, error, "rad").at_most(5e-3, why, "none")]
 
 
-def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
+def _loop_rows(work_folder: Path) -> tuple[list[Row], list[list[float]]]:
     """Rows and table: variances of the errors of filter estimate and of stabilised run, compared with the discrete
     Lyapunov equation."""
     force = deviation_at_period(35.0, COARSE_PERIOD)
-    step, covariance = closed_loop_covariance(folder, force)
-    errors = [loop_errors(folder, force, LOOP_SECONDS, SEED + i) for i in range(LOOP_RUN_COUNT)]
+    step, covariance = closed_loop_covariance(work_folder, force)
+    errors = [loop_errors(work_folder, force, LOOP_SECONDS, SEED + i) for i in range(LOOP_RUN_COUNT)]
     squares = np.mean([np.mean(error_series**2, axis=0) for error_series in errors], axis=0)
     spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))
     names = ("z1 - z3", "z2 - z3", "pitch", "z1' - z3'", "z2' - z3'", "pitch rate")

@@ -43,7 +43,7 @@ ROUNDING_REASON = "the same tableau and laws; sums are taken in another order"
 NO_DAMPING = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: accelerations, bounces, energy and wheel loads of vehicles whose tyres lift off. A quick run has one
     vehicle, half a second of bounces, short runs on roads, and no hub forces."""
     vehicles = VEHICLE_SETS[-1:] if quick else VEHICLE_SETS

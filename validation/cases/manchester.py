@@ -43,7 +43,7 @@ FIRST_COLUMNS = {"right": 2, "left": 5}
 
 
 @allowing_breaches("the benchmark takes elastic steel, as its codes do", "elastic")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 compared with the published results; a full run also has case A-1 at every mm, searches, profile
     files, and computing times."""
     published = PUBLISHED_CONTACT[np.isin(PUBLISHED_CONTACT[:, 0], QUICK_SHIFTS)] if quick else PUBLISHED_CONTACT

@@ -143,27 +143,27 @@ FULL_FAULTS = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of single faults on one road; a full run also has clean recordings on four roads, several faults at once,
     and other noise samples."""
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, finding_texts = [], dict[str, str]()
     for fault in QUICK_FAULTS if quick else QUICK_FAULTS + FULL_FAULTS:
-        findings = planted_findings(virtual, folder, fault.spoil, **fault.faults)
+        findings = planted_findings(virtual, work_folder, fault.spoil, **fault.faults)
         rows += _fault_rows(fault, findings)
         finding_texts[fault.name] = findings[0].text if findings else "nothing"
-    rows.append(_clean_recordings_row("quick", [planted_findings(virtual, folder)]))
+    rows.append(_clean_recordings_row("quick", [planted_findings(virtual, work_folder)]))
     if not quick:
         rows += [
-            *_clean_recording_rows(folder),
-            *_wrong_vehicle_rows(folder),
-            *_three_faults_rows(virtual, folder),
-            _mean_delay_row(virtual, folder),
+            *_clean_recording_rows(work_folder),
+            *_wrong_vehicle_rows(work_folder),
+            *_three_faults_rows(virtual, work_folder),
+            _mean_delay_row(virtual, work_folder),
         ]
-        size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, folder), "drift")
+        size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, work_folder), "drift")
         rows += [
             _size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
-            *_moving_car_rows(folder),
+            *_moving_car_rows(work_folder),
         ]
     return rows, {"said": finding_texts}
 
@@ -218,24 +218,24 @@ def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> R
     )
 
 
-def _clean_recording_rows(folder: Path) -> list[Row]:
+def _clean_recording_rows(work_folder: Path) -> list[Row]:
     """Rows: no errors or doubts for clean recordings of 5 to 20 s, from four roads, two vehicles and two noise samples
     each."""
     return [
         _clean_recordings_row(
             vehicle,
-            [planted_findings(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)],
+            [planted_findings(measurement(vehicle, road), work_folder, seed=seed) for road in roads for seed in range(2)],
         )
         for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
     ]
 
 
-def _wrong_vehicle_rows(folder: Path) -> list[Row]:
+def _wrong_vehicle_rows(work_folder: Path) -> list[Row]:
     """Rows on recordings of a car that differs from its vehicle file R19-free: heavier, with stiffer springs, or with
     weaker dampers."""
     findings_by_car = {
         name: errors_and_doubts(
-            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder
+            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), work_folder
         )
         for name, of_recording in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
     }
@@ -257,10 +257,10 @@ def _wrong_vehicle_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) -> list[Row]:
+def _three_faults_rows(virtual_measurement: VirtualMeasurement, work_folder: Path) -> list[Row]:
     """Rows: three faults at once are all named, and the size of one of them is right."""
     spoil = exchanged_hubs(("fl", "fr")), scaled_channels(1e-3, "rr_fz")
-    findings = planted_findings(virtual_measurement, folder, *spoil, delay={"rl_fz": PLANTED_DELAY})
+    findings = planted_findings(virtual_measurement, work_folder, *spoil, delay={"rl_fz": PLANTED_DELAY})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
         ", ".join(sorted({f.check for f in findings})),
@@ -275,11 +275,11 @@ def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) ->
     ]
 
 
-def _mean_delay_row(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
+def _mean_delay_row(virtual_measurement: VirtualMeasurement, work_folder: Path) -> Row:
     """Row: mean over several noise samples of the delay that the check states for one channel, as a test of its
     bias."""
     samples = [
-        planted_findings(virtual_measurement, folder, seed=seed, **QUICK_FAULTS[0].faults)
+        planted_findings(virtual_measurement, work_folder, seed=seed, **QUICK_FAULTS[0].faults)
         for seed in range(NOISE_SAMPLE_COUNT)
     ]
     late = 1e3 * float(
@@ -290,7 +290,7 @@ def _mean_delay_row(virtual_measurement: VirtualMeasurement, folder: Path) -> Ro
     return Observed("measured_checks.spread", SYSTEM, what, late, "ms").within(3.0, 0.15, why, "closed form")
 
 
-def _moving_car_rows(folder: Path) -> list[Row]:
+def _moving_car_rows(work_folder: Path) -> list[Row]:
     """Rows: inertial checks of a telephone recording in a real car, if the recording is available."""
     path = car.find_recording()
     if path is None:
@@ -302,7 +302,7 @@ def _moving_car_rows(folder: Path) -> list[Row]:
     degrees[:, 4] *= DEGREES_PER_RADIAN
     down[:, :6] *= np.tile(measured_car.TELEPHONE_TO_CAR, 2)
     findings = {
-        name: check(measured_car.phone_recording(values, folder / f"{name}.columns"), None)
+        name: check(measured_car.phone_recording(values, work_folder / f"{name}.columns"), None)
         for name, values in (("clean", clean), ("degrees", degrees), ("down", down))
     }
     errors = {

@@ -26,7 +26,7 @@ CHI_SQUARE_LIMIT = 18.4
 """99.99 % quantile of the chi-square distribution with 2 degrees of freedom."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the drive in Exudyn and MuJoCo and of the repeated drive over 2 s; a full run takes 8 s and also
     identifies the tyres."""
     scene = _drive_scene([0.0, 2.0] if quick else [0.0, 8.0])

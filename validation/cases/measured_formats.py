@@ -76,7 +76,7 @@ def preserved_texts(measurement_source: Source) -> dict[str, bool]:
     }
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of round trips through each format, of two sampling rates in one file, and of the choice of number format; a
     full run also measures memory."""
     rows: list[Row] = []
@@ -180,11 +180,11 @@ def two_rates_row(path: Path, file_extension: str) -> Row:
     ).at_most(1e-12, "each group has a clock of its own", "closed form")
 
 
-def form_rows(folder: Path) -> list[Row]:
+def form_rows(work_folder: Path) -> list[Row]:
     """Rows: CSV files in the forms that loggers, spreadsheets and scripts write, and files of other kinds, are read
     exactly or refused."""
     files = (*csv_forms.FILES, *kinds.FILES)
-    ends = [_difference_or_error(odd, folder / f"form {i}") for i, odd in enumerate(files)]
+    ends = [_difference_or_error(odd, work_folder / f"form {i}") for i, odd in enumerate(files)]
     crashed = sorted({odd.name for odd, end in zip(files, ends, strict=True) if isinstance(end, str)})
     readable = [(odd, end) for odd, end in zip(files, ends, strict=True) if odd.expected_outcome != "refused"]
     errors = [end if isinstance(end, float) else float("inf") for _, end in readable]
@@ -217,11 +217,11 @@ def form_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _difference_or_error(odd_file: OddFile, folder: Path) -> float | str | None:
+def _difference_or_error(odd_file: OddFile, work_folder: Path) -> float | str | None:
     """Error of the values read from a file; None if the file is refused with a reason; text of any other error that is
     raised."""
     try:
-        return odd_file.error(folder)
+        return odd_file.error(work_folder)
     except InputError:
         return None
     except Exception as error:
@@ -236,11 +236,11 @@ def wheel_force() -> np.ndarray:
     return load
 
 
-def resolution_rows(folder: Path) -> list[Row]:
+def resolution_rows(work_folder: Path) -> list[Row]:
     """Rows: change of the damage of the road without its pothole by integer and by floating-point samples. RPC III
     files are written in floating point for this reason."""
     load = wheel_force()
-    path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
+    path = write(work_folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read_channels(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
     rounded_load = step * np.round(load / step)

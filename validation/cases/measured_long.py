@@ -39,19 +39,19 @@ LONG_DURATION = 24.0
 """Length (s) of the run whose memory is measured."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of section forces, of counting, and of a run in blocks in MuJoCo; a full run also has all engines, a killed
     run, memory, and exported files."""
     rows = [*_guide_rows(quick), *_counting_rows()]
     if quick:
-        return [*rows, _equal_blocks_row(folder, "mujoco", "kalman", 0.3)], {}
+        return [*rows, _equal_blocks_row(work_folder, "mujoco", "kalman", 0.3)], {}
     lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.2}
     rows += [
-        _equal_blocks_row(folder, engine, method, seconds)
+        _equal_blocks_row(work_folder, engine, method, seconds)
         for engine, seconds in lasting.items()
         for method in ("none", "kalman", "prescribed")
     ]
-    return [*rows, _killed_row(folder), *_memory_rows(folder), *_export_rows(folder)], {}
+    return [*rows, _killed_row(work_folder), *_memory_rows(work_folder), *_export_rows(work_folder)], {}
 
 
 def _guide_rows(quick: bool) -> list[Row]:
@@ -146,9 +146,9 @@ def _counting_rows() -> list[Row]:
     ]
 
 
-def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float) -> Row:
+def _equal_blocks_row(work_folder: Path, engine: str, stabiliser: str, seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
-    run_folder = folder / f"blocks {seconds}"
+    run_folder = work_folder / f"blocks {seconds}"
     run_folder.mkdir(exist_ok=True)
     job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
     bits = []
@@ -167,11 +167,11 @@ def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
 
 
-def _killed_row(folder: Path) -> Row:
+def _killed_row(work_folder: Path) -> Row:
     """Row: number of channels that differ between a run that was killed twice and a run that was not."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):
-        run_folder = folder / f"killed {times}"
+        run_folder = work_folder / f"killed {times}"
         run_folder.mkdir()
         job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS)
         if times:
@@ -190,10 +190,10 @@ def _killed_row(folder: Path) -> Row:
     ).at_most(0.0, "a checkpoint is written whole or not at all", "closed form")
 
 
-def _memory_rows(folder: Path) -> list[Row]:
+def _memory_rows(work_folder: Path) -> list[Row]:
     """Rows: peak memory for an hour of recording, extrapolated from a shorter recording, and speed of the run."""
-    section_run_of_recording(folder, LONG_DURATION, PATTERN_SECONDS)
-    words = map(str, (folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))
+    section_run_of_recording(work_folder, LONG_DURATION, PATTERN_SECONDS)
+    words = map(str, (work_folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     output_lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in output_lines], float)  # of every block: seconds, memory, processor
@@ -218,9 +218,9 @@ def _memory_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _export_rows(folder: Path) -> list[Row]:
+def _export_rows(work_folder: Path) -> list[Row]:
     """Rows: section forces written in every format and read back; a measured check channel compared with the run."""
-    run_folder = folder / "handed on"
+    run_folder = work_folder / "handed on"
     run_folder.mkdir()
     job = section_run_of_recording(run_folder, 2.0, PATTERN_SECONDS)
     outcome = run(job, run_folder / "run")

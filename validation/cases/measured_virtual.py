@@ -71,20 +71,20 @@ CHAIN_TESTS = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on virtual measurements through the whole chain of files, run and damage with ten noise samples, on the
     engines, and on the predicted time of trust; a quick run has one short noise sample."""
     if quick:
-        return _quick_rows(folder), {}
+        return _quick_rows(work_folder), {}
     rows, data = list[Row](), dict[str, Any]()
     for proof in CHAIN_TESTS:
-        proved, ratios = _format_rows(proof, folder / proof.name)
+        proved, ratios = _format_rows(proof, work_folder / proof.name)
         rows += proved
         data[proof.name] = ratios
-    return [*rows, *_trust_time_rows(), *_moving_car_rows(folder / "moving")], data
+    return [*rows, *_trust_time_rows(), *_moving_car_rows(work_folder / "moving")], data
 
 
-def write_user_vehicle(folder: Path) -> str:
+def write_user_vehicle(work_folder: Path) -> str:
     """Write a vehicle file that differs from R19-free in every spring, damper and mass, without symmetry; returns its
     name."""
     text, number = (SHIPPED_FOLDER / "r19_free.toml").read_text(encoding="utf-8"), count()
@@ -92,11 +92,11 @@ def write_user_vehicle(folder: Path) -> str:
     def scaled(number_match: re.Match[str]) -> str:
         return f"{number_match[1]} = {float(number_match[2]) * (1.0 + 0.02 * (next(number) % 11 - 5))!r}"
 
-    (folder / "own.toml").write_text(re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", scaled, text, flags=re.M))
+    (work_folder / "own.toml").write_text(re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", scaled, text, flags=re.M))
     return "own.toml"
 
 
-def measurement_of_test(chain_test: ChainTest, folder: Path, duration: float) -> VirtualMeasurement:
+def measurement_of_test(chain_test: ChainTest, work_folder: Path, duration: float) -> VirtualMeasurement:
     """The virtual measurement of a vehicle on a road; faults and noise are added to each sample later."""
     table = {
         "duration": duration,
@@ -104,7 +104,7 @@ def measurement_of_test(chain_test: ChainTest, folder: Path, duration: float) ->
         "frame": chain_test.frame,
         "sections": ["front left"],
     }
-    vehicle = cut(load_vehicle(chain_test.vehicle, folder), "body")
+    vehicle = cut(load_vehicle(chain_test.vehicle, work_folder), "body")
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
@@ -120,21 +120,21 @@ def planted_faults(bits: int) -> Faults:
 
 
 def recording_from_files(
-    virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, format_name: str, folder: Path
+    virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, format_name: str, work_folder: Path
 ) -> Recording:
     """Recording read back through a scene, after two recorders, one for hubs and one for the inertial unit, have
     written the samples in a file format."""
-    folder.mkdir(parents=True)
+    work_folder.mkdir(parents=True)
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
     for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -RECORDER_DELAY)):
         signals = tuple(signal for signal, taken in zip(virtual.signals, chosen, strict=True) if taken)
-        write(folder / f"{name}.{format_name}", [channel_group(signals, samples[:, chosen], virtual.period)])
+        write(work_folder / f"{name}.{format_name}", [channel_group(signals, samples[:, chosen], virtual.period)])
         text.append(map_lines(signals, f"{name}.{format_name}", offset))
-    (folder / "scene.toml").write_text("\n".join(text))
-    if (taken := folder.parent / vehicle).is_file():
-        (folder / vehicle).write_bytes(taken.read_bytes())
-    return read_files(load(folder / "scene.toml"), folder)
+    (work_folder / "scene.toml").write_text("\n".join(text))
+    if (taken := work_folder.parent / vehicle).is_file():
+        (work_folder / vehicle).write_bytes(taken.read_bytes())
+    return read_files(load(work_folder / "scene.toml"), work_folder)
 
 
 def stabilised_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine: str = "mujoco") -> SectionRun:
@@ -142,18 +142,18 @@ def stabilised_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 
-def _format_rows(chain_test: ChainTest, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
+def _format_rows(chain_test: ChainTest, work_folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """Rows and mean damage ratios of ten noise samples through every file format, stabilised. The first sample is also
     run free and in the other engine."""
-    folder.mkdir()
-    write_user_vehicle(folder)
-    true, planted = measurement_of_test(chain_test, folder, DURATION), planted_faults(chain_test.bits)
+    work_folder.mkdir()
+    write_user_vehicle(work_folder)
+    true, planted = measurement_of_test(chain_test, work_folder, DURATION), planted_faults(chain_test.bits)
     ratios: dict[str, list[dict[str, float]]] = {form: [] for form in chain_test.formats}
     off = dict.fromkeys(chain_test.formats, 0.0)
     for path in range(NOISE_SAMPLE_COUNT):
         samples, known = true.samples(planted, SEED, path), list[tuple[np.ndarray, dict[str, float]]]()
         for form in chain_test.formats:
-            format_folder = folder / f"{form}{path}"
+            format_folder = work_folder / f"{form}{path}"
             recording = recording_from_files(true, samples, chain_test.vehicle, form, format_folder)
             off[form] = max(off[form], _largest_channel_change(recording, true, samples))
             values = recording.columns.block(recording.columns.names, 0, recording.count)
@@ -171,8 +171,8 @@ def _format_rows(chain_test: ChainTest, folder: Path) -> tuple[list[Row], dict[s
         for form, ratios_of in ratios.items()
     }
     rows = [row for form in chain_test.formats for row in _damage_rows(chain_test, form, off[form], means[form])]
-    first = recording_from_files(true, true.samples(planted, SEED), chain_test.vehicle, "csv", folder / "beside")
-    return [*rows, *_other_run_rows(chain_test, first, true, folder)], means
+    first = recording_from_files(true, true.samples(planted, SEED), chain_test.vehicle, "csv", work_folder / "beside")
+    return [*rows, *_other_run_rows(chain_test, first, true, work_folder)], means
 
 
 def _differ_by_rounding(first_samples: np.ndarray, second_samples: np.ndarray) -> bool:
@@ -226,14 +226,14 @@ def _damage_rows(
 
 
 def _other_run_rows(
-    chain_test: ChainTest, recording: Recording, true_measurement: VirtualMeasurement, folder: Path
+    chain_test: ChainTest, recording: Recording, true_measurement: VirtualMeasurement, work_folder: Path
 ) -> list[Row]:
     """Rows: the recording simulated in Exudyn and MuJoCo, free and stabilised, and the verdicts on these runs."""
     free = stabilised_run(recording, true_measurement.vehicle, AttitudeHold("none"))
     jobs = {
         engine: stabilised_run(recording, true_measurement.vehicle, chain_test.hold, engine) for engine in ENGINES[1:]
     }
-    runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
+    runs = {engine: march(job, work_folder / engine) for engine, job in jobs.items()}
     beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
     apart = float((np.abs(beside - two).max(axis=0) / np.maximum(np.abs(beside).max(axis=0), 1e-6)).max())
     last_run = runs[ENGINES[-1]]
@@ -262,7 +262,7 @@ def _other_run_rows(
         true_measurement.vehicle, level, recording.period, recording.duration, chain_test.frame
     ).trusted_time
     try:
-        run = march(free, folder / "free")
+        run = march(free, work_folder / "free")
     except RunFailed as error:
         assert isinstance(error.partial, SectionOutcome)
         run = error.partial
@@ -341,15 +341,15 @@ def frame_of_measurement(true_measurement: VirtualMeasurement) -> str:
     return next(signal.frame for signal in true_measurement.signals if signal.at in true_measurement.vehicle.hubs)
 
 
-def _moving_car_rows(folder: Path) -> list[Row]:
+def _moving_car_rows(work_folder: Path) -> list[Row]:
     """Rows on a real car: a telephone's gyro and accelerometers compared with the angles of its camera, from two files
     with different clocks."""
     path, what = moving_car.find_recording(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
         id, gyro = "measured_virtual.moving_gyro", f"{what} ratio of the gyro to the camera's angles"
         return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.RECORDING_FILE}")]
-    scene = measured_car.recording_scene(path, cut(load_vehicle("r19_free"), "body"), folder)
-    recording = read_files(scene, folder)
+    scene = measured_car.recording_scene(path, cut(load_vehicle("r19_free"), "body"), work_folder)
+    recording = read_files(scene, work_folder)
     findings = check_recording(recording, None, scene.places, {})
     ratio = next((f.size for f in findings if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in findings if f.check == "shift" and "roll_rate" in f.place), None)
@@ -369,14 +369,14 @@ def _moving_car_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _quick_rows(folder: Path) -> list[Row]:
+def _quick_rows(work_folder: Path) -> list[Row]:
     """Rows of a quick run: one short noise sample through a file, the damage of a spring, and the closed law of
     drift."""
     proof = CHAIN_TESTS[0]
-    true = measurement_of_test(proof, folder, 0.6)
+    true = measurement_of_test(proof, work_folder, 0.6)
     samples = true.samples(read(Faults, {"noise": NOISE_LEVELS}, ""), SEED)
-    recording = recording_from_files(true, samples, proof.vehicle, "csv", folder / "quick")
-    run = march(stabilised_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
+    recording = recording_from_files(true, samples, proof.vehicle, "csv", work_folder / "quick")
+    run = march(stabilised_run(recording, true.vehicle, proof.hold), work_folder / "quick" / "run")
     wrong = errors_of_run(run, true)
     level = MeasurementErrors(8.0, 1.0)
     law = rigid_vehicle(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))

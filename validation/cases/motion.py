@@ -55,7 +55,7 @@ LOOSE_SENSOR = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "da
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of clean motions in space, noise, each engine's simulated readings, and drift; a quick run has few paths and
     runs of 1 s."""
     rows = [row for name in SENSOR_ARRANGEMENTS for row in _exact_rows(name)]

@@ -25,7 +25,7 @@ TIMING_ROUNDS, TIMED_STEP_COUNT = 5, 1000
 """Number of interleaved timing rounds for the ratio of computing times, and number of steps of each timed run."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of three cars; a quick run has the shipped car and a tenth of the states."""
     cars = {"r19_free": r19()} if quick else {"r19_free": r19(), "twin": cut(twin(), "body"), "rough": rough_car()}
     rows = [row for name, car in cars.items() for row in _agreement_rows(name, car, quick)]

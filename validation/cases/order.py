@@ -62,7 +62,7 @@ def fitted_order(steps: tuple[float, ...], errors_of_steps: list[float]) -> floa
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each integrator, compared with DOP853 at a tolerance of 1e-13. A quick run has one halving of the step
     over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)

@@ -23,9 +23,9 @@ STATE_COUNTS = {True: 10, False: 100}
 """Number of random states, for a quick run (True) and a full run (False)."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of energies and of a lane change, which takes 0.5 s in a quick run and 1.5 s in a full one."""
-    path = folder / "saloon.xml"
+    path = work_folder / "saloon.xml"
     path.write_text(SALOON, encoding="utf-8")
     handling = Handling(vehicle_of_file(path), controls=LANE_CHANGE_CONTROLS)
     return [_energy_row(handling, quick), *_lane_change_rows(handling, 0.5 if quick else 1.5)], {}

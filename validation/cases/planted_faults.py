@@ -46,7 +46,7 @@ QUICK_SPACING, FEWEST_FAULTS = 16, 40
 """Every so many faults of a campaign are planted in a quick run; and the least number of faults that must be caught."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on planted faults by system; a full run also has a row over all systems. A quick run plants every sixteenth
     fault of each system."""
     plane = (

@@ -30,7 +30,7 @@ BOUND_REASON = (
 )
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for both covariances compared with 60-digit arithmetic, for their difference, and for Monte Carlo; a quick
     run has 2000 paths."""
     exact = {

@@ -73,7 +73,7 @@ SECONDS_REASON = "a target about seconds, which are reported and never gated"
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; a quick run has five of the eleven
     problems, and a part of their settings."""
     rounds = TIMING_ROUNDS[quick]

@@ -50,19 +50,19 @@ CHI_SQUARE_LIMIT = 52.0
 small exceed it."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on a known car with repeated noise; a full run also has the measured race car."""
-    rows = _known_car_rows(folder)
+    rows = _known_car_rows(work_folder)
     if quick:
         return rows, {}
     data = data_folder()
     if data is None or not (data / RACE_CAR_FILE).is_file():
         return [*rows, *_rows_not_run(f"needs {RACE_CAR_FILE} in the folder that TWINRIG_DATA names")], {}
-    chosen = _identified_race_car(data / RACE_CAR_FILE, folder)
-    return [*rows, *_race_car_rows(chosen), _sensors_row(folder / "race.csv")], _saved_data(chosen)
+    chosen = _identified_race_car(data / RACE_CAR_FILE, work_folder)
+    return [*rows, *_race_car_rows(chosen), _sensors_row(work_folder / "race.csv")], _saved_data(chosen)
 
 
-def _car_scene(folder: Path, values: dict[str, float]) -> SingleTrackScene:
+def _car_scene(work_folder: Path, values: dict[str, float]) -> SingleTrackScene:
     """Scene of a car with a drive that steers, brakes and accelerates; ``values`` replaces parameters by their scene
     keys."""
     table: dict[str, Any] = {
@@ -76,17 +76,17 @@ def _car_scene(folder: Path, values: dict[str, float]) -> SingleTrackScene:
     for key, value in values.items():
         owner, name = key.split(".")
         table[owner][name] = value
-    return build(table, "known car", folder)
+    return build(table, "known car", work_folder)
 
 
-def _write_drive(folder: Path) -> None:
+def _write_drive(work_folder: Path) -> None:
     steer = 0.045 * np.sin(1.1 * DRIVE_TIMES) * np.cos(0.35 * DRIVE_TIMES) + 0.015 * np.sin(3.7 * DRIVE_TIMES)
     columns = {
         "time": ("s", DRIVE_TIMES),
         "steer": ("rad", steer),
         "speed": ("m/s", 20.0 + 3.0 * np.sin(0.4 * DRIVE_TIMES)),
     }
-    write_table(folder / "known.csv", columns)
+    write_table(work_folder / "known.csv", columns)
 
 
 def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
@@ -102,9 +102,9 @@ def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
     return problem_of(_car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass=5.0)
 
 
-def _known_car_rows(folder: Path) -> list[Row]:
-    _write_drive(folder)
-    scene, truth = _car_scene(folder, TRUE_PARAMETERS), np.array(list(TRUE_PARAMETERS.values()))
+def _known_car_rows(work_folder: Path) -> list[Row]:
+    _write_drive(work_folder)
+    scene, truth = _car_scene(work_folder, TRUE_PARAMETERS), np.array(list(TRUE_PARAMETERS.values()))
     solved = [uncertainty(fit(_noisy_problem(scene, seed))) for seed in range(NOISE_REPEATS)]
     distance, worst = 0.0, 0.0
     for known in solved:
@@ -150,8 +150,8 @@ def _coverage(fits: list[Uncertainty]) -> float:
     return float(np.mean(shares, axis=0).min())
 
 
-def _identified_race_car(file: Path, folder: Path) -> IdentifiedVehicle:
-    path = write_plain_table(file, folder / "race.csv")
+def _identified_race_car(file: Path, work_folder: Path) -> IdentifiedVehicle:
+    path = write_plain_table(file, work_folder / "race.csv")
     table = {"title": "race car", "system": "single-track", **RACE_CAR, "drive": {"file": path.name, "low_pass": 10.0}}
     times = read_drive(path).times
     middle = float(times[round(IDENTIFIED_SHARE * len(times))])

@@ -38,12 +38,12 @@ and true error."""
 @allowing_breaches(
     "random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same"
 )
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on all recommendations for all scenes; a quick run has those of one engine for one scene."""
     both = (
-        [scene_verdicts("pitch-plane", QUICK_SCENE_NUMBER, folder, (QUICK_ENGINE,))]
+        [scene_verdicts("pitch-plane", QUICK_SCENE_NUMBER, work_folder, (QUICK_ENGINE,))]
         if quick
-        else _verdicts_in_processes(folder)
+        else _verdicts_in_processes(work_folder)
     )
     verdicts, refused = [of_scene for of_scene, _ in both], [why for _, of_scene in both for why in of_scene]
     return _promise_rows(verdicts, refused), {
@@ -52,7 +52,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _verdicts_in_processes(folder: Path) -> list[SceneVerdicts]:
+def _verdicts_in_processes(work_folder: Path) -> list[SceneVerdicts]:
     """Verdicts on the recommendations for all scenes, computed by at most two processes, the long computations
     first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
@@ -60,21 +60,21 @@ def _verdicts_in_processes(folder: Path) -> list[SceneVerdicts]:
         return [
             job.result()
             for job in [
-                pool.submit(scene_verdicts, system, n, folder)
+                pool.submit(scene_verdicts, system, n, work_folder)
                 for system in reversed(SCENE_COUNTS)
                 for n in range(SCENE_COUNTS[system])
             ]
         ]
 
 
-def scene_verdicts(system: str, scene_number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> SceneVerdicts:
+def scene_verdicts(system: str, scene_number: int, work_folder: Path, engines: tuple[str, ...] = ENGINES) -> SceneVerdicts:
     """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
     verdicts if the scene was refused more than REDRAWS times."""
     refused: list[str] = []
     for n in range(scene_number, scene_number + (REDRAWS + 1) * REDRAW_STRIDE, REDRAW_STRIDE):
         try:
             reasons = (
-                verdicts_on_pitch_plane(random_scene(n, folder), engines)
+                verdicts_on_pitch_plane(random_scene(n, work_folder), engines)
                 if system == "pitch-plane"
                 else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system, n))
             )

@@ -49,7 +49,7 @@ SYMMETRY_ZERO = 1e-20
 """Variances below this share of the largest variance count as zero by symmetry."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: covariance compared with quadrature, closed forms and limits, and the fast method for many speeds. A quick
     run leaves out the engines' own linearisations, and compares two vehicles at one speed each."""
     routes = [_quadrature_comparison(*job) for job in _comparisons(quick)]

@@ -39,7 +39,7 @@ DIFFERENCES_REASON = "central differences of order six leave 1e-13 of smooth law
 SAME_LAWS_REASON = "the same laws, added up in another order: 1e-16 of the largest force per operation"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the linearised matrices; a full run also has accelerations, simulations, rest and computing times."""
     rows: list[Row] = []
     for name in VEHICLE_NAMES[not quick]:

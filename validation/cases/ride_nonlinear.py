@@ -38,7 +38,7 @@ MILD_DAMPING = 1500.0
 """Damping (N s/m) of the spring whose friction or stops are tested alone."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of gains, fixed point, one road level and a short run in time; a full run has three levels and a vehicle of
     19 degrees of freedom in time."""
     rows = [*_gain_rows(), *_fixed_point_rows()]

@@ -53,7 +53,7 @@ MISPRINTED_FREQUENCY = 10.0
 """Frequency (Hz) at which the standard's table prints Wd = 212 although its own parameters give 202."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of closed forms by second methods, frequency weightings, and fits to an artificial road; a full run also has
     fits to measured roads."""
     rows = [*_paper_rows(), *_input_rows(), *_isotropic_rows(), *_weighting_rows()]

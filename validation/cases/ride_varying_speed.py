@@ -52,7 +52,7 @@ TIMED_REPEATS = 20
 """Number of repetitions in the timing of the covariance, which is too short to time once."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of limits and of the adjoint with a half car; a full run also has larger vehicles, Monte Carlo, and the
     cost."""
     rows = [*_limit_rows("half_car", SHORT_STOP_PROFILE), _adjoint_row(), _damped_tyre_row()]

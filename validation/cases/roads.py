@@ -23,7 +23,7 @@ SEED = 3
 """Seed of the class C road's random phases."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of round trips through files, sampling by recurrence, variance of a road class, and the measured course; a
     quick run is the same."""
     with TemporaryDirectory() as name:
@@ -32,11 +32,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 @on_paper_road()
-def _round_trip_rows(folder: Path) -> list[Row]:
+def _round_trip_rows(work_folder: Path) -> list[Row]:
     road = study_road()
-    write_opencrg(road, folder / "study.crg", ROAD_LENGTH, INCREMENT)
-    _write_csv(road, folder / "study.csv")
-    back = {"OpenCRG": read_opencrg(folder / "study.crg"), "CSV": read_csv_road(folder / "study.csv")}
+    write_opencrg(road, work_folder / "study.crg", ROAD_LENGTH, INCREMENT)
+    _write_csv(road, work_folder / "study.csv")
+    back = {"OpenCRG": read_opencrg(work_folder / "study.crg"), "CSV": read_csv_road(work_folder / "study.csv")}
     station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
     true = road.height_and_slope(station)[0]
     rows = [
@@ -54,7 +54,7 @@ def _round_trip_rows(folder: Path) -> list[Row]:
             road_scene(
                 duration=2.5,
                 road={"source": source, "file": f"study.{suffix}", "speed": 20.0, "beyond_end": "refused"},
-                folder=folder,
+                folder=work_folder,
             ),
             "reference",
         )

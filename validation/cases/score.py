@@ -56,7 +56,7 @@ noise, by stabiliser."""
 
 @on_paper_road()
 @allowing_breaches("what holds a run too softly, or too hard, is scored like all else")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on heave drift, vertical forces, damage conventions and verdicts; a full run has the whole study in all
     engines, and the prototype's runs."""
     rows = [*_convention_rows(), *_heave_rows(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
@@ -141,22 +141,22 @@ def _heave_rows(engines: tuple[str, ...], duration: float) -> list[Row]:
     return rows
 
 
-def _sinking_errors(engine: str, folder: Path, duration: float) -> tuple[float, float]:
+def _sinking_errors(engine: str, work_folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) of the sinking run, and largest deviation of its damage ratios from 1."""
-    scene = force_scene(folder, duration=duration)
+    scene = force_scene(work_folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING_SPEED)})
     still, moved = (simulate(simulated_scene, engine) for simulated_scene in (scene, sinking))
     wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
 
-def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
+def _grade_rows(work_folder: Path, engines: tuple[str, ...]) -> list[Row]:
     """Rows: on a grade of 0.1 rad a holding spring gives wrong results, and a prescribed pitch right ones, in each
     implementation."""
     scene = load(STUDY_SCENE, QUICK_OPTIONS)
     options = read(Options, scene.options, "", "options")
-    (folder / "short").mkdir()
-    bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
+    (work_folder / "short").mkdir()
+    bench = Bench(roads(scene, options)["grade"], "grade", options, work_folder / "short")
     rows = []
     for engine in engines:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
@@ -177,10 +177,10 @@ def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def _study_results(folder: Path) -> list[Saved]:
+def _study_results(work_folder: Path) -> list[Saved]:
     """Results of all stabilisers of the study with its default options, in all engines."""
-    (folder / "study").mkdir()
-    _, rows, failed = compare(load(STUDY_SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
+    (work_folder / "study").mkdir()
+    _, rows, failed = compare(load(STUDY_SCENE), IMPLEMENTATIONS, work_folder / "study", lambda text, progress_share: None)
     assert not failed, failed
     return rows
 
@@ -244,11 +244,11 @@ def _vertical_damage_rows(studied: list[Saved]) -> list[Row]:
     ]
 
 
-def _long_results(folder: Path) -> list[Saved]:
+def _long_results(work_folder: Path) -> list[Saved]:
     """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the hand-written reference."""
     scene = load(STUDY_SCENE, FULL_OPTIONS)
-    (folder / "long").mkdir()
-    bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")
+    (work_folder / "long").mkdir()
+    bench = Bench(scene, "road", read(Options, scene.options, "", "options"), work_folder / "long")
     return [_score_of_method(bench, name) for name in PROTOTYPE_RESULTS]
 
 

@@ -45,7 +45,7 @@ DEAD_BAND_SPRING = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_b
 
 @allowing_breaches("masses are wrong on purpose: what they leave to be held is what is measured")
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: forces and moments that reveal a missing mass and a misplaced centre of mass on both vehicles, and the
     other stabilisers on the asymmetric vehicle; a quick run has half a second."""
     duration = 0.5 if quick else 10.0
@@ -67,12 +67,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {}
 
 
-def write_motion(measured_run: Result, folder: Path, ahead: float = 0.0) -> None:
+def write_motion(measured_run: Result, work_folder: Path, ahead: float = 0.0) -> None:
     """Write the pitch, and the heave of a point ``ahead`` (m) of the true centre of mass, to the file that scenes with
     prescribed motion read."""
     pitch = measured_run["pitch"]
     columns = {"z3": ("m", measured_run["z3"] - ahead * np.sin(pitch)), "pitch": ("rad", pitch)}
-    write_time_series(folder / "motion.csv", columns, STEP)
+    write_time_series(work_folder / "motion.csv", columns, STEP)
 
 
 def prescribed_run(scene: Scene, engine: str) -> Result:
@@ -83,11 +83,11 @@ def prescribed_run(scene: Scene, engine: str) -> Result:
 
 
 def _missing_mass_rows(
-    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, work_folder: Path
 ) -> list[Row]:
     """Rows: if the model's chassis is 5 % too light by the mass dm, prescribing the heave takes a mean force of dm (g -
     z3'')."""
-    write_motion(measured_run, folder)
+    write_motion(measured_run, work_folder)
     scene = build_follower({"m3": (1 - MISSING_MASS_SHARE) * p.m3}, PRESCRIBED_MOTION)
     rate = measured_run["z3_rate"]
     mean = (rate[-1] - rate[0]) / scene.run.duration
@@ -111,11 +111,11 @@ def _missing_mass_rows(
 
 
 def _shifted_centre_rows(
-    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, work_folder: Path
 ) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
-    write_motion(measured_run, folder, CENTRE_SHIFT)
+    write_motion(measured_run, work_folder, CENTRE_SHIFT)
     scene = build_follower({"a": p.a + CENTRE_SHIFT, "b": p.b - CENTRE_SHIFT}, PRESCRIBED_MOTION)
     wanted = CENTRE_SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
     return [
@@ -180,10 +180,10 @@ def _high_pass_row(build_follower: BuildFollower) -> Row:
     )
 
 
-def _bandwidth_rows(measured_run: Result, build_follower: BuildFollower, folder: Path) -> list[Row]:
+def _bandwidth_rows(measured_run: Result, build_follower: BuildFollower, work_folder: Path) -> list[Row]:
     """Rows: stabilising moment if the prescribed pitch has the white noise of an inertial unit, raw and smoothed."""
     noise = PITCH_NOISE * normal_samples(SEED, 0, len(measured_run.times), 1)[:, 0]
-    write_time_series(folder / "measured.csv", {"pitch": ("rad", measured_run["pitch"] + noise)}, STEP)
+    write_time_series(work_folder / "measured.csv", {"pitch": ("rad", measured_run["pitch"] + noise)}, STEP)
     file = {"file": "measured.csv"}
     runs = {
         bandwidth: prescribed_run(

@@ -39,7 +39,7 @@ ROUNDING_SHARE = 1e-12
 
 
 @allowing_breaches("what is judged is how well equations are solved, whatever a random vehicle does")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on the stated errors of all systems that draw random samples; a quick run has a few samples of the pitch
     plane, and gives no verdict on shares."""
     names = list(SAMPLE_MODULES)

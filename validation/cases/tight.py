@@ -18,7 +18,7 @@ shows this difference."""
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for the uncertainty of the tight solution, and a row for each implementation; a quick run takes half a
     second."""
     duration = QUICK_DURATION if quick else DURATION

@@ -24,7 +24,7 @@ SPEED, TURN_SPEED = 22.0, 15.0
 TURN_TOLERANCE = 1e-3
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on static loads and engines; a full run also has turns, a circle, energy, and a planted fault."""
     rows = [_static_loads_row(), *(_engines_row(name, 0.05 if quick else 1.0) for name in TRAINS)]
     if not quick:

@@ -32,7 +32,7 @@ BOUND_REASON = "RK4 with the same stages differs only by the order of additions:
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for each road, excitation, vehicle and engine, each with the largest difference over the steps; a quick run
     has one vehicle at one step."""
     rows: list[Row] = []

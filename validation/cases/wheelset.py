@@ -41,7 +41,7 @@ SPEED_RATIO = 1.1
 ENGINES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: wavelength, critical speed, accelerations, simulations, limit cycles, energy and planted faults. A quick
     run has the chosen wheelset alone, without planted faults."""
     wheelsets = {"chosen": CHOSEN_WHEELSET} | ({} if quick else drawn_wheelsets())

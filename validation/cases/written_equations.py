@@ -33,7 +33,7 @@ DURATION, QUICK_DURATION = 1.0, 0.02
 for each simulated second."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of cars on hub forces and of cars on rolling tyres; a quick run has fewer states and simulates a few
     steps."""
     states, duration = (QUICK_STATE_COUNT, QUICK_DURATION) if quick else (STATE_COUNT, DURATION)
