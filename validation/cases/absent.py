@@ -75,15 +75,17 @@ def write_files(work_folder: Path) -> None:
     smoothly."""
     t = STEP * np.arange(2001)
     wave = np.sin(np.pi * t) ** 2
-    write_time_series(work_folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
+    write_time_series(
+        work_folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP
+    )
     pitch = {"pitch": ("rad", 0.02 * wave)}
     write_time_series(work_folder / "pitch.csv", pitch, STEP)
     write_time_series(work_folder / "motion.csv", {"z3": ("m", 0.06 + 0.01 * wave), **pitch}, STEP)
 
 
-def model(simulated_scene: Scene, engine: str) -> Model:
+def model(simulated_scene: Scene, engine_name: str) -> Model:
     """Model of a scene in one engine."""
-    return build(engine, assembly_of_scene(simulated_scene), settings_of(simulated_scene, engine))
+    return build(engine_name, assembly_of_scene(simulated_scene), settings_of(simulated_scene, engine_name))
 
 
 def scenes_without_and_with(effect: str, step_count: int, work_folder: Path) -> tuple[Scene, Scene]:
@@ -99,23 +101,26 @@ def scenes_without_and_with(effect: str, step_count: int, work_folder: Path) -> 
     return scene_below, scene({**needed, effect: module.EXAMPLE}, step_count, work_folder, prescribed)
 
 
-def counts_of_scene(simulated_scene: Scene, engine: str) -> dict[str, int]:
+def counts_of_scene(simulated_scene: Scene, engine_name: str) -> dict[str, int]:
     """Numbers of components in an engine's model of a scene, and of the channels that are saved."""
-    return {**model(simulated_scene, engine).plan(), "channels": len(run(simulated_scene, engine).data.data_vars)}
+    return {
+        **model(simulated_scene, engine_name).plan(),
+        "channels": len(run(simulated_scene, engine_name).data.data_vars),
+    }
 
 
-def count_changes(effect: str, engine: str, work_folder: Path) -> dict[str, int]:
+def count_changes(effect: str, engine_name: str, work_folder: Path) -> dict[str, int]:
     """Changes of the numbers of components in an engine's model when an effect is added; unchanged numbers are left
     out."""
-    before, after = (counts_of_scene(bare, engine) for bare in scenes_without_and_with(effect, 20, work_folder))
+    before, after = (counts_of_scene(bare, engine_name) for bare in scenes_without_and_with(effect, 20, work_folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
-def declared_changes(effect: str, engine: str) -> dict[str, int]:
+def declared_changes(effect: str, engine_name: str) -> dict[str, int]:
     """Changes of the numbers of components in an engine's model that an effect declares in its COUNTS; zero changes are
     left out."""
     table = module_of(DEFAULT_SYSTEM, effect).COUNTS
-    return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
+    return {key: value for key, value in {**table.get("all", {}), **table.get(engine_name, {})}.items() if value}
 
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
@@ -155,35 +160,40 @@ def _import_rows() -> list[Row]:
     ]
 
 
-def _absence_rows(engine: str, work_folder: Path) -> list[Row]:
+def _absence_rows(engine_name: str, work_folder: Path) -> list[Row]:
     """Rows: Python function calls, memory and callbacks that 1,980 more steps of a scene without effects need. All must
     be zero."""
     for bare in (scene({}, steps, work_folder) for steps in (20, 20)):  # wrappers cache on their first calls
-        counted_march(engine, model(bare, engine))
+        counted_march(engine_name, model(bare, engine_name))
     short, long = (
-        march_with_least_memory(engine, partial(model, scene({}, steps, work_folder), engine)) for steps in (20, 2000)
+        march_with_least_memory(engine_name, partial(model, scene({}, steps, work_folder), engine_name))
+        for steps in (20, 2000)
     )
     callbacks = max(short.callbacks, installed_callbacks())
-    if engine == "exudyn":
-        callbacks += user_functions(model(scene({}, 20, work_folder), engine))
+    if engine_name == "exudyn":
+        callbacks += user_functions(model(scene({}, 20, work_folder), engine_name))
     why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
     return [
         Observed(
-            f"absent.frames.{engine}",
+            f"absent.frames.{engine_name}",
             SYSTEM,
-            f"{engine}: number of Python functions that 1,980 more steps enter",
+            f"{engine_name}: number of Python functions that 1,980 more steps enter",
             long.frames - short.frames,
             "",
         ).at_most(0, why, "none"),
         Observed(
-            f"absent.memory.{engine}",
+            f"absent.memory.{engine_name}",
             SYSTEM,
-            f"{engine}: memory that 1,980 more steps take beyond their result",
+            f"{engine_name}: memory that 1,980 more steps take beyond their result",
             long.peak_bytes - short.peak_bytes,
             "B",
         ).at_most(1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
         Observed(
-            f"absent.callbacks.{engine}", SYSTEM, f"{engine}: number of callbacks that a bare scene has", callbacks, ""
+            f"absent.callbacks.{engine_name}",
+            SYSTEM,
+            f"{engine_name}: number of callbacks that a bare scene has",
+            callbacks,
+            "",
         ).at_most(0, "counted over all items, and in the engine's globals before, during and after the march", "none"),
     ]
 

@@ -317,7 +317,7 @@ def _same_pendulum_rows(family: str, mechanism: Mechanism, output: OutputFile, r
 
 def _engine_row(
     family: str,
-    engine: str,
+    engine_name: str,
     mechanism: Mechanism,
     engine_run: tuple[BodyMotion, Reaction],
     reference_run: tuple[BodyMotion, Reaction],
@@ -328,8 +328,8 @@ def _engine_row(
     rotation = float(np.abs(engine_run[0].rotation - reference_run[0].rotation).max())
     off = max(position_error, rotation, _reaction_difference(mechanism, engine_run[1], reference_run[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
-    quantity = f"{family}: {engine} from the reference: position, rotation, reaction by the largest"
-    return Observed(_row_id(family, f"twin.{engine}"), SYSTEM, quantity, off, "m, -").at_most(
+    quantity = f"{family}: {engine_name} from the reference: position, rotation, reaction by the largest"
+    return Observed(_row_id(family, f"twin.{engine_name}"), SYSTEM, quantity, off, "m, -").at_most(
         ENGINE_TOLERANCE, why, "native"
     )
 

@@ -26,12 +26,12 @@ def scene(parameter_set_name: str, geometry: str = "exact"):
     )
 
 
-def acceleration_difference(engine: str, parameter_set_name: str, geometry: str = "exact") -> float:
+def acceleration_difference(engine_name: str, parameter_set_name: str, geometry: str = "exact") -> float:
     """Largest difference of an engine's accelerations from the reference's over all random states, divided by the
     largest acceleration."""
     audited = scene(parameter_set_name, geometry)
     return acceleration_gap(
-        checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATE_COUNT
+        checks.engine(engine_name), assembly_of_scene(audited), settings_of(audited, engine_name), STATE_COUNT
     )
 
 

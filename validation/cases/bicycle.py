@@ -111,11 +111,11 @@ def _fault_rows(bicycle: Whipple) -> list[Row]:
     return [seen.within(1e6, 1e-3, "a planted fault must be seen by far; counted up to a million", "closed form")]
 
 
-def _eigenvalue_differences(bicycle: Whipple, engine: str) -> np.ndarray:
+def _eigenvalue_differences(bicycle: Whipple, engine_name: str) -> np.ndarray:
     """Largest difference (1/s) between the eigenvalues on tyres and those of ideal rolling, for each tyre stiffness."""
     wanted = bicycle.eigenvalues(SPEED)
     stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in TYRE_STIFFNESS_FACTORS]
-    return np.array([np.abs(engine_eigenvalues(engine, rolling, SPEED) - wanted).max() for rolling in stiff])
+    return np.array([np.abs(engine_eigenvalues(engine_name, rolling, SPEED) - wanted).max() for rolling in stiff])
 
 
 def _limit_rows(eigenvalue_gaps: dict[str, np.ndarray]) -> list[Row]:

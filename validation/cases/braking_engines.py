@@ -181,17 +181,17 @@ def _trailer_rows(quick: bool) -> list[Row]:
     return rows
 
 
-def straight_pull_error(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, duration: float = 4.0) -> float:
+def straight_pull_error(angle: float = 0.5, v: float = 0.2, time_step: float = 5e-4, duration: float = 4.0) -> float:
     """Relative error of the drawbar angle psi after a straight pull over the time t at speed v. Exact, with drawbar
     length L: tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L)."""
-    n = round(duration / step)
+    n = round(duration / time_step)
     state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN_TRAILER.drawbar, 0.0]])
     states, _ = follow_hook(
         plane_of_trailer(CHOSEN_TRAILER),
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,
         np.tile([v, 0.0], (n + 1, 1)),
-        step,
+        time_step,
         STIFF_TYRE_SLOPE,
         np.zeros(4),
     )
@@ -200,11 +200,11 @@ def straight_pull_error(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, 
 
 
 def circle_errors(
-    radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: float = 20.0
+    radius: float = 15.0, v: float = 0.5, time_step: float = 2e-4, duration: float = 20.0
 ) -> tuple[float, float]:
     """Relative errors of the radii of the trailer's front and rear axle on a steady circle. Exact, with drawbar length
     L: R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 - wheelbase^2."""
-    yaw_rate, times = v / radius, step * np.arange(round(duration / step) + 1)
+    yaw_rate, times = v / radius, time_step * np.arange(round(duration / time_step) + 1)
     hook = v * np.column_stack((-np.sin(yaw_rate * times), np.cos(yaw_rate * times)))
     front = np.sqrt(radius**2 - CHOSEN_TRAILER.drawbar**2)
     rear = np.sqrt(front**2 - CHOSEN_TRAILER.wheelbase**2)
@@ -217,7 +217,7 @@ def circle_errors(
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,
         hook,
-        step,
+        time_step,
         STIFF_TYRE_SLOPE,
         np.zeros(4),
     )

@@ -144,7 +144,9 @@ def _table_of_fmu(work_folder: Path) -> dict[str, Any] | str:
     return {"fmu": FmuBuilder.build_FMU(Path(port.__path__[0]) / "example_slave.py", dest=work_folder).name}
 
 
-def _equal_bits_rows(tables_by_connection: dict[str, dict[str, Any] | str], work_folder: Path, duration: float) -> list[Row]:
+def _equal_bits_rows(
+    tables_by_connection: dict[str, dict[str, Any] | str], work_folder: Path, duration: float
+) -> list[Row]:
     """Rows: runs with every kind of connection, and a replay of the log, compared bit by bit with a run that calls the
     controller directly."""
     first = run(_scene(work_folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
@@ -214,7 +216,9 @@ def _round_seconds(controller: Controller, first_number: int) -> float:
 
 def _process_outcome(misbehaviour: str, work_folder: Path) -> dict[str, Any]:
     words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), misbehaviour, "{port}"]
-    return _outcome_of_run(f"second process: {misbehaviour}", PROCESS_FAULTS[misbehaviour], {"command": words}, work_folder)
+    return _outcome_of_run(
+        f"second process: {misbehaviour}", PROCESS_FAULTS[misbehaviour], {"command": words}, work_folder
+    )
 
 
 def _class_outcome(misbehaviour: str, work_folder: Path) -> dict[str, Any]:

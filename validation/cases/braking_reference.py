@@ -66,14 +66,14 @@ def _law_row(law: str) -> Row:
     ).at_most(bound, ROUNDING_REASON, "native")
 
 
-def _acceleration_row(vehicle: str, engine: str) -> Row:
-    accelerations = whole.accelerations(whole.VEHICLES[vehicle](), engine)
+def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
+    accelerations = whole.accelerations(whole.VEHICLES[vehicle_name](), engine_name)
     return Observed(
-        f"braking_reference.accelerations.{vehicle}.{engine}",
+        f"braking_reference.accelerations.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
+        f"largest difference of the {vehicle_name}'s accelerations in {engine_name} from plain code at "
         f"{whole.STATE_COUNT} states of any heading",
-        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
+        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle_name)),
         "by the largest",
     ).at_most(1e-12, ROUNDING_REASON, "native")
 
@@ -91,25 +91,25 @@ def _relaxing_turn_row() -> Row:
     )
 
 
-def _circle_row(vehicle: str) -> Row:
-    computed, plain = whole.steady_circle_pair(whole.VEHICLES[vehicle]())
+def _circle_row(vehicle_name: str) -> Row:
+    computed, plain = whole.steady_circle_pair(whole.VEHICLES[vehicle_name]())
     return Observed(
-        f"braking_reference.turn.{vehicle}",
+        f"braking_reference.turn.{vehicle_name}",
         SYSTEM,
-        f"largest difference of a steady circle of the {vehicle} from plain code: steer angles, state "
+        f"largest difference of a steady circle of the {vehicle_name} from plain code: steer angles, state "
         "and yaw, 30 m at 8 m/s",
         float(np.nan_to_num(np.abs(computed - plain).max(), nan=np.inf)),
         "rad, m, per s",
     ).at_most(1e-10, "the same equations, solved to rounding", "native")
 
 
-def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
-    path = whole.run(whole.VEHICLES[vehicle](), engine, duration)
+def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration)
     return Observed(
-        f"braking_reference.stop.{vehicle}.{engine}",
+        f"braking_reference.stop.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain "
+        f"largest difference of {duration:g} s of a stop of the {vehicle_name} in {engine_name} from plain "
         "code, slip controller on split and changing friction",
-        whole.path_difference(path, whole.plain_run(vehicle, duration)),
+        whole.path_difference(path, whole.plain_run(vehicle_name, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")

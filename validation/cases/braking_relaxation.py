@@ -36,21 +36,21 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def _slip_rise_row(engine: str) -> Row:
+def _slip_rise_row(engine_name: str) -> Row:
     return Observed(
-        f"braking_relaxation.rise.{engine}",
+        f"braking_relaxation.rise.{engine_name}",
         SYSTEM,
         "difference of the slip angles of wheels that are turned at once from 1 - exp(-u t / sigma)",
-        slip_rise_error(engine),
+        slip_rise_error(engine_name),
         "of the angle in the end",
     ).at_most(2e-6, "first order by the way; what friction of a millionth leaves of the course", "closed form")
 
 
-def slip_rise_error(engine: str, sample_count: int = 20) -> float:
+def slip_rise_error(engine_name: str, sample_count: int = 20) -> float:
     """Largest error of the rise of the slip angle's tangent after a steer step at constant speed, compared with its
     exponential."""
     slick = table_of_surface("wet").scaled(FRICTION_FACTOR)
-    vehicle = replace(braked_vehicle(car(), slick, engine, STEER), relaxation=whole.RELAXATION_LENGTHS)
+    vehicle = replace(braked_vehicle(car(), slick, engine_name, STEER), relaxation=whole.RELAXATION_LENGTHS)
     path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, sample_count * vehicle.sample - 1e-6)
     distances = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
     risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER)
@@ -58,42 +58,42 @@ def slip_rise_error(engine: str, sample_count: int = 20) -> float:
 
 
 def braked_turn(
-    engine: str | None, relaxation_length: float, stiffness_factor: float | None = None, duration: float = 0.2
+    engine_name: str | None, relaxation_length: float, stiffness_factor: float | None = None, duration: float = 0.2
 ) -> BrakingPath:
     """Braked turn of the car, or of the box whose suspension is ``stiffness_factor`` times as stiff, on tyres with a
     relaxation length (m, 0 for none). Without an engine the vehicle moves in the plane, without a suspension."""
     vehicle = car() if stiffness_factor is None else box(stiffness_factor, 0.01)
     torques, substeps = steady_torques(*BRAKE_TORQUES), 2 if stiffness_factor is None else 4
-    vehicle_on_tyres = braked_vehicle(vehicle, table_of_surface("wet"), engine, 0.015, substeps=substeps)
+    vehicle_on_tyres = braked_vehicle(vehicle, table_of_surface("wet"), engine_name, 0.015, substeps=substeps)
     return replace(vehicle_on_tyres, relaxation=np.full(4, relaxation_length) if relaxation_length else None).run(
         torques, 10.0, duration
     )
 
 
-def _short_relaxation_row(engine: str) -> Row:
+def _short_relaxation_row(engine_name: str) -> Row:
     return Observed(
         "braking_relaxation.short",
         SYSTEM,
         "ratio of the shift of a braked turn's end by a relaxation length of 0.2 m to the shift by 0.1 m",
-        shift_ratio(engine),
+        shift_ratio(engine_name),
         "",
     ).within(2.0, 0.05, "to first order in the length, whose limit is a tyre that answers at once", "closed form")
 
 
-def shift_ratio(engine: str) -> float:
+def shift_ratio(engine_name: str) -> float:
     """Ratio of two shifts of a braked turn's final position and heading (m, rad): the shift by a relaxation length of
     0.2 m divided by the shift by 0.1 m."""
-    none, short, long = (braked_turn(engine, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
+    none, short, long = (braked_turn(engine_name, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
     return float(np.abs(long - none).max() / np.abs(short - none).max())
 
 
-def _reference_row(vehicle: str, engine: str, duration: float) -> Row:
-    path = whole.run(whole.VEHICLES[vehicle](), engine, duration, lags=True)
+def _reference_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration, lags=True)
     return Observed(
-        f"braking_relaxation.reference.{vehicle}.{engine}",
+        f"braking_relaxation.reference.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"difference of {duration:g} s of a stop in {engine} from plain code: {vehicle}, relaxing tyres, slip control",
-        whole.path_difference(path, whole.plain_run(vehicle, duration, lags=True)),
+        f"difference of {duration:g} s of a stop in {engine_name} from plain code: {vehicle_name}, relaxing tyres, slip control",
+        whole.path_difference(path, whole.plain_run(vehicle_name, duration, lags=True)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 

@@ -86,17 +86,17 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"curves": curves, "steps": steps}
 
 
-def _errors_over_step(surface: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
+def _errors_over_step(surface: str, slip: float, speed: float, time_steps: tuple[float, ...]) -> dict[str, Any]:
     """Errors of twinrig's and of other integration schemes over the step: relative error of the stopping distance, and
     the remaining speed (m/s) if a scheme does not stop."""
     tyre, _ = both = friction_table(surface)
     force, torque = steady_torque(FRONT_WHEEL, tyre, slip)
     true = exact_distance(FRONT_WHEEL, tyre, torque, speed)
     distances = {
-        "ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]
+        "ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in time_steps]
     }
     distances |= {
-        key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES
+        key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in time_steps] for key in SCHEMES
     }
     steadily = constant_torque_stop(
         FRONT_WHEEL, both, torque, speed, rim_turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
@@ -105,7 +105,7 @@ def _errors_over_step(surface: str, slip: float, speed: float, steps: tuple[floa
         "exact": true,
         "steady": steadily / (FRONT_WHEEL.mass * speed**2 / (2.0 * force)) - 1.0,
         "errors": {key: [(distance / true - 1.0, left) for distance, left in ends] for key, ends in distances.items()},
-        "at": steps.index(PAPER_STEP),
+        "at": time_steps.index(PAPER_STEP),
     }
 
 
@@ -186,9 +186,9 @@ def broken_rules(stopped: QuarterStop, radius: float, is_braked: bool) -> list[s
     return [name for name, wrong in broken.items() if wrong]
 
 
-def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tuple[float, ...]) -> Row:
+def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, time_steps: tuple[float, ...]) -> Row:
     wrong, runs = list[str](), 0
-    for on, step in product(surfaces, steps):
+    for on, step in product(surfaces, time_steps):
         tyre = friction_table(on)
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_SPEED
@@ -206,7 +206,7 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
     some = "" if set(surfaces) <= set(FULL_SWEEP_SURFACES) else some
     what = (
         f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW_SPEED:g}: {len(surfaces)} surfaces, "
-        f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
+        f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(time_steps):g} to {1e3 * max(time_steps):g} ms{some}, "
         f"watched for {STANDSTILL_SECONDS:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no "
         "stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"

@@ -56,27 +56,27 @@ def _axle_loads_row() -> Row:
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
 
-def _acceleration_row(vehicle: str, engine: str) -> Row:
-    accelerations = whole.accelerations(whole.TRAINS[vehicle](), engine)
+def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
+    accelerations = whole.accelerations(whole.TRAINS[vehicle_name](), engine_name)
     return Observed(
-        f"braking_trailer.accelerations.{vehicle.replace(' ', '_')}.{engine}",
+        f"braking_trailer.accelerations.{vehicle_name.replace(' ', '_')}.{engine_name}",
         SYSTEM,
-        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
+        f"largest difference of the {vehicle_name}'s accelerations in {engine_name} from plain code at "
         f"{whole.STATE_COUNT} states of "
         "any heading",
-        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
+        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle_name)),
         "by the largest",
     ).at_most(1e-12, ROUNDING_REASON, "native")
 
 
-def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
-    path = whole.run(whole.TRAINS[vehicle](), engine, duration)
+def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    path = whole.run(whole.TRAINS[vehicle_name](), engine_name, duration)
     return Observed(
-        f"braking_trailer.stop.{vehicle}.{engine}",
+        f"braking_trailer.stop.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain code, slip controller "
+        f"largest difference of {duration:g} s of a stop of the {vehicle_name} in {engine_name} from plain code, slip controller "
         "of all wheels on split and changing friction",
-        whole.path_difference(path, whole.plain_run(vehicle, duration)),
+        whole.path_difference(path, whole.plain_run(vehicle_name, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")
 

@@ -39,11 +39,13 @@ JUDGED_RANGE = (1e-4, 0.05)
 """Smallest and largest relative change whose prediction is judged, as for linear scenes."""
 
 
-def judge_choice(system: str, seed: int) -> ChoiceCheckedByRuns:
+def judge_choice(system_name: str, seed: int) -> ChoiceCheckedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
-    if system == "ride":
+    if system_name == "ride":
         return judge_ride(random_nonlinear_ride(seed))
-    return choice_checked_by_runs(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+    return choice_checked_by_runs(
+        draw_scene(system_name, seed), system_name, ENGINES[system_name][seed % len(ENGINES[system_name])]
+    )
 
 
 def judge_ride(bent_ride: NonlinearRide) -> ChoiceCheckedByRuns:
@@ -151,17 +153,21 @@ def _prediction_row(choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
     return Observed(name, SYSTEM, quantity, share, "").within(1.0, 0.05, asked, "none")
 
 
-def _saving_rows(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
-    of_system = [judged_choice for judged_choice in choices if judged_choice.system == system]
+def _saving_rows(choices: list[ChoiceCheckedByRuns], system_name: str) -> list[Row]:
+    of_system = [judged_choice for judged_choice in choices if judged_choice.system == system_name]
     calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
     seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
-    name = f"choice_nonlinear.saving.{system}"
-    note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
+    name = f"choice_nonlinear.saving.{system_name}"
+    note = (
+        "steps within a sample alone may grow"
+        if system_name == "braking"
+        else "it depends on the step that a scene has"
+    )
     return [
         Observed(
             name,
             SYSTEM,
-            f"ratio of calls before and after the choice, median of {len(of_system)} scenes of {system}",
+            f"ratio of calls before and after the choice, median of {len(of_system)} scenes of {system_name}",
             float(np.median(calls[:, 0] / calls[:, 2])),
             "times",
         ).aim(5.0, note, "at least"),
@@ -169,7 +175,7 @@ def _saving_rows(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
             f"{name}.step",
             SYSTEM,
             "ratio of calls before and after longer steps alone, with all effects, median of "
-            f"{len(of_system)} scenes of {system}",
+            f"{len(of_system)} scenes of {system_name}",
             float(np.median(calls[:, 0] / calls[:, 1])),
             "times",
         ).beside("", "what is left is due to effects", "none"),

@@ -45,8 +45,8 @@ def _relative_error(wave_period: float, exact: float) -> float:
     return abs(wave_period / exact - 1.0)
 
 
-def _closed_form_row(row_name: str, quantity: str, error: float, tolerance_reason: str) -> Row:
-    return Observed(f"conicity.{row_name}", SYSTEM, quantity, error, "").at_most(
+def _closed_form_row(row_name: str, quantity_name: str, error: float, tolerance_reason: str) -> Row:
+    return Observed(f"conicity.{row_name}", SYSTEM, quantity_name, error, "").at_most(
         ROUNDING_TOLERANCE, tolerance_reason, "closed form"
     )
 

@@ -216,10 +216,10 @@ def _mujoco_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any
         "plain": lambda: python_law(law),
     }[setup.bridge]()
 
-    def job(steps: int) -> None:
+    def job(step_count: int) -> None:
         mujoco.set_mjcb_passive(callback)
         try:
-            march.run(start, steps)
+            march.run(start, step_count)
         finally:
             mujoco.set_mjcb_passive(None)
 

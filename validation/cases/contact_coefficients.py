@@ -51,22 +51,24 @@ SLENDER_ELLIPSES = (
 REFERENCE_NOTE = "the same continuum problem solved on cells, extrapolated to none"
 
 
-def exact_coefficients(axis_ratio: float, poisson_ratio: float, cells: int = COARSEST_CELLS) -> Array:
+def exact_coefficients(axis_ratio: float, poisson_ratio: float, cell_count: int = COARSEST_CELLS) -> Array:
     """Creepage coefficients C11, C22, C23, C33 (4,) by the exact theory, extrapolated from three grids to infinitely
     small cells."""
-    coarse, middle, fine = (_coefficients_on_grid(axis_ratio, poisson_ratio, n) for n in (cells, 2 * cells, 4 * cells))
+    coarse, middle, fine = (
+        _coefficients_on_grid(axis_ratio, poisson_ratio, n) for n in (cell_count, 2 * cell_count, 4 * cell_count)
+    )
     limit = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
     if axis_ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
         limit[3] = fine[3] + (fine[3] - middle[3]) / 3.0
     return limit
 
 
-def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cells: int) -> Array:
+def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cell_count: int) -> Array:
     """Creepage coefficients (4,) by the exact linear theory on one grid, from unit creepages. C23 is the mean of two
     values: lateral force due to spin, and moment due to lateral creepage."""
     a, b = axis_ratio**0.5, axis_ratio**-0.5
     more = max(1.0, max(axis_ratio, 1.0 / axis_ratio) / 10.0)
-    columns, rows = round(cells * (more if a > b else 1.0)), round(cells * (more if b > a else 1.0))
+    columns, rows = round(cell_count * (more if a > b else 1.0)), round(cell_count * (more if b > a else 1.0))
     dx, dy = 2.0 * a / columns, 2.0 * b / rows
     x, y = centres(columns, dx), centres(rows, dy)
     inside = (x / a) ** 2 + (y[:, None] / b) ** 2 < 1.0

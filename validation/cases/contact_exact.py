@@ -66,25 +66,25 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _bound_row(
     row_name: str,
-    quantity: str,
+    quantity_name: str,
     largest_error: float,
     bound: float,
     tolerance_reason: str,
     unit: str = "",
     independence: Any = "closed form",
 ) -> Row:
-    return Observed(f"contact_exact.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
+    return Observed(f"contact_exact.{row_name}", SYSTEM, quantity_name, largest_error, unit).at_most(
         bound, tolerance_reason, independence
     )
 
 
-def numerical_hertz(axis_ratio: float, cells: int) -> tuple[NormalSolution, Array]:
+def numerical_hertz(axis_ratio: float, cell_count: int) -> tuple[NormalSolution, Array]:
     """Numerical solution of the normal problem for a Hertzian ellipse with the axis ratio a/b, and its relative errors
     (3,) of approach, peak pressure and area."""
     a, b = CONTACT_SIZE * axis_ratio**0.5, CONTACT_SIZE / axis_ratio**0.5
     truth = by_axes(a, b, MATERIAL_PAIR, load=LOAD)
-    dx, dy = 2 * a / cells, 2 * b / cells
-    x, y = centres(cells + 5, dx), centres(cells + 5, dy)
+    dx, dy = 2 * a / cell_count, 2 * b / cell_count
+    x, y = centres(cell_count + 5, dx), centres(cell_count + 5, dy)
     solved = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, MATERIAL_PAIR, load=LOAD)
     values = np.array([solved.approach, solved.pressure.max(), solved.area])
     return solved, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
@@ -132,40 +132,40 @@ def carter(x: Array, a: float, share: float) -> Array:
     return full_traction - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
 
 
-def _strip_traction(cells: int, share: float) -> tuple[list[float], list[float], float]:
+def _strip_traction(cell_count: int, share: float) -> tuple[list[float], list[float], float]:
     """Middle line of a slender ellipse: x / a, traction divided by mu p0, and error of the integrated traction divided
     by that of full sliding. share: creepage divided by the creepage of full sliding."""
     b = CONTACT_SIZE / STRIP_AXIS_RATIO**0.5
     a = STRIP_AXIS_RATIO * b
-    pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
+    pressed = hertzian(a, b, LOAD, cell_count + 1)  # odd: one strip of cells lies in the middle
     bound = MU * 1.5 * LOAD / (np.pi * a * b)
     solved = solve_rolling(pressed, MU, 2 * share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR)
-    traction = -solved.traction[cells // 2, :, 0] / bound
+    traction = -solved.traction[cell_count // 2, :, 0] / bound
     error = float(traction.sum() * pressed.dx / (np.pi * a / 2) - (1 - (1 - share) ** 2))
     return (pressed.x / a).tolist(), traction.tolist(), error
 
 
-def _carter_rows(cells: int) -> list[Row]:
+def _carter_rows(cell_count: int) -> list[Row]:
     why = "first order in the cells: the leading edge of the zone that sticks; and the ellipse is no cylinder by 1e-3"
     return [
         _bound_row(
             f"carter.{share:g}",
-            f"error of the force on Carter's cylinder over mu N, {share:g} of the creepage of sliding, {cells} cells",
-            abs(_strip_traction(cells, share)[2]),
-            0.2 / cells,
+            f"error of the force on Carter's cylinder over mu N, {share:g} of the creepage of sliding, {cell_count} cells",
+            abs(_strip_traction(cell_count, share)[2]),
+            0.2 / cell_count,
             why,
         )
         for share in (0.2, 0.5, 0.8)
     ]
 
 
-def shifted_ball(share: float, nu: float, cells: int) -> RollingSolution:
+def shifted_ball(share: float, nu: float, cell_count: int) -> RollingSolution:
     """Exact solution for a ball that is shifted by the distance at which Cattaneo and Mindlin's tangential force is
     ``share`` times mu N."""
     body = Material(E=2.1e11, nu=nu)
     pair = MaterialPair(body, body)
     shift_distance = 3 * FRICTION_LIMIT * (2 - nu) / (8 * CONTACT_SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
-    return solve_shift(hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, cells), MU, shift_distance, 0.0, pair)
+    return solve_shift(hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, cell_count), MU, shift_distance, 0.0, pair)
 
 
 def _cattaneo_rows() -> list[Row]:
@@ -182,12 +182,12 @@ def _cattaneo_rows() -> list[Row]:
     ]
 
 
-def rolling_forces(case_name: str, cells: int, sign: float = 1.0, mirror_sign: float = 1.0) -> Array:
+def rolling_forces(case_name: str, cell_count: int, sign: float = 1.0, mirror_sign: float = 1.0) -> Array:
     """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). ``sign`` reverses the
     creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
     ratio, xi_x, xi_y, spin = CASES[case_name]
     creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * sign
-    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cells)
+    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cell_count)
     across = mirror_sign * creepage
     solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR)
     return np.array([solved.fx, solved.fy, solved.mz / CONTACT_SIZE]) / FRICTION_LIMIT
@@ -338,14 +338,14 @@ def _sample_rows(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     ]
 
 
-def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
+def _differences_from_file(row: dict[str, str], cell_count: int) -> list[Any]:
     """Kind and axis ratio of a row of the sample file, difference of the force divided by mu N, and difference of the
     moment divided by mu N sqrt(ab). The file's units are mm, N and MPa."""
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
     solved = solve_rolling(
-        hertzian(a, b, value["FN_N"], cells),
+        hertzian(a, b, value["FN_N"], cell_count),
         value["mu"],
         value["xi_x"],
         value["xi_y"],

@@ -209,15 +209,16 @@ def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     return rows
 
 
-def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[str, str]) -> list[float]:
+def _shares_beyond_stated(cases: list[ContactCase], cell_count: int, choices: dict[str, str]) -> list[float]:
     """Shares of contacts whose discretisation errors of force and of moment exceed the stated ones."""
     answers = []
     for case in cases:
         contact = case.contact(Fastsim, **{**BEST_CHOICES, **choices})
-        fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED_CELLS)
+        fine, true = contact.roll(case.motion, cell_count), contact.roll(case.motion, CONVERGED_CELLS)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
-            np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + MOMENT_ROUNDING * case.limit
+            np.array(off)
+            > np.array(remaining_errors(contact, case.motion, cell_count, fine)) + MOMENT_ROUNDING * case.limit
         )
     return [float(value) for value in np.mean(answers, axis=0)]
 

@@ -85,7 +85,8 @@ COMBINATIONS = (
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each combination; a quick run has the first one with few noise paths."""
     combinations = [
-        _drift_off_figures(combination, work_folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
+        _drift_off_figures(combination, work_folder, quick)
+        for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
     ]
     return [_drift_off_row(figures) for figures in combinations], {"combinations": combinations}
 
@@ -118,18 +119,20 @@ def _drift_off_figures(combination: Combination, work_folder: Path, quick: bool)
     }
 
 
-def _drift_by_noise(combination: Combination, work_folder: Path, path_count: int) -> tuple[list[float | None], list[float]]:
+def _drift_by_noise(
+    combination: Combination, work_folder: Path, noise_path_count: int
+) -> tuple[list[float | None], list[float]]:
     """Predicted drift-off time (s), and the drift-off time of every noise path."""
     true = virtual_drive(work_folder, combination.duration, 1 / combination.rate, road=combination.road)
     effects = {"force_noise": {"deviation": combination.noise_deviation, "seed": SEED}}
     scene = force_scene(work_folder, duration=combination.duration, effects=effects)
-    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), path_count)["drift_off"]
+    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), noise_path_count)["drift_off"]
     quiet = assembly_of_scene(force_scene(work_folder, duration=combination.duration))
     return [noise_error_curve(quiet, combination.noise_deviation).passing_time()], times.tolist()
 
 
 def _drift_by_sampling(
-    combination: Combination, work_folder: Path, path_count: int
+    combination: Combination, work_folder: Path, noise_path_count: int
 ) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) on similar roads, which have other speeds or other seeds."""
     speed = combination.road["speed"]
@@ -149,7 +152,7 @@ def _drift_by_sampling(
 
 
 def _drift_by_model_error(
-    combination: Combination, work_folder: Path, path_count: int
+    combination: Combination, work_folder: Path, noise_path_count: int
 ) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) of vehicles with random parameters, all started from the true
     state."""

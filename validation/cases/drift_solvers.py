@@ -113,13 +113,13 @@ def _drift_by_solver(work_folder: Path, solvers: Any) -> list[Saved]:
 
 
 def _drift_of_run(
-    assembly: Assembly, engine: str, method: str, step_or_tolerance: float, true_run: Result
+    assembly: Assembly, engine_name: str, method: str, step_or_tolerance: float, true_run: Result
 ) -> dict[str, float]:
     """Drift-off time (s) of a run (its duration if it does not drift off), and its final pitch error (rad)."""
     settings = Settings(method, step_or_tolerance, DURATION)
     if method in ADAPTIVE_METHODS:
-        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, step_or_tolerance)
-    run = build(engine, assembly, settings).run()
+        settings = Settings(method, 1e-3 if engine_name == "reference" else 5e-3, DURATION, step_or_tolerance)
+    run = build(engine_name, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true_run.times, true_run["pitch"]))
     time = GrowthCurve(run.times, error).passing_time()
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
@@ -145,20 +145,21 @@ def _treatment_record(
     true_run: Result,
     quiet_assembly: Assembly,
     cutoff: float | None,
-    engine: str,
+    engine_name: str,
     method: str,
-    step: float,
+    time_step: float,
 ) -> Saved:
     forces = quiet_assembly.input
     assert isinstance(forces, Sampled)
-    settings = Settings(method, step, NOISY_SECONDS)
-    clean = _noisy_states(engine, quiet_assembly, forces.values, cutoff, settings)
-    rows = np.rint(np.array(GROWTH_WINDOW) / step).astype(int)
+    settings = Settings(method, time_step, NOISY_SECONDS)
+    clean = _noisy_states(engine_name, quiet_assembly, forces.values, cutoff, settings)
+    rows = np.rint(np.array(GROWTH_WINDOW) / time_step).astype(int)
     spread = np.zeros(2)
     for path in range(PATH_COUNT):
         noise = FORCE_NOISE * normal_samples(SEED, path, len(forces.values), 2)
         spread += (
-            _noisy_states(engine, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]
+            _noisy_states(engine_name, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3]
+            - clean[rows, 3]
         ) ** 2
     spread, law = np.sqrt(spread / PATH_COUNT), _pitch_deviation_law(_low_pass(forces.values, cutoff), quiet_assembly)
     growth, expected = (
@@ -170,17 +171,17 @@ def _treatment_record(
         "law": expected,
         "growth": growth,
         "spread": float(spread[1]),
-        **_damage_ratios(clean[:: round(1e-3 / step)], true_run, quiet_assembly),
+        **_damage_ratios(clean[:: round(1e-3 / time_step)], true_run, quiet_assembly),
     }
 
 
 def _noisy_states(
-    engine: str, assembly: Assembly, force_samples: np.ndarray, cutoff: float | None, settings: Settings
+    engine_name: str, assembly: Assembly, force_samples: np.ndarray, cutoff: float | None, settings: Settings
 ) -> np.ndarray:
     """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff`` (Hz) is
     given."""
     forces = Sampled(_low_pass(force_samples, cutoff), 1 / NOISE_SAMPLING_RATE, held=False)
-    return build(engine, replace(assembly, input=forces), settings).run().states
+    return build(engine_name, replace(assembly, input=forces), settings).run().states
 
 
 def _low_pass(force_samples: np.ndarray, cutoff: float | None) -> np.ndarray:

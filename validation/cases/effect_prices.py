@@ -88,23 +88,23 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {"price": price, "ratios": ratios}
 
 
-def hand_built(engine: str, bare_scene: Scene) -> Any:
+def hand_built(engine_name: str, bare_scene: Scene) -> Any:
     """Run of the hand-built model of the vehicle without effects in an engine: a function that returns the states."""
-    assembly, settings = assembly_of_scene(bare_scene), settings_of(bare_scene, engine)
-    run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
+    assembly, settings = assembly_of_scene(bare_scene), settings_of(bare_scene, engine_name)
+    run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine_name]
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio_to_hand_built(engine: str, work_folder: Path, step_count: int, round_count: int) -> Saved:
+def _ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, round_count: int) -> Saved:
     """Ratio of the computing time of twinrig's model of a scene without effects to that of the hand-built model, and
     the largest difference of their states.
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
     bare = scene({}, step_count, work_folder)
-    ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(step_count + 1)
+    ours, theirs, times = model(bare, engine_name), hand_built(engine_name, bare), STEP * np.arange(step_count + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
-    jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
+    jobs = [ours.run, lambda: guard(engine_name, times, theirs(), bare.run.duration), theirs]
     seconds = interleave(jobs, round_count, round_interval=(1, 1, UNCHECKED_INTERVAL), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
@@ -113,29 +113,29 @@ def _ratio_to_hand_built(engine: str, work_folder: Path, step_count: int, round_
     }
 
 
-def _hand_built_rows(engine: str, comparison: Saved, step_count: int) -> list[Row]:
+def _hand_built_rows(engine_name: str, comparison: Saved, step_count: int) -> list[Row]:
     why = (
         f"interleaved runs of {step_count:,} steps, seconds of the processor, median of paired ratios: what the "
         "machinery costs where no effect is named"
     )
     return [
         Observed(
-            f"effect_prices.same.{engine}",
+            f"effect_prices.same.{engine_name}",
             SYSTEM,
-            f"{engine}: largest difference of the states of a bare scene from those of a hand-built model",
+            f"{engine_name}: largest difference of the states of a bare scene from those of a hand-built model",
             comparison["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
         ratio_row(
-            f"effect_prices.ratio.{engine}",
-            f"{engine}: ratio of the time of a bare scene to that of a hand-built model "
+            f"effect_prices.ratio.{engine_name}",
+            f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model "
             "whose result passes the same guard",
             comparison["ratio"],
             why,
         ),
         ratio_row(
-            f"effect_prices.unchecked.{engine}",
-            f"{engine}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
+            f"effect_prices.unchecked.{engine_name}",
+            f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
             comparison["unchecked"],
             why,
         ),
@@ -293,30 +293,30 @@ def _choice_row() -> Row:
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price_of_effect(effect: str, engine: str, work_folder: Path, round_count: int) -> Saved:
+def _price_of_effect(effect: str, engine_name: str, work_folder: Path, round_count: int) -> Saved:
     """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the numbers of
     components that the effect changes."""
     seconds = interleave(
-        [_timed_run(bare, engine) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, work_folder)],
+        [_timed_run(bare, engine_name) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, work_folder)],
         round_count,
         5e-3,
     )
     added = (seconds[1] - seconds[0]) / EFFECT_STEP_COUNT * 1e6
     return {
         "effect": effect,
-        "engine": engine,
-        "adds": changes_text(count_changes(effect, engine, work_folder)) or "nothing",
+        "engine": engine_name,
+        "adds": changes_text(count_changes(effect, engine_name, work_folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
     }
 
 
-def _timed_run(simulated_scene: Scene, engine: str) -> Any:
+def _timed_run(simulated_scene: Scene, engine_name: str) -> Any:
     """Function that runs a scene and computes its output channels; the model is built beforehand, outside the timed
     call."""
     assembly = assembly_of_scene(simulated_scene)
-    built = build(engine, assembly, settings_of(simulated_scene, engine))
+    built = build(engine_name, assembly, settings_of(simulated_scene, engine_name))
     return lambda: output_channels(assembly, built.run(), built)
 
 

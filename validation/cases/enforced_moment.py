@@ -57,10 +57,10 @@ def write_manoeuvre(work_folder: Path, parameter_set_name: str, abrupt: bool = F
     write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
 
 
-def enforced_moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
+def enforced_moment(scene: Scene, engine_name: str, settings: Settings) -> np.ndarray:
     """Enforced moment (n,) in N m at every millisecond of a scene."""
     finer = replace(settings, duration=scene.run.duration)
-    return simulate(scene, engine, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / settings.step)]
+    return simulate(scene, engine_name, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / settings.step)]
 
 
 def exact_moment(scene: Scene) -> np.ndarray:
@@ -134,7 +134,9 @@ def _ringing_rows(work_folder: Path) -> CaseAnswer:
     """Rows and data on an abrupt start: error of Exudyn's multiplier over the first 0.1 s, with and without consistent
     initial accelerations."""
     write_manoeuvre(work_folder, "itwm_drift", abrupt=True)
-    scene = force_scene(work_folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH)
+    scene = force_scene(
+        work_folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH
+    )
     true = exact_moment(scene)
     first = slice(1, 101)
     paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
@@ -181,7 +183,7 @@ def _inconsistent_multiplier(scene: Scene, settings: Settings) -> np.ndarray:
     return multiplier
 
 
-def _study_road_rows(work_folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
+def _study_road_rows(work_folder: Path, time_steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """Rows and table on the paper's run with prescribed pitch on the study road: error of the enforced moment at each
     step, divided by the rms of the moment."""
     virtual_drive(work_folder, ROUGH_ROAD_SECONDS + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
@@ -197,7 +199,7 @@ def _study_road_rows(work_folder: Path, steps: tuple[float, ...]) -> tuple[list[
     true = exact_moment(scene)
     table: list[list[Any]] = []
     for engine, best in BEST_SETTINGS.items():
-        for step in steps:
+        for step in time_steps:
             settings = Settings(best.integrator, step, ROUGH_ROAD_SECONDS, spectral_radius=best.spectral_radius)
             table.append(
                 [

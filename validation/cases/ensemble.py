@@ -74,9 +74,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         return rows, _saved_data(measured.states, times, paths, large, prices)
 
 
-def _noisy_scene(force_folder: Path, duration: float, path: int = 0, step: float = STEP) -> Scene:
-    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": path}}
-    return force_scene(force_folder, duration=duration, step=step, effects=noise)
+def _noisy_scene(force_folder: Path, duration: float, noise_path: int = 0, time_step: float = STEP) -> Scene:
+    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": noise_path}}
+    return force_scene(force_folder, duration=duration, step=time_step, effects=noise)
 
 
 def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
@@ -95,7 +95,7 @@ def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.nda
 
 def _single_run_row(force_folder: Path, duration: float, paths: Arrays) -> Row:
     """Row: path 7 of the ensemble equals a single run of the scene with ``path = 7``."""
-    alone = simulate(_noisy_scene(force_folder, duration, path=7), "reference")
+    alone = simulate(_noisy_scene(force_folder, duration, noise_path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
     return Observed(
         "ensemble.path",
@@ -171,13 +171,13 @@ def _in_separate_process(function: Callable[..., Any], *args: Any) -> Any:
         return pool.submit(function, *args).result()
 
 
-def _large_ensemble(job: NoisePaths, path_count: int, block_folder: Path) -> Saved:
+def _large_ensemble(job: NoisePaths, noise_path_count: int, block_folder: Path) -> Saved:
     """A large ensemble with its computing time (s) and the peak memory (bytes) of this process and its workers."""
     import resource
 
     start = time.perf_counter()
     with process_pool(2) as pool:
-        paths = run_paths(job, path_count, block_folder, pool)
+        paths = run_paths(job, noise_path_count, block_folder, pool)
     seconds = time.perf_counter() - start
     parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     busy = parent.ru_utime + parent.ru_stime + child.ru_utime + child.ru_stime
@@ -261,26 +261,26 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
 
 
 def _engine_rows_and_times(
-    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, path_count: int, pool: Executor | None
+    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, noise_path_count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
     """Rows on the agreement of the first paths between engines, and the wall time (s) per path and step of each
     engine."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
     jobs_by_method: dict[str, Callable[[], Arrays]] = {
-        "mujoco, 1 thread": lambda: run_paths(single, path_count),
-        "mujoco, 2 threads": lambda: run_paths(two, path_count),
+        "mujoco, 1 thread": lambda: run_paths(single, noise_path_count),
+        "mujoco, 2 threads": lambda: run_paths(two, noise_path_count),
         "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(
-            exudyn, path_count, executor=pool, blocks=Blocks(1)
+            exudyn, noise_path_count, executor=pool, blocks=Blocks(1)
         ),
     }
     rows, prices = [], {}
     for method_name, job in jobs_by_method.items():
         start = time.perf_counter()
         paths = job()
-        prices[method_name] = (time.perf_counter() - start) / (path_count * (len(truth) - 1))
+        prices[method_name] = (time.perf_counter() - start) / (noise_path_count * (len(truth) - 1))
         what = (
-            f"largest difference of {path_count} paths in {method_name} from the reference before drift-off, "
+            f"largest difference of {noise_path_count} paths in {method_name} from the reference before drift-off, "
             "over the largest state"
         )
         rows.append(
@@ -316,7 +316,9 @@ def _half_step_row(force_folder: Path) -> Row:
     """Row: change of the pitch when the step is halved. The noise samples stay the same, so only the integrator's error
     changes."""
     pitch = [
-        run_paths(noise_paths(_noisy_scene(force_folder, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
+        run_paths(noise_paths(_noisy_scene(force_folder, 10.0, time_step=step), np.array([10.0])), 100)["states"][
+            :, 0, 3
+        ]
         for step in (STEP, STEP / 2)
     ]
     change = float(np.abs(pitch[0] - pitch[1]).max() / pitch[1].std())

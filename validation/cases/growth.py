@@ -67,9 +67,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return [*rows, _step_row(work_folder), _linear_row(work_folder)], {"spread": spread, "roads": roads}
 
 
-def _noisy_scene(work_folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
-    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": path}}
-    return force_scene(work_folder, step=step, duration=duration, effects=noise)
+def _noisy_scene(work_folder: Path, duration: float, time_step: float = 1e-3, noise_path: int = 0) -> Scene:
+    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": noise_path}}
+    return force_scene(work_folder, step=time_step, duration=duration, effects=noise)
 
 
 def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> Saved:

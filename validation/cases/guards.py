@@ -38,12 +38,12 @@ def ending(attempt_run: Callable[[], Any]) -> str:
     return "answered"
 
 
-def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
+def integrators(engine_name: str, adaptive: bool | None = None) -> list[str]:
     """Integrators that an engine offers: fixed-step, adaptive, or both if ``adaptive`` is None."""
     return [
         name
-        for name, facts in CATALOGUE[engine].items()
-        if (engine, name) not in UNAVAILABLE_INTEGRATORS and adaptive in (None, facts.adaptive)
+        for name, facts in CATALOGUE[engine_name].items()
+        if (engine_name, name) not in UNAVAILABLE_INTEGRATORS and adaptive in (None, facts.adaptive)
     ]
 
 
@@ -58,47 +58,50 @@ def _tight_solution(duration: float) -> np.ndarray:
     return setups.tight_solution(road_assembly(), 1e-3, duration).states
 
 
-def unstable_run_counts(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]:
+def unstable_run_counts(engine_name: str, runner: Runner, quick: bool = False) -> dict[str, int]:
     """Numbers of runs that end right, refused, raised or silently wrong, for every fixed-step integrator at steps of 2
     to 10 ms and durations of 0.04 and 0.2 s, in a full run also of 2 s."""
     counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
-    for name in integrators(engine, adaptive=False):
+    for name in integrators(engine_name, adaptive=False):
         for step in QUICK_STEPS if quick else UNSTABLE_STEPS:
             for duration in QUICK_DURATIONS if quick else DURATIONS:
-                counts[_ending_of_unstable_run(engine, name, step, duration, runner)] += 1
+                counts[_ending_of_unstable_run(engine_name, name, step, duration, runner)] += 1
     return counts
 
 
-def _ending_of_unstable_run(engine: str, integrator: str, step: float, duration: float, runner: Runner) -> str:
+def _ending_of_unstable_run(
+    engine_name: str, integrator: str, time_step: float, duration: float, runner: Runner
+) -> str:
     try:
-        states = runner(engine, road_assembly(), step, duration, integrator).states
+        states = runner(engine_name, road_assembly(), time_step, duration, integrator).states
     except InputError:
         return "refused"
     except RunFailed:
         return "raised"
-    truth = _tight_solution(duration)[:: round(step / 1e-3)]
+    truth = _tight_solution(duration)[:: round(time_step / 1e-3)]
     share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
     return "right" if share <= SILENT_ERROR else "SILENT"
 
 
-def nan_force_endings(engine: str) -> dict[str, str]:
+def nan_force_endings(engine_name: str) -> dict[str, str]:
     """How runs end if a force sample is NaN and has not passed the file reader, for every integrator and both
     interpolations."""
     base, endings = setups.vehicle(), {}
-    for name in integrators(engine):
+    for name in integrators(engine_name):
         for is_held in (True, False):
             forces = setups.static_forces(base, 102, 1e-3, is_held)
             forces.values[57, 0] = np.nan
-            attempt = partial(setups.run, engine, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
+            attempt = partial(setups.run, engine_name, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
             endings[f"{name}, {'held' if is_held else 'linear'}"] = ending(attempt)
     return endings
 
 
-def constrained_endings(engine: str) -> dict[str, str]:
+def constrained_endings(engine_name: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
-    wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
+    wrong = [name for name in integrators(engine_name) if not CATALOGUE[engine_name][name].constraints]
     return {
-        name: ending(partial(setups.run, engine, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name)) for name in wrong
+        name: ending(partial(setups.run, engine_name, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name))
+        for name in wrong
     }
 
 
@@ -180,81 +183,81 @@ def _disk_row(work_folder: Path) -> Row:
     ).at_most(0.0, "files are written whole or not at all", "none")
 
 
-def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
+def _unstable_rows(engine_name: str, endings: Saved, quick: bool) -> list[Row]:
     """Rows: no run at an unstable step gives a silent wrong result; if the check before the run is bypassed, the guard
     after the run raises an error."""
-    checked = unstable_run_counts(engine, setups.run, quick)
-    past = unstable_run_counts(engine, setups.unchecked_run, quick)
-    endings[engine] = {"checked": checked, "unchecked": past}
+    checked = unstable_run_counts(engine_name, setups.run, quick)
+    past = unstable_run_counts(engine_name, setups.unchecked_run, quick)
+    endings[engine_name] = {"checked": checked, "unchecked": past}
     total = sum(checked.values())
     return [
         Observed(
-            f"guards.unstable.{engine}",
+            f"guards.unstable.{engine_name}",
             SYSTEM,
-            f"silent wrong answers of {total} runs at 2 to 10 ms with every fixed-step integrator, {engine}",
+            f"silent wrong answers of {total} runs at 2 to 10 ms with every fixed-step integrator, {engine_name}",
             checked["SILENT"],
             "runs",
         ).at_most(0.0, "a step beyond the stability limit is refused with the limit named", "native"),
         behaviour_row(
-            f"guards.unstable.{engine}.unchecked",
+            f"guards.unstable.{engine_name}.unchecked",
             SYSTEM,
-            f"RK4 at 5 ms over 2 s with the step check bypassed, {engine}",
-            ending(lambda: setups.unchecked_run(engine, road_assembly(), 5e-3, 2.0)),
+            f"RK4 at 5 ms over 2 s with the step check bypassed, {engine_name}",
+            ending(lambda: setups.unchecked_run(engine_name, road_assembly(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
         ),
     ]
 
 
-def _input_rows(engine: str) -> list[Row]:
-    numbers = nan_force_endings(engine)
+def _input_rows(engine_name: str) -> list[Row]:
+    numbers = nan_force_endings(engine_name)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = ending(lambda: sampled_input.damaged_file(engine, Path(files_folder)))
+        file = ending(lambda: sampled_input.damaged_file(engine_name, Path(files_folder)))
     return [
         behaviour_row(
-            f"guards.nan-file.{engine}",
+            f"guards.nan-file.{engine_name}",
             SYSTEM,
-            f"a force file that holds NaN, {engine}",
+            f"a force file that holds NaN, {engine_name}",
             file,
             "refused",
             "the reader names the line",
         ),
         behaviour_row(
-            f"guards.nan.{engine}",
+            f"guards.nan.{engine_name}",
             SYSTEM,
-            f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine}",
+            f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine_name}",
             _unexpected_endings(caught, "caught"),
             "caught",
             "Exudyn's explicit solvers return True with NaN",
         ),
         behaviour_row(
-            f"guards.step-sampling.{engine}",
+            f"guards.step-sampling.{engine_name}",
             SYSTEM,
-            f"a step that does not divide the sampling period, {engine}",
-            ending(lambda: sampled_input.uneven_steps(engine, Path())),
+            f"a step that does not divide the sampling period, {engine_name}",
+            ending(lambda: sampled_input.uneven_steps(engine_name, Path())),
             "refused",
             "a held sample would change in a step",
         ),
         behaviour_row(
-            f"guards.step-duration.{engine}",
+            f"guards.step-duration.{engine_name}",
             SYSTEM,
-            f"a step that does not divide the duration, {engine}",
-            ending(lambda: setups.run(engine, setups.vehicle(), 3e-4, 1.0)),
+            f"a step that does not divide the duration, {engine_name}",
+            ending(lambda: setups.run(engine_name, setups.vehicle(), 3e-4, 1.0)),
             "refused",
             "the run would end elsewhere",
         ),
     ]
 
 
-def _explicit_solver_row(engine: str) -> Row:
+def _explicit_solver_row(engine_name: str) -> Row:
     """Row: error of the enforced moment by an explicit solver in the hand-written reference and in MuJoCo, where the
     pitch is an input and no constraint."""
-    error = prescribed_pitch.explicit_error(engine, Path())
+    error = prescribed_pitch.explicit_error(engine_name, Path())
     return Observed(
-        f"guards.constraint.{engine}",
+        f"guards.constraint.{engine_name}",
         SYSTEM,
-        f"error of the enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
+        f"error of the enforced moment by an explicit solver, {engine_name}: the pitch is an input, no constraint is active",
         error,
         "of its rms",
     ).at_most(1e-4, "the project's bound at 1 ms", "closed form")

@@ -103,26 +103,26 @@ def _prepared_runs(work_folder: Path) -> FreeRuns:
 
 
 def _largest_pitch_error(
-    setting: SpringSetting, stiffness: float, free_runs: FreeRuns, engine: str = "reference"
+    setting: SpringSetting, stiffness: float, free_runs: FreeRuns, engine_name: str = "reference"
 ) -> float:
     """Largest pitch error (rad) of a run with a holding spring of a given stiffness (N m/rad)."""
     free = free_runs.runs[setting.disturbed]
     damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
     held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    return float(np.abs(simulate(free.scene, engine, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
+    return float(np.abs(simulate(free.scene, engine_name, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
 
 
-def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine: str) -> list[Row]:
+def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine_name: str) -> list[Row]:
     """Rows: a spring of 0.6 of the predicted stiffness fails to hold the pitch, and one of 1.2 holds the pitch."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
-        off = _largest_pitch_error(setting, factor * free_runs.predicted_stiffness, free_runs, engine)
-        key = f"holding_spring.{expected}.{engine}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
+        off = _largest_pitch_error(setting, factor * free_runs.predicted_stiffness, free_runs, engine_name)
+        key = f"holding_spring.{expected}.{engine_name}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
         rows.append(
             behaviour_row(
                 key,
                 SYSTEM,
-                f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
+                f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, {engine_name}",
                 "holds" if off <= ALLOWED_PITCH_ERROR else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {ALLOWED_PITCH_ERROR} allowed",

@@ -322,12 +322,12 @@ class IndexOne:
         self._free = derivative_of("force", assembly.vehicle.geometry)
         self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
-    def run(self, step: float, duration: float) -> np.ndarray:
+    def run(self, time_step: float, duration: float) -> np.ndarray:
         """States (n + 1, 8) by classical Runge-Kutta from the assembly's initial state, which may be off the
         constraint."""
         assert self.assembly.input is not None
-        count = round(duration / step)
-        inputs = self.assembly.input.sample(0.0, step / 2, 2 * count + 1)
+        count = round(duration / time_step)
+        inputs = self.assembly.input.sample(0.0, time_step / 2, 2 * count + 1)
         states = np.empty((count + 1, 8))
         y = states[0] = self.assembly.initial
         acting = dict[float, np.ndarray]()
@@ -336,9 +336,9 @@ class IndexOne:
             return self._derivative(y, acting[time])
 
         for i in range(count):
-            acting |= zip((0.0, 0.5 * step, step), inputs[2 * i : 2 * i + 3], strict=True)
-            y = runge_kutta_step(rate, 0.0, y, step)
-            states[i + 1] = y = self._projection(y, acting[step]) if self.projected else y
+            acting |= zip((0.0, 0.5 * time_step, time_step), inputs[2 * i : 2 * i + 3], strict=True)
+            y = runge_kutta_step(rate, 0.0, y, time_step)
+            states[i + 1] = y = self._projection(y, acting[time_step]) if self.projected else y
         return states
 
     def _derivative(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:

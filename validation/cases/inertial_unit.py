@@ -104,21 +104,21 @@ def _exact_rate_rows() -> list[Row]:
 
 
 def _closed_form_row(
-    row_name: str, quantity: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+    row_name: str, quantity_name: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
 ) -> Row:
     """Row for an error relative to a closed form."""
-    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity, error_value, unit).at_most(
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, error_value, unit).at_most(
         bound, tolerance_reason, "closed form"
     )
 
 
-def _one_axis_rows(path_count: int) -> list[Row]:
+def _one_axis_rows(noise_path_count: int) -> list[Row]:
     """Rows on eqs (27) to (30): with noise on one gyro axis and no rotation, the angle about this axis is a Brownian
     motion."""
     rows = []
     for axis in range(3):
         deviation = EQUAL_WALK / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
-        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, path_count))
+        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, noise_path_count))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
@@ -130,8 +130,8 @@ def _one_axis_rows(path_count: int) -> list[Row]:
                     "rad^2",
                 ),
                 EQUAL_WALK**2 * 200 * SAMPLE_PERIOD,
-                path_count,
-                f"s^2 t; {path_count:,} paths, seed {SEED}",
+                noise_path_count,
+                f"s^2 t; {noise_path_count:,} paths, seed {SEED}",
             ),
             _closed_form_row(
                 f"one_axis.{axis + 1}.spill",
@@ -144,10 +144,12 @@ def _one_axis_rows(path_count: int) -> list[Row]:
     return rows
 
 
-def _mean_row(row_name: str, quantity: str, samples: np.ndarray, expected_mean: float, tolerance_reason: str) -> Row:
+def _mean_row(
+    row_name: str, quantity_name: str, samples: np.ndarray, expected_mean: float, tolerance_reason: str
+) -> Row:
     """Row for a mean that must lie within MEAN_BAND standard errors of its theoretical value."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
-    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity, float(samples.mean()), "").within(
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, float(samples.mean()), "").within(
         expected_mean,
         MEAN_BAND * error,
         f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {MEAN_BAND} standard errors of {error:.2g}",
@@ -155,13 +157,13 @@ def _mean_row(row_name: str, quantity: str, samples: np.ndarray, expected_mean: 
     )
 
 
-def _three_axes_rows(path_count: int) -> list[Row]:
+def _three_axes_rows(noise_path_count: int) -> list[Row]:
     """Rows on noise about three axes. Equal noise: mean trace of the error matrix; unequal noise on a turning body:
     mean error matrix and mean quaternion."""
     count = round(RUN_SECONDS / SAMPLE_PERIOD)
     rates, root = turning_rates(count, SAMPLE_PERIOD), SAMPLE_PERIOD**0.5
-    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_WALK / root * np.ones(3), path_count)
-    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_WALKS / root, path_count)
+    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_WALK / root * np.ones(3), noise_path_count)
+    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_WALKS / root, noise_path_count)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
         mean_error(UNEQUAL_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
@@ -203,7 +205,7 @@ def _three_axes_rows(path_count: int) -> list[Row]:
             "error of the mean rotation matrix with unequal noise, turning body, worst entry over its standard error",
             standard_errors(wandered, exact),
             "",
-            f"{path_count:,} paths, seed {SEED}; entries differ from the identity by "
+            f"{noise_path_count:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
             MEAN_BAND,
         ),
@@ -221,15 +223,15 @@ def _three_axes_rows(path_count: int) -> list[Row]:
 STRATONOVICH_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
-def _norm_rows(path_count: int) -> list[Row]:
+def _norm_rows(noise_path_count: int) -> list[Row]:
     """Rows on Ito's theory: the norm of a quaternion that is never normalised grows by a law, and the mean quaternion
     is the true one."""
     rows, steps, span = [], 100, 4.0
     period = span / steps
     for axes in (1, 3):
-        noise = np.zeros((steps, path_count, 3))
-        noise[:, :, :axes] = normal_samples(SEED, axes, steps * path_count, axes, source=GYRO).reshape(
-            steps, path_count, axes
+        noise = np.zeros((steps, noise_path_count, 3))
+        noise[:, :, :axes] = normal_samples(SEED, axes, steps * noise_path_count, axes, source=GYRO).reshape(
+            steps, noise_path_count, axes
         )
         q = euler_quaternions(EQUAL_WALK * period**0.5 * noise, START_ATTITUDE)
         square = np.sum(q**2, axis=1)
@@ -271,7 +273,7 @@ def _norm_rows(path_count: int) -> list[Row]:
     return rows
 
 
-def _ten_minute_rows(path_count: int) -> CaseAnswer:
+def _ten_minute_rows(noise_path_count: int) -> CaseAnswer:
     """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
     gyro sample."""
     walk = angle_random_walk_of(RATE_DEVIATION, SAMPLING_RATE)
@@ -301,13 +303,13 @@ def _ten_minute_rows(path_count: int) -> CaseAnswer:
             )
         ),
     ]
-    if not path_count:
+    if not noise_path_count:
         return rows, {}
     every = round(SAMPLING_RATE)
     t = np.arange(round(TEN_MINUTES * SAMPLING_RATE)) / SAMPLING_RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
     true = true_attitude(rates, 1 / SAMPLING_RATE, START_ATTITUDE)[::every]
-    wandered = np.array([_error_angles(path, rates, true) for path in range(path_count)])
+    wandered = np.array([_error_angles(path, rates, true) for path in range(noise_path_count)])
     rows.append(
         mean_square(
             Observed(
@@ -318,29 +320,29 @@ def _ten_minute_rows(path_count: int) -> CaseAnswer:
                 "deg^2",
             ),
             axis**2,
-            3 * path_count,
-            f"{path_count} paths of 600,000 steps, seed {SEED}",
+            3 * noise_path_count,
+            f"{noise_path_count} paths of 600,000 steps, seed {SEED}",
         )
     )
     return rows, {
         "paths": wandered[:8].tolist(),
         "rms": np.sqrt(np.mean(wandered**2, axis=(0, 2))).tolist(),
-        "count": path_count,
+        "count": noise_path_count,
     }
 
 
-def _error_angles(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
+def _error_angles(noise_path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true_attitudes``
     (601, 4)."""
     attitudes = measured_attitude(
-        rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(path, path + 1), SEED
+        rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(noise_path, noise_path + 1), SEED
     )
     return np.degrees(
         rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true_attitudes) - 1), 0], true_attitudes))
     )
 
 
-def _bias_rows(path_count: int) -> list[Row]:
+def _bias_rows(noise_path_count: int) -> list[Row]:
     """Rows: mean square angle error by simulated gyro biases, constant and wandering, compared with its law."""
     rows, grade, tau = [], 10.0 * DEGREES_PER_HOUR, 100.0
     for name, turn_on, instability, span in (
@@ -349,7 +351,7 @@ def _bias_rows(path_count: int) -> list[Row]:
         ("forgetful", 0.0, grade, 600),
     ):
         angles = np.array(
-            [bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(path_count)]
+            [bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(noise_path_count)]
         )
         law = float(angle_variance(np.array(float(span)), 0.0, turn_on, instability, tau))
         rows.append(
@@ -362,8 +364,8 @@ def _bias_rows(path_count: int) -> list[Row]:
                     "rad^2",
                 ),
                 law,
-                path_count,
-                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {path_count:,} paths, seed {SEED}",
+                noise_path_count,
+                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {noise_path_count:,} paths, seed {SEED}",
             )
         )
     return rows
@@ -397,7 +399,7 @@ def _section_force_rows() -> list[Row]:
     ]
 
 
-def _recording_rows(path_count: int) -> CaseAnswer:
+def _recording_rows(noise_path_count: int) -> CaseAnswer:
     """Rows and data from a recording of a minute in a real car: gyro compared with camera, and the noise law on the
     car's motion."""
     path = recording.find_recording()
@@ -411,7 +413,7 @@ def _recording_rows(path_count: int) -> CaseAnswer:
     off = np.degrees(recording.gyro_error(recorded))
     rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
-    wandered = attitude_errors(rates, period, deviation, path_count)
+    wandered = attitude_errors(rates, period, deviation, noise_path_count)
     law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
     return [
         Observed(
@@ -427,7 +429,7 @@ def _recording_rows(path_count: int) -> CaseAnswer:
             "error of the mean rotation matrix of noise on the car's motion, worst entry over its standard error",
             standard_errors(wandered, law),
             "",
-            f"the recorded rates, read each 50 ms, as the true motion; {path_count:,} paths, seed {SEED}",
+            f"the recorded rates, read each 50 ms, as the true motion; {noise_path_count:,} paths, seed {SEED}",
             MEAN_BAND,
         ),
     ], {"off": off[::20].tolist()}

@@ -125,14 +125,16 @@ def _inconsistency_rows(innovations: list[np.ndarray]) -> list[Row]:
     return rows
 
 
-def _outside_band_row(row_name: str, quantity: str, noise: str, values: np.ndarray, degrees_of_freedom: int) -> Row:
+def _outside_band_row(
+    row_name: str, quantity_name: str, noise: str, values: np.ndarray, degrees_of_freedom: int
+) -> Row:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
     low, high = _chi_square_band(degrees_of_freedom * len(values))
     mean = float(values.mean()) / degrees_of_freedom
     return behaviour_row(
         f"kalman.{row_name}",
         SYSTEM,
-        f"{quantity} of a filter that assumes 4 times the variance of the {noise}",
+        f"{quantity_name} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
         "outside",
         f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",
@@ -148,7 +150,7 @@ def _chi_square_band(degrees_of_freedom: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _band_row(row_name: str, quantity: str, values: np.ndarray, degrees_of_freedom: int, sample: str) -> Row:
+def _band_row(row_name: str, quantity_name: str, values: np.ndarray, degrees_of_freedom: int, sample: str) -> Row:
     low, high = _chi_square_band(degrees_of_freedom * len(values))
     mean = float(values.mean()) / degrees_of_freedom
     why = (
@@ -156,11 +158,13 @@ def _band_row(row_name: str, quantity: str, values: np.ndarray, degrees_of_freed
         f"{degrees_of_freedom * len(values)} degrees of freedom: {sample}"
     )
     return Observed(
-        f"kalman.{row_name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
+        f"kalman.{row_name}", SYSTEM, f"{quantity_name}, mean per degree of freedom, no model error", mean, ""
     ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 
-def _gap_rows(work_folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
+def _gap_rows(
+    work_folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]
+) -> list[Row]:
     """Rows: pitch error and count of missing samples if the file of the angle, of the rate, or of both has missing
     samples."""
     rows = []

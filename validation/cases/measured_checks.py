@@ -174,18 +174,18 @@ def _stated_size(findings: Sequence[Finding], check: str, finding_place: str = "
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _size_row(row_name: str, quantity: str, stated_size: float, unit: str, planted_size: float) -> Row:
+def _size_row(row_name: str, quantity_name: str, stated_size: float, unit: str, planted_size: float) -> Row:
     """Row that compares the size that a check states with the size of the planted fault."""
     id, why = f"measured_checks.{row_name}", "what was planted, 20 %"
-    return Observed(id, SYSTEM, quantity, stated_size, unit).within(
+    return Observed(id, SYSTEM, quantity_name, stated_size, unit).within(
         planted_size, SIZE_TOLERANCE * abs(planted_size), why, "closed form"
     )
 
 
-def _no_findings_row(row_name: str, quantity: str, finding_texts: list[str], tolerance_reason: str) -> Row:
+def _no_findings_row(row_name: str, quantity_name: str, finding_texts: list[str], tolerance_reason: str) -> Row:
     """Row that passes if there are no findings."""
     id, finding_text = f"measured_checks.{row_name}", "; ".join(finding_texts) or tolerance_reason
-    return Observed(id, SYSTEM, quantity, len(finding_texts), "").within(0, 0, finding_text, "closed form")
+    return Observed(id, SYSTEM, quantity_name, len(finding_texts), "").within(0, 0, finding_text, "closed form")
 
 
 def _fault_rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
@@ -224,7 +224,11 @@ def _clean_recording_rows(work_folder: Path) -> list[Row]:
     return [
         _clean_recordings_row(
             vehicle,
-            [planted_findings(measurement(vehicle, road), work_folder, seed=seed) for road in roads for seed in range(2)],
+            [
+                planted_findings(measurement(vehicle, road), work_folder, seed=seed)
+                for road in roads
+                for seed in range(2)
+            ],
         )
         for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
     ]

@@ -146,21 +146,21 @@ def _counting_rows() -> list[Row]:
     ]
 
 
-def _equal_blocks_row(work_folder: Path, engine: str, stabiliser: str, seconds: float) -> Row:
+def _equal_blocks_row(work_folder: Path, engine_name: str, stabiliser: str, seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     run_folder = work_folder / f"blocks {seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
+    job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS, engine_name, AttitudeHold(stabiliser))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
-        name = f"{engine} {stabiliser} {block}"
+        name = f"{engine_name} {stabiliser} {block}"
         run(job, run_folder / name, block=block)
         bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
-        f"measured_long.blocks_{engine}_{stabiliser}",
+        f"measured_long.blocks_{engine_name}_{stabiliser}",
         SYSTEM,
-        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser "
+        f"channels in {engine_name} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser "
         f"{stabiliser}",
         changed,
         "1",

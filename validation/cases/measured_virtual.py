@@ -120,26 +120,28 @@ def planted_faults(bits: int) -> Faults:
 
 
 def recording_from_files(
-    virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, format_name: str, work_folder: Path
+    virtual: VirtualMeasurement, samples: np.ndarray, vehicle_name: str, format_name: str, work_folder: Path
 ) -> Recording:
     """Recording read back through a scene, after two recorders, one for hubs and one for the inertial unit, have
     written the samples in a file format."""
     work_folder.mkdir(parents=True)
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
-    text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
+    text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle_name}"']
     for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -RECORDER_DELAY)):
         signals = tuple(signal for signal, taken in zip(virtual.signals, chosen, strict=True) if taken)
         write(work_folder / f"{name}.{format_name}", [channel_group(signals, samples[:, chosen], virtual.period)])
         text.append(map_lines(signals, f"{name}.{format_name}", offset))
     (work_folder / "scene.toml").write_text("\n".join(text))
-    if (taken := work_folder.parent / vehicle).is_file():
-        (work_folder / vehicle).write_bytes(taken.read_bytes())
+    if (taken := work_folder.parent / vehicle_name).is_file():
+        (work_folder / vehicle_name).write_bytes(taken.read_bytes())
     return read_files(load(work_folder / "scene.toml"), work_folder)
 
 
-def stabilised_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine: str = "mujoco") -> SectionRun:
+def stabilised_run(
+    recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine_name: str = "mujoco"
+) -> SectionRun:
     """Run of a recording, ready to be started, with the vehicle's attitude stabilised as ``hold`` says."""
-    return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
+    return SectionRun(vehicle, recording, Sections(vehicle), engine_name, hold)
 
 
 def _format_rows(chain_test: ChainTest, work_folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
@@ -312,7 +314,7 @@ def _trust_time_rows() -> list[Row]:
 
 
 def _drift_off_time(
-    vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: MeasurementErrors, path: int
+    vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: MeasurementErrors, noise_path: int
 ) -> float:
     samples = true_measurement.run.wrenches.reshape(len(true_measurement.run.times), -1)
     forces = HubForces(
@@ -326,7 +328,7 @@ def _drift_off_time(
     run = hub_model(
         "mujoco",
         vehicle,
-        forces.with_noise(deviation, SEED, path),
+        forces.with_noise(deviation, SEED, noise_path),
         true_measurement.step,
         float(true_measurement.run.times[-1]),
         "smooth",

@@ -195,7 +195,7 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     return lines, rows
 
 
-def _engine_rows(engine: str, duration: float) -> list[Row]:
+def _engine_rows(engine_name: str, duration: float) -> list[Row]:
     """Rows: motion recovered from five rigid sensors in an engine's run on the study road, and detection of a loose
     sixth sensor."""
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID_SENSORS.items()} | {
@@ -212,7 +212,7 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
             },
         }
     )
-    run, p = simulate(scene, engine), scene.effects["accelerometers"]
+    run, p = simulate(scene, engine_name), scene.effects["accelerometers"]
     readings, array = readings_of(run, p), sensor_array(RIGID_SENSORS)
     felt = readings[:, :5]
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
@@ -221,24 +221,24 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = fit_quality(sensor_array(p.positions()), readings)
     return [
-        *_recovery_rows("accelerometers", engine, array, felt, run.states, None),
-        *_recovery_rows("gyro", engine, array, felt, run.states, turning),
+        *_recovery_rows("accelerometers", engine_name, array, felt, run.states, None),
+        *_recovery_rows("gyro", engine_name, array, felt, run.states, turning),
         Observed(
-            f"motion.pitch_acceleration.{engine}",
+            f"motion.pitch_acceleration.{engine_name}",
             SYSTEM,
-            f"largest difference of the pitch acceleration from {engine}'s readings from the paper's "
+            f"largest difference of the pitch acceleration from {engine_name}'s readings from the paper's "
             "equations, over the largest value",
             float(np.abs(acceleration - true).max() / np.abs(true).max()),
             "",
         ).at_most(
             CLOSED_FORM_BOUND,
             "the engine's acceleration beside eq. (38), as in the build audit",
-            "shared kernel" if engine == "reference" else "native",
+            "shared kernel" if engine_name == "reference" else "native",
         ),
         behaviour_row(
-            f"motion.bracket.{engine}",
+            f"motion.bracket.{engine_name}",
             SYSTEM,
-            f"six sensors, of which a bracket of 30 Hz carries one, {engine}: {100 * loose.share:.2g} "
+            f"six sensors, of which a bracket of 30 Hz carries one, {engine_name}: {100 * loose.share:.2g} "
             "% fits no rigid body",
             f"loose: {loose.suspect}" if not loose.rigid else "rigid",
             "loose: battery",
@@ -246,9 +246,9 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
             "closed form",
         ),
         Observed(
-            f"motion.rigid.{engine}",
+            f"motion.rigid.{engine_name}",
             SYSTEM,
-            f"share of the readings that no rigid body explains, five rigid mounts, {engine}",
+            f"share of the readings that no rigid body explains, five rigid mounts, {engine_name}",
             fit_quality(array, felt).share,
             "",
         ).at_most(CLOSED_FORM_BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
@@ -257,7 +257,7 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
 
 def _recovery_rows(
     integration_rule: str,
-    engine: str,
+    engine_name: str,
     array: SensorArray,
     specific_forces: np.ndarray,
     states: np.ndarray,
@@ -275,9 +275,9 @@ def _recovery_rows(
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
     return [
         Observed(
-            f"motion.recovered.{integration_rule}.{what}.{engine}",
+            f"motion.recovered.{integration_rule}.{what}.{engine_name}",
             SYSTEM,
-            f"error of the {what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
+            f"error of the {what} recovered from {words}, {engine_name}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
             float(np.abs(error).max()),
             unit,
         ).at_most(bound, "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")
@@ -299,20 +299,20 @@ def _turning_body(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarra
     )
 
 
-def _noise_samples(path: int, sample_count: int) -> np.ndarray:
-    return NOISE_DEVIATION * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(
+def _noise_samples(noise_path: int, sample_count: int) -> np.ndarray:
+    return NOISE_DEVIATION * normal_samples(SEED + 1, noise_path, sample_count, 15, source=ACCELEROMETERS).reshape(
         sample_count, 5, 3
     )
 
 
-def _random_walk_rows(path_count: int) -> tuple[list[Row], dict[str, list[float]]]:
+def _random_walk_rows(noise_path_count: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Row and curves: if angular rates are only integrated from noisy readings, their error grows with the square root
     of time."""
     count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
     errors = np.array(
         [
             integrate_rates(spin_from_readings(array, _noise_samples(path, count)), SAMPLE_PERIOD, np.zeros(3))
-            for path in range(path_count)
+            for path in range(noise_path_count)
         ]
     )
     row = mean_square(
@@ -324,8 +324,8 @@ def _random_walk_rows(path_count: int) -> tuple[list[Row], dict[str, list[float]
             "m^2/s^2",
         ),
         NOISE_DEVIATION**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
-        3 * path_count,
-        f"{path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
+        3 * noise_path_count,
+        f"{noise_path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
     )
     curves = {
         "time": SAMPLE_PERIOD * np.arange(count),

@@ -71,13 +71,13 @@ def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
     return rows
 
 
-def _native_count_row(car_name: str, car: CutVehicle, engine: str) -> Row:
-    share = native_share(engine, car)
+def _native_count_row(car_name: str, car: CutVehicle, engine_name: str) -> Row:
+    share = native_share(engine_name, car)
     shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
     return Observed(
-        f"native_builds.count_{car_name}_{engine}",
+        f"native_builds.count_{car_name}_{engine_name}",
         SYSTEM,
-        f"number of springs, mounts and bars of {car_name} that are native elements in {engine}",
+        f"number of springs, mounts and bars of {car_name} that are native elements in {engine_name}",
         len(share.elements),
         "elements",
     ).within(len(car.elements), 0, f"all have stiffness and damping that every engine has; shared: {shared}", "native")

@@ -39,26 +39,26 @@ ORDER_REASON = "halvings inside the asymptotic range; the band leaves room for t
 
 
 def errors_by_step(
-    engine: str,
+    engine_name: str,
     integrator: str,
     options: dict[str, float],
     exact_states: np.ndarray,
     duration: float,
-    steps: tuple[float, ...],
+    time_steps: tuple[float, ...],
 ) -> list[float]:
     """Largest state error of an integrator at each step, over a duration (s), on the common time grid."""
     errors_of_steps = []
-    for step in steps:
+    for step in time_steps:
         run = simulate(
-            road_scene(step=step, duration=duration), engine, Settings(integrator, step, duration, **options)
+            road_scene(step=step, duration=duration), engine_name, Settings(integrator, step, duration, **options)
         )
         errors_of_steps.append(float(np.abs(run.states[:: round(COMPARED_GRID / step)] - exact_states).max()))
     return errors_of_steps
 
 
-def fitted_order(steps: tuple[float, ...], errors_of_steps: list[float]) -> float:
+def fitted_order(time_steps: tuple[float, ...], errors_of_steps: list[float]) -> float:
     """Order of convergence: slope of log(error) over log(step) by least squares."""
-    return float(np.polyfit(np.log(steps), np.log(errors_of_steps), 1)[0])
+    return float(np.polyfit(np.log(time_steps), np.log(errors_of_steps), 1)[0])
 
 
 @on_paper_road()

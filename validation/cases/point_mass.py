@@ -142,14 +142,14 @@ def _discretisation_difference(damping_product: float, step_count: int) -> float
     return 1 - float(euler_covariance(step_count, *arguments)[0, 0] / continuous_covariance(END_TIME, *arguments)[0, 0])
 
 
-def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
+def _monte_carlo_rows(damping_product: float, noise_path_count: int) -> list[Row]:
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
     arguments = (DEVIATION, STEP, MASS, damping_product / (steps * STEP))
-    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(path_count, steps, *arguments, seed=SEED)
+    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(noise_path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
-    why = f"{path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
+    why = f"{noise_path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
             Observed(
@@ -160,7 +160,7 @@ def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
                 "m^2",
             ),
             float(law[0, 0]),
-            path_count,
+            noise_path_count,
             why,
         ),
         mean_square(
@@ -173,7 +173,7 @@ def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
                 "",
             ),
             1.0,
-            2 * path_count,
+            2 * noise_path_count,
             why,
         ),
     ]

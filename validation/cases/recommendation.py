@@ -67,7 +67,9 @@ def _verdicts_in_processes(work_folder: Path) -> list[SceneVerdicts]:
         ]
 
 
-def scene_verdicts(system: str, scene_number: int, work_folder: Path, engines: tuple[str, ...] = ENGINES) -> SceneVerdicts:
+def scene_verdicts(
+    system_name: str, scene_number: int, work_folder: Path, engines: tuple[str, ...] = ENGINES
+) -> SceneVerdicts:
     """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
     verdicts if the scene was refused more than REDRAWS times."""
     refused: list[str] = []
@@ -75,11 +77,11 @@ def scene_verdicts(system: str, scene_number: int, work_folder: Path, engines: t
         try:
             reasons = (
                 verdicts_on_pitch_plane(random_scene(n, work_folder), engines)
-                if system == "pitch-plane"
-                else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system, n))
+                if system_name == "pitch-plane"
+                else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system_name, n))
             )
         except (InputError, RunFailed) as error:
-            refused.append(f"{system} {n}: {error}")
+            refused.append(f"{system_name} {n}: {error}")
         else:
             return reasons, refused
     return [], refused

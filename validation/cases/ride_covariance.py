@@ -222,31 +222,31 @@ def _inputs_row() -> Row:
     ).at_most(1e-12, "exact but for rounding", "closed form")
 
 
-def _engine_row(engine: str) -> Row:
+def _engine_row(engine_name: str) -> Row:
     """Row: covariance of an engine's own linearised vehicle, compared with quadrature on the analytic vehicle."""
     from models.engines.spatial_protocol import build
 
     worst = 0.0
     for name, speed in (("r19_ride", 20.0), ("r19_free", 33.0), ("three_axle_truck", 9.0)):
         vehicle = _ride_vehicle(name, SEED)
-        linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
+        linear, analytic = build(engine_name, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
         roads = five_correlation_cases(analytic.wheels).values()
         worst = max(worst, *(_covariance_difference(linear, analytic, road, speed)[0] for road in roads))
     return Observed(
-        f"ride_covariance.engine.{engine}",
+        f"ride_covariance.engine.{engine_name}",
         SYSTEM,
-        f"difference of the standard deviations from the linearisation of {engine}, three asymmetric "
+        f"difference of the standard deviations from the linearisation of {engine_name}, three asymmetric "
         "twins, five cases, from quadrature of the analytic vehicles",
         worst,
         "",
     ).at_most(1e-6, "asked", "native")
 
 
-def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[str, Any]]:
+def _speed_sweep_rows(speeds: np.ndarray, engine_name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data on the fast method: five cases of correlation over many speeds with weighting, by the fast and by
     the direct method, with processor times."""
     vehicle = _ride_vehicle("r19_ride")
-    linear = linear_vehicle(vehicle, engine)
+    linear = linear_vehicle(vehicle, engine_name)
     roads = five_correlation_cases(linear(20.0).wheels)
     variance_sweep(
         linear, roads, speeds[:1], WEIGHTED_OUTPUTS
@@ -278,7 +278,7 @@ def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[
             "ride_covariance.fast.time",
             SYSTEM,
             f"time of five cases at {len(speeds)} speeds with ISO weighting, from the linear vehicle "
-            f"of {engine}, single core, measured once",
+            f"of {engine_name}, single core, measured once",
             seconds,
             "s",
         ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),

@@ -91,11 +91,11 @@ def relative_difference(computed_values: np.ndarray, expected: np.ndarray) -> fl
     return float(np.abs(computed_values - expected).max(initial=0.0)) / (size or 1.0)
 
 
-def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def random_state(vehicle: SpatialVehicle, noise_path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Random state with standard deviations of 0.05 m or rad for coordinates and 0.5 per s for rates, and a random road
     with 0.05 m and m/s."""
     n, w = len(vehicle.coordinates()), len(vehicle.tyres)
-    drawn = normal_samples(SEED, path, 1, 2 * n + 2 * w)[0]
+    drawn = normal_samples(SEED, noise_path, 1, 2 * n + 2 * w)[0]
     return 0.05 * drawn[:n], 0.5 * drawn[n : 2 * n], 0.05 * drawn[2 * n :]
 
 
@@ -158,8 +158,8 @@ def _acceleration_rows(vehicle_name: str) -> list[Row]:
     ]
 
 
-def _settings(engine: str, duration: float = 1.0) -> Settings:
-    return Settings(INTEGRATORS[engine], STEP, duration)
+def _settings(engine_name: str, duration: float = 1.0) -> Settings:
+    return Settings(INTEGRATORS[engine_name], STEP, duration)
 
 
 def _simulation_rows() -> tuple[list[Row], list[list[str]]]:

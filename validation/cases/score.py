@@ -141,11 +141,11 @@ def _heave_rows(engines: tuple[str, ...], duration: float) -> list[Row]:
     return rows
 
 
-def _sinking_errors(engine: str, work_folder: Path, duration: float) -> tuple[float, float]:
+def _sinking_errors(engine_name: str, work_folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) of the sinking run, and largest deviation of its damage ratios from 1."""
     scene = force_scene(work_folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING_SPEED)})
-    still, moved = (simulate(simulated_scene, engine) for simulated_scene in (scene, sinking))
+    still, moved = (simulate(simulated_scene, engine_name) for simulated_scene in (scene, sinking))
     wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
@@ -180,7 +180,9 @@ def _grade_rows(work_folder: Path, engines: tuple[str, ...]) -> list[Row]:
 def _study_results(work_folder: Path) -> list[Saved]:
     """Results of all stabilisers of the study with its default options, in all engines."""
     (work_folder / "study").mkdir()
-    _, rows, failed = compare(load(STUDY_SCENE), IMPLEMENTATIONS, work_folder / "study", lambda text, progress_share: None)
+    _, rows, failed = compare(
+        load(STUDY_SCENE), IMPLEMENTATIONS, work_folder / "study", lambda text, progress_share: None
+    )
     assert not failed, failed
     return rows
 
@@ -252,9 +254,9 @@ def _long_results(work_folder: Path) -> list[Saved]:
     return [_score_of_method(bench, name) for name in PROTOTYPE_RESULTS]
 
 
-def _score_of_method(bench: Bench, method: str, engine: str = "reference") -> Saved:
+def _score_of_method(bench: Bench, method: str, engine_name: str = "reference") -> Saved:
     effects = bench.methods[method]
-    return bench.row(method, effects, bench.simulate(engine, effects))
+    return bench.row(method, effects, bench.simulate(engine_name, effects))
 
 
 def _prototype_rows(long_runs: list[Saved]) -> list[Row]:

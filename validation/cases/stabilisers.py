@@ -75,10 +75,12 @@ def write_motion(measured_run: Result, work_folder: Path, ahead: float = 0.0) ->
     write_time_series(work_folder / "motion.csv", columns, STEP)
 
 
-def prescribed_run(scene: Scene, engine: str) -> Result:
+def prescribed_run(scene: Scene, engine_name: str) -> Result:
     """Run with prescribed motion, by the engine's integrator that can solve constraints."""
     return simulate(
-        scene, engine, Settings(CONSTRAINED_INTEGRATORS[engine], STEP, scene.run.duration, spectral_radius=0.6)
+        scene,
+        engine_name,
+        Settings(CONSTRAINED_INTEGRATORS[engine_name], STEP, scene.run.duration, spectral_radius=0.6),
     )
 
 

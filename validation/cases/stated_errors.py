@@ -59,17 +59,17 @@ def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
         return list(pool.map(samples_of_system, sample_counts, sample_counts.values()))
 
 
-def samples_of_system(system: str, sample_count: int) -> list[Saved]:
+def samples_of_system(system_name: str, sample_count: int) -> list[Saved]:
     """Random samples of stated and true errors for one system, as tables for JSON."""
-    drawn: Iterator[Sample] = import_module(SAMPLE_MODULES[system]).samples(sample_count, SEED)
-    return [_sample_as_table(system, sample) for sample in drawn]
+    drawn: Iterator[Sample] = import_module(SAMPLE_MODULES[system_name]).samples(sample_count, SEED)
+    return [_sample_as_table(system_name, sample) for sample in drawn]
 
 
-def _sample_as_table(system: str, sample: Sample) -> Saved:
+def _sample_as_table(system_name: str, sample: Sample) -> Saved:
     """A sample of stated and true error as a table for JSON; its ``ratio`` is the ratio of the true to the stated
     error, None where no number is stated."""
     sample_table = {
-        "system": system,
+        "system": system_name,
         "name": sample.name,
         "engine": sample.engine,
         "cost": sample.extra_calls / sample.calls,
@@ -158,9 +158,9 @@ def _share_of_true(hits: Iterator[bool]) -> float:
     return float(np.mean(counted)) if counted else 1.0
 
 
-def _median_cost(system: str, samples: list[Saved]) -> float:
+def _median_cost(system_name: str, samples: list[Saved]) -> float:
     """Median cost of a system's error estimates; estimates without a number count only if no estimate has a number."""
-    of_system = [sample for sample in samples if sample["system"] == system]
+    of_system = [sample for sample in samples if sample["system"] == system_name]
     return float(
         np.median(
             [sample["cost"] for sample in of_system if sample["ratio"] is not None]
@@ -169,11 +169,11 @@ def _median_cost(system: str, samples: list[Saved]) -> float:
     )
 
 
-def _system_rows(system: str, samples: list[Saved]) -> list[Row]:
+def _system_rows(system_name: str, samples: list[Saved]) -> list[Row]:
     """Rows on the stated errors of one system, reported without a verdict."""
-    of_system = [sample for sample in samples if sample["system"] == system]
+    of_system = [sample for sample in samples if sample["system"] == system_name]
     known = [sample for sample in of_system if sample["ratio"] is not None]
-    sample_text = f"{system}, {len(known)} of {len(of_system)} samples"
+    sample_text = f"{system_name}, {len(known)} of {len(of_system)} samples"
     near = _share_of_true(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
     middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
@@ -183,12 +183,12 @@ def _system_rows(system: str, samples: list[Saved]) -> list[Row]:
         (
             "cost",
             "median ratio of the cost of the estimate to that of the run",
-            _median_cost(system, samples),
+            _median_cost(system_name, samples),
             LARGEST_COST_RATIO,
         ),
     )
     return [
-        Observed(f"stated_errors.{system}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
+        Observed(f"stated_errors.{system_name}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
             expected, why, "none"
         )
         for id, what, value, expected in shown

@@ -32,9 +32,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {}
 
 
-def _rough_turn(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
+def _rough_turn(engine_name: str, vehicle: SpatialVehicle, duration: float) -> Drive:
     """A turn on a rough road, steered, braked and driven."""
-    return drive_run(engine, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
+    return drive_run(engine_name, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
 
 
 def _static_loads_row() -> Row:

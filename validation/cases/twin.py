@@ -47,14 +47,16 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {}
 
 
-def _force_rows(parameter_set_name: str, road_name: str, measured_run: Result, steps: tuple[float, ...]) -> list[Row]:
+def _force_rows(
+    parameter_set_name: str, road_name: str, measured_run: Result, time_steps: tuple[float, ...]
+) -> list[Row]:
     """Rows: runs driven by the wheel forces of a road-excited run, whose samples are held constant or interpolated
     linearly."""
     with TemporaryDirectory() as name:
         write_measurement(measured_run, Path(name), 2e-3)
         rows = []
         for interpolation in ("held", "linear"):
-            scenes = [force_scene(Path(name), parameter_set_name, step, 2.0, interpolation) for step in steps]
+            scenes = [force_scene(Path(name), parameter_set_name, step, 2.0, interpolation) for step in time_steps]
             rows += _engine_rows(f"{interpolation} wheel forces of the {road_name}, {parameter_set_name}", scenes)
         return rows
 
@@ -63,7 +65,7 @@ def _force_rows(parameter_set_name: str, road_name: str, measured_run: Result, s
     "edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road"
 )
 @allowing_breaches("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
-def _course_rows(parameter_set_name: str, steps: tuple[float, ...]) -> list[Row]:
+def _course_rows(parameter_set_name: str, time_steps: tuple[float, ...]) -> list[Row]:
     """Rows: runs on the measured course (250 m at 50 m/s), and runs driven by the wheel forces of its rough part."""
     data = data_folder()
     if data is None or not (data / COURSE_FILE).exists():
@@ -77,13 +79,13 @@ def _course_rows(parameter_set_name: str, steps: tuple[float, ...]) -> list[Row]
             )
         ]
     road = {"source": "opencrg", "file": COURSE_FILE, "speed": 50.0, "beyond_end": "refused"}
-    scenes = [road_scene(parameter_set_name, step, 5.0, road, data) for step in steps]
+    scenes = [road_scene(parameter_set_name, step, 5.0, road, data) for step in time_steps]
     measured = simulate(scenes[-1], "reference")
     rough = Result(
         measured.data.isel(time=slice(ROUGH_SAMPLES, None)).assign_coords(time=measured.data.time[:-ROUGH_SAMPLES])
     )
     rows = _engine_rows(f"measured course, {parameter_set_name}", scenes) + _force_rows(
-        parameter_set_name, "measured course", rough, steps
+        parameter_set_name, "measured course", rough, time_steps
     )
     for name, speed, rule in OTHER_ROADS:
         road = {"source": "opencrg", "file": name, "speed": speed, "beyond_end": rule, "track": "left"}

@@ -55,7 +55,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         texts |= {f"chain_{count}": random_chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": random_tree(4 + 2 * seed, seed) for seed in range(1, 8)}
     rows = [_agreement_row(name, _file_of_text(work_folder, name, text), quick) for name, text in texts.items()]
-    rows += [] if quick else [_agreement_row(name, _exported_file(work_folder, name), quick) for name in EXPORTED_SCENES]
+    rows += (
+        [] if quick else [_agreement_row(name, _exported_file(work_folder, name), quick) for name in EXPORTED_SCENES]
+    )
     return [
         *rows,
         _soft_constraint_row(work_folder, "geared", GEARED),

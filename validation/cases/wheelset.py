@@ -189,14 +189,14 @@ def _simulation_speed(speeds: CriticalSpeeds, wheelset_name: str) -> float:
     return min(SPEED_RATIO * critical, 180.0) if critical is not None else 60.0
 
 
-def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: int) -> list[Row]:
+def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cell_count: int) -> list[Row]:
     """Rows on simulations of one second by RK4 with FASTSIM: differences between the implementations, and the sign of
     the creep forces' power."""
     pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
-        setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", cells)
+        setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", cell_count)
         step = _time_step(Equations(*setup))
         for engine in IMPLEMENTATION_MODULES:
             equations = implementation(engine)(*setup)
@@ -206,7 +206,7 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: in
         for first, second in pairs:
             gap = float(np.abs(paths[first].states - paths[second].states).max())
             pairs[first, second] = max(pairs[first, second], gap)
-    of = f"states of {len(wheelsets)} wheelsets over 1 s with FASTSIM ({cells} cells), RK4 at the same step"
+    of = f"states of {len(wheelsets)} wheelsets over 1 s with FASTSIM ({cell_count} cells), RK4 at the same step"
     why = "the same method and contact forces; what differs is rounding"
     return [
         *(

@@ -40,9 +40,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return [*_law_rows(states), *_hub_rows(states, duration), *_rolling_rows(states, duration)], {}
 
 
-def _plain_equations_row(row_name: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
+def _plain_equations_row(row_name: str, quantity_name: str, largest_error: float, unit: str, bound: float) -> Row:
     """Row that compares the independently written equations with another implementation of the same laws."""
-    return Observed(f"written.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
+    return Observed(f"written.{row_name}", SYSTEM, quantity_name, largest_error, unit).at_most(
         bound, INDEPENDENCE_NOTE, "native"
     )
 
