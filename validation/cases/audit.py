@@ -14,7 +14,7 @@ SYSTEM: System = "pitch-plane"
 STATE_COUNT = 100
 
 
-def scene(parameter_set_name: str, geometry: str = "exact"):
+def study_road_scene(parameter_set_name: str, geometry: str = "exact"):
     """Scene of a vehicle on the study road; the road makes its heights enter the comparison."""
     return build_scene(
         {
@@ -29,7 +29,7 @@ def scene(parameter_set_name: str, geometry: str = "exact"):
 def acceleration_difference(engine_name: str, parameter_set_name: str, geometry: str = "exact") -> float:
     """Largest difference of an engine's accelerations from the reference's over all random states, divided by the
     largest acceleration."""
-    audited = scene(parameter_set_name, geometry)
+    audited = study_road_scene(parameter_set_name, geometry)
     return acceleration_gap(
         checks.engine(engine_name), assembly_of_scene(audited), settings_of(audited, engine_name), STATE_COUNT
     )

@@ -77,13 +77,15 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {name: list(where) for name, where in turns.items()}
 
 
-def braked_truck_turn(end_speed: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
+def braked_truck_turn(
+    end_speed: float, steer_angle: float = STEER, step_function: Callable[..., Any] = advance
+) -> TurnEnd:
     """End of a braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s), interpolated linearly within the
     last step."""
     truck = RollingTruck(
         on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
         SPEED,
-        steer=steer,
+        steer=steer_angle,
         step_function=step_function,
     )
     while True:
@@ -106,6 +108,7 @@ def simulation_speed(substep_count: int) -> float:
 
 
 def _axle_load_rows() -> list[Row]:
+    """Rows: axle loads of a truck with locked wheels, and the sideways path of a truck with locked steered wheels."""
     rows = [
         Observed(
             f"braking_engines.transfer.{name.replace(' ', '-')}",
@@ -129,6 +132,7 @@ def _axle_load_rows() -> list[Row]:
 
 
 def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
+    """Rows: a turn compared with its mirror image, and no yaw without steering."""
     mirrored, straight = braked_truck_turn(end_speed, -STEER), braked_truck_turn(end_speed, 0.0)
     apart = max(
         abs(mirrored.x - steered_turn.x), abs(mirrored.y + steered_turn.y), abs(mirrored.heading + steered_turn.heading)
@@ -147,10 +151,10 @@ def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
     ]
 
 
-def lateral_tyre_tables(slope: float) -> Tables:
+def lateral_tyre_tables(friction_slope: float) -> Tables:
     """Tyre tables with lateral friction alone. Its coefficient rises with a slope (1/rad) up to a slip angle of 0.01
     rad."""
-    mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
+    mu = np.array([[0.0], [0.01 * friction_slope], [0.01 * friction_slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     return stacked_tables([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
@@ -163,7 +167,7 @@ def _trailer_rows(quick: bool) -> list[Row]:
             "braking_engines.pull",
             SYSTEM,
             "relative difference of the drawbar angle on a straight pull from its closed form",
-            straight_pull_error(),
+            trailer_pull_error(),
             "",
         ).at_most(1e-4, why, "closed form")
     ]
@@ -176,16 +180,20 @@ def _trailer_rows(quick: bool) -> list[Row]:
                 off,
                 "",
             ).at_most(1e-4, why, "closed form")
-            for name, off in zip(("front", "rear"), circle_errors(), strict=True)
+            for name, off in zip(("front", "rear"), trailer_circle_errors(), strict=True)
         ]
     return rows
 
 
-def straight_pull_error(angle: float = 0.5, v: float = 0.2, time_step: float = 5e-4, duration: float = 4.0) -> float:
+def trailer_pull_error(
+    start_angle: float = 0.5, v: float = 0.2, time_step: float = 5e-4, duration: float = 4.0
+) -> float:
     """Relative error of the drawbar angle psi after a straight pull over the time t at speed v. Exact, with drawbar
     length L: tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L)."""
     n = round(duration / time_step)
-    state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN_TRAILER.drawbar, 0.0]])
+    state = np.array(
+        [[0.0, 0.0, start_angle, start_angle], [v, 0.0, -v * np.sin(start_angle) / CHOSEN_TRAILER.drawbar, 0.0]]
+    )
     states, _ = follow_hook(
         plane_of_trailer(CHOSEN_TRAILER),
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
@@ -195,11 +203,11 @@ def straight_pull_error(angle: float = 0.5, v: float = 0.2, time_step: float = 5
         STIFF_TYRE_SLOPE,
         np.zeros(4),
     )
-    exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN_TRAILER.drawbar))
+    exact = 2.0 * np.arctan(np.tan(start_angle / 2.0) * np.exp(-v * duration / CHOSEN_TRAILER.drawbar))
     return abs(float(states[-1, 0, 2] / exact - 1.0))
 
 
-def circle_errors(
+def trailer_circle_errors(
     radius: float = 15.0, v: float = 0.5, time_step: float = 2e-4, duration: float = 20.0
 ) -> tuple[float, float]:
     """Relative errors of the radii of the trailer's front and rear axle on a steady circle. Exact, with drawbar length

@@ -16,7 +16,7 @@ SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """Duration (s) of a stop, in the quick and in the full run."""
-LAW_COMPARISONS = {
+FORCE_LAW_COMPARISONS = {
     "friction": (
         laws.friction_of_random_states,
         1e-12,
@@ -48,9 +48,9 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the force laws, accelerations, steady circles and stops. A quick run has the car in one engine and a
     short stop; a full run has all vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)
-    rows = [_law_row(name) for name in LAW_COMPARISONS]
+    rows = [_force_law_row(name) for name in FORCE_LAW_COMPARISONS]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
-    rows += [_relaxing_turn_row(), *(_circle_row(vehicle) for vehicle in vehicles)]
+    rows += [_relaxing_turn_row(), *(_steady_circle_row(vehicle) for vehicle in vehicles)]
     rows += [
         _stop_row(vehicle, engine, QUICK_DURATION if quick else FULL_DURATION)
         for vehicle in vehicles
@@ -59,14 +59,16 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def _law_row(law: str) -> Row:
-    both, bound, what = LAW_COMPARISONS[law]
+def _force_law_row(law_name: str) -> Row:
+    """Row: largest difference of a force law from the reference's at random states."""
+    both, bound, what = FORCE_LAW_COMPARISONS[law_name]
     return Observed(
-        f"braking_reference.{law}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
+        f"braking_reference.{law_name}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
     ).at_most(bound, ROUNDING_REASON, "native")
 
 
 def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
+    """Row: accelerations of a vehicle at random states in an engine, compared with the reference."""
     accelerations = whole.accelerations(whole.VEHICLES[vehicle_name](), engine_name)
     return Observed(
         f"braking_reference.accelerations.{vehicle_name}.{engine_name}",
@@ -79,6 +81,7 @@ def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
 
 
 def _relaxing_turn_row() -> Row:
+    """Row: end of a braked turn on relaxing tyres, compared with Newton's and Euler's equations."""
     return Observed(
         "braking_reference.relaxing_turn",
         SYSTEM,
@@ -91,7 +94,8 @@ def _relaxing_turn_row() -> Row:
     )
 
 
-def _circle_row(vehicle_name: str) -> Row:
+def _steady_circle_row(vehicle_name: str) -> Row:
+    """Row: steady circle of a vehicle compared with the reference."""
     computed, plain = whole.steady_circle_pair(whole.VEHICLES[vehicle_name]())
     return Observed(
         f"braking_reference.turn.{vehicle_name}",
@@ -104,6 +108,7 @@ def _circle_row(vehicle_name: str) -> Row:
 
 
 def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    """Row: course of a stop in an engine compared with the reference."""
     path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration)
     return Observed(
         f"braking_reference.stop.{vehicle_name}.{engine_name}",

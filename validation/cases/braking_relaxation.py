@@ -16,7 +16,7 @@ from validation.common.rows import Observed, Row, System
 TITLE = "Relaxing tyres on the suspension"
 SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
-FRICTION_FACTOR = 1e-6
+SLIPPERY_FRICTION_FACTOR = 1e-6
 """Friction of the slippery road divided by that of a wet road: so low that steered wheels do not turn the car."""
 SPEED, STEER = 20.0, 0.02
 """Speed (m/s) and steer angle (rad) of the steer step."""
@@ -30,13 +30,14 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     engines = ENGINES[1:] if quick else ENGINES
     vehicles = ("car",) if quick else tuple(whole.VEHICLES)
     rows = [_slip_rise_row(engine) for engine in engines] + [_short_relaxation_row("exudyn")]
-    rows += [_reference_row(vehicle, engine, 0.05 if quick else 0.2) for vehicle in vehicles for engine in engines]
+    rows += [_plain_code_row(vehicle, engine, 0.05 if quick else 0.2) for vehicle in vehicles for engine in engines]
     if not quick:
         rows.append(_stiff_suspension_row())
     return rows, {}
 
 
 def _slip_rise_row(engine_name: str) -> Row:
+    """Row: rise of the slip angles after a steer step, compared with an exponential in the distance."""
     return Observed(
         f"braking_relaxation.rise.{engine_name}",
         SYSTEM,
@@ -49,7 +50,7 @@ def _slip_rise_row(engine_name: str) -> Row:
 def slip_rise_error(engine_name: str, sample_count: int = 20) -> float:
     """Largest error of the rise of the slip angle's tangent after a steer step at constant speed, compared with its
     exponential."""
-    slick = table_of_surface("wet").scaled(FRICTION_FACTOR)
+    slick = table_of_surface("wet").scaled(SLIPPERY_FRICTION_FACTOR)
     vehicle = replace(braked_vehicle(car(), slick, engine_name, STEER), relaxation=whole.RELAXATION_LENGTHS)
     path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, sample_count * vehicle.sample - 1e-6)
     distances = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
@@ -71,34 +72,38 @@ def braked_turn(
 
 
 def _short_relaxation_row(engine_name: str) -> Row:
+    """Row: the end of a braked turn shifts in proportion to a short relaxation length."""
     return Observed(
         "braking_relaxation.short",
         SYSTEM,
         "ratio of the shift of a braked turn's end by a relaxation length of 0.2 m to the shift by 0.1 m",
-        shift_ratio(engine_name),
+        relaxation_shift_ratio(engine_name),
         "",
     ).within(2.0, 0.05, "to first order in the length, whose limit is a tyre that answers at once", "closed form")
 
 
-def shift_ratio(engine_name: str) -> float:
+def relaxation_shift_ratio(engine_name: str) -> float:
     """Ratio of two shifts of a braked turn's final position and heading (m, rad): the shift by a relaxation length of
     0.2 m divided by the shift by 0.1 m."""
     none, short, long = (braked_turn(engine_name, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
     return float(np.abs(long - none).max() / np.abs(short - none).max())
 
 
-def _reference_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+def _plain_code_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    """Row: a stop on relaxing tyres in an engine, compared with independently written plain code."""
     path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration, lags=True)
     return Observed(
         f"braking_relaxation.reference.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"difference of {duration:g} s of a stop in {engine_name} from plain code: {vehicle_name}, relaxing tyres, slip control",
+        f"difference of {duration:g} s of a stop in {engine_name} from plain code: {vehicle_name}, relaxing tyres, "
+        "slip control",
         whole.path_difference(path, whole.plain_run(vehicle_name, duration, lags=True)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 
 
 def _stiff_suspension_row() -> Row:
+    """Row: a stiffer suspension brings the braked turn closer to that of the vehicle in the plane."""
     apart = []
     for stiffer in (1.0, 100.0):
         ends = [braked_turn(engine, 0.3, stiffer, 2.0).states[-1, 0, :2] for engine in ("mujoco", None)]

@@ -50,11 +50,11 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             *_locked_wheel_rows(HARD_FRICTION),
             *_engine_rows(wet),
             *_ice_rows(),
-            *_step_rows(wet),
+            *_substep_rows(wet),
             _simulation_speed_row(wet),
         ]
-        data["limit"] = stiff_limit(wet)
-        rows += _stiff_limit_rows(data["limit"])
+        data["limit"] = stiff_suspension_distances(wet)
+        rows += _stiff_suspension_rows(data["limit"])
     return rows, data
 
 
@@ -137,10 +137,10 @@ def _mirror_rows(left_turn: BrakingPath, mirrored_turn: BrakingPath) -> list[Row
     ]
 
 
-def _engine_rows(wet_table: TyreTable) -> list[Row]:
+def _engine_rows(wet_tyre_table: TyreTable) -> list[Row]:
     """Row: distance between Exudyn and MuJoCo at the end of a braked turn with steps of 1 ms."""
     ends = [
-        braked_vehicle(car(), wet_table, engine, 0.05, 1e-3)
+        braked_vehicle(car(), wet_tyre_table, engine, 0.05, 1e-3)
         .run(steady_torques(*HARD_TURN_TORQUES), 15.0)
         .states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
@@ -156,9 +156,9 @@ def _engine_rows(wet_table: TyreTable) -> list[Row]:
     ]
 
 
-def _step_rows(wet_table: TyreTable) -> list[Row]:
+def _substep_rows(wet_tyre_table: TyreTable) -> list[Row]:
     distances = [
-        braked_vehicle(car(), wet_table, steer=0.05, substeps=n)
+        braked_vehicle(car(), wet_tyre_table, steer=0.05, substeps=n)
         .run(steady_torques(*HARD_TURN_TORQUES), 10.0)
         .states[-1, 0, 0]
         for n in (1, 4, 16)
@@ -222,10 +222,10 @@ class _TimedController:
         return command
 
 
-def _simulation_speed_row(wet_table: TyreTable) -> Row:
+def _simulation_speed_row(wet_tyre_table: TyreTable) -> Row:
     """Row of the simulation speed, from the fastest tenth of the samples, which other processes disturb least."""
     vehicle, controller = (
-        braked_vehicle(car(), wet_table, substeps=4, gradient=150.0),
+        braked_vehicle(car(), wet_tyre_table, substeps=4, gradient=150.0),
         _TimedController(SlipBangBang(wheels=4)),
     )
     vehicle.run(controller, 15.0, 2.0)
@@ -243,7 +243,7 @@ def _simulation_speed_row(wet_table: TyreTable) -> Row:
     )
 
 
-def stiff_limit(tyre: TyreTable) -> list[list[float]]:
+def stiff_suspension_distances(tyre_table: TyreTable) -> list[list[float]]:
     """Distance (m) between the ends of a J-turn of the box on its suspension and of the plane vehicle with load
     transfer, for three stiffness factors. Each row of the result: stiffness factor, distance. The wheels have hardly
     any inertia."""
@@ -251,7 +251,7 @@ def stiff_limit(tyre: TyreTable) -> list[list[float]]:
     for stiffer in (1.0, 10.0, 100.0):
         stiff_box = box(stiffer, 0.01)
         ends = [
-            braked_vehicle(stiff_box, tyre, engine, 0.015, substeps=4)
+            braked_vehicle(stiff_box, tyre_table, engine, 0.015, substeps=4)
             .run(steady_torques(*TURN_TORQUES), 10.0)
             .states[-1, 0, :2]
             for engine in ("mujoco", None)
@@ -260,14 +260,14 @@ def stiff_limit(tyre: TyreTable) -> list[list[float]]:
     return distances
 
 
-def _stiff_limit_rows(ends: list[list[float]]) -> list[Row]:
+def _stiff_suspension_rows(distances_by_stiffness: list[list[float]]) -> list[Row]:
     return [
         Observed(
             "braking_suspension.limit",
             SYSTEM,
             "ratio of distances from the plane vehicle at the end of the box's J-turn: springs 100 "
             "times as stiff, to the plain springs",
-            ends[-1][1] / ends[0][1],
+            distances_by_stiffness[-1][1] / distances_by_stiffness[0][1],
             "",
         ).at_most(0.05, "stiff springs are the plane vehicle with algebraic load transfer", "shared kernel")
     ]

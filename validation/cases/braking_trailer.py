@@ -74,7 +74,8 @@ def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
     return Observed(
         f"braking_trailer.stop.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"largest difference of {duration:g} s of a stop of the {vehicle_name} in {engine_name} from plain code, slip controller "
+        f"largest difference of {duration:g} s of a stop of the {vehicle_name} in {engine_name} from plain code, "
+        "slip controller "
         "of all wheels on split and changing friction",
         whole.path_difference(path, whole.plain_run(vehicle_name, duration)),
         "m, rad, per s",

@@ -24,14 +24,14 @@ SYSTEM: System = "effects"
 SCENE_COUNT, FREQUENCY_JUDGED_COUNT = 40, 10
 """Number of random scenes, three of four with detailed vehicles; and number of these scenes that are also judged by
 frequency responses."""
-NEARBY_COUNT = 8
+NEARBY_SCENE_COUNT = 8
 """Number of random speeds, and of random parameter sets, at which a choice is checked."""
-TOLERANCE = 0.02
+COMMON_TOLERANCE = 0.02
 """Relative tolerance of every other scene; the others have random tolerances from 0.5 to 10 %."""
-QUICK_SEEDS = (2, 5)
+QUICK_SCENE_SEEDS = (2, 5)
 """Seeds of the random scenes of a quick run; in both scenes effects are left out."""
-CHANGE_STAGES = ("predicted", "confirmed")
-JUDGED_RANGE = (1e-4, 0.05)
+STAGES_OF_CHANGE = ("predicted", "confirmed")
+JUDGED_CHANGE_RANGE = (1e-4, 0.05)
 """Smallest and largest relative change whose prediction is judged: above rounding errors, and below 5 %."""
 
 
@@ -66,20 +66,20 @@ class JudgedChoice:
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
-def judged_choice_of(scene: LinearRide, by_frequency: bool) -> JudgedChoice:
+def judge_choice_for_ride(ride: LinearRide, with_frequency_responses: bool) -> JudgedChoice:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
-    ``by_frequency``, by frequency responses."""
-    chooser = chooser_over_speeds(scene)
+    ``with_frequency_responses``, by frequency responses."""
+    chooser = chooser_over_speeds(ride)
     choice, full_scene = chooser.choose(), chooser.full_scenes[0]
-    rest = full_scene.reduced(reduced_without(scene.scene, choice.left_out))
+    rest = full_scene.reduced(reduced_without(ride.scene, choice.left_out))
     two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return JudgedChoice(
-        scene,
+        ride,
         choice,
         float(abs(two / deviation - 1).max()),
-        changes_by_frequency(chooser, choice) if by_frequency else None,
-        worst_nearby(chooser, chosen, NEARBY_COUNT if chosen else 0, NEARBY_COUNT),
+        changes_by_frequency(chooser, choice) if with_frequency_responses else None,
+        worst_nearby(chooser, chosen, NEARBY_SCENE_COUNT if chosen else 0, NEARBY_SCENE_COUNT),
         measured_step(chooser, chosen) / measured_step(chooser, none) if chosen else 1.0,
     )
 
@@ -87,10 +87,10 @@ def judged_choice_of(scene: LinearRide, by_frequency: bool) -> JudgedChoice:
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of forty scenes of random vehicles and speed ranges, and of the published half car. A quick run has two
     random scenes and the half car."""
-    seeds = QUICK_SEEDS if quick else range(SCENE_COUNT)
+    seeds = QUICK_SCENE_SEEDS if quick else range(SCENE_COUNT)
     choices = [
-        judged_choice_of(
-            random_linear_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+        judge_choice_for_ride(
+            random_linear_ride(seed, COMMON_TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
             quick or seed < FREQUENCY_JUDGED_COUNT,
         )
         for seed in seeds
@@ -99,16 +99,16 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if not quick:
         rows += [_prediction_row(choices), _saving_row(choices), *_solver_count_rows()]
     pair_rows, pair = _half_car_rows()
-    return [*rows, *pair_rows, *_activity_rows()], {
+    return [*rows, *pair_rows, *_energy_activity_rows()], {
         "scenes": [_summary_of_choice(choice) for choice in choices],
         "pair": pair,
     }
 
 
-def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
-    share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in choices]))
-    lies = sum(not judged_choice.is_honest for judged_choice in choices)
-    second = [judged_choice for judged_choice in choices if judged_choice.frequency_changes is not None]
+def _tolerance_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
+    share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in judged_choices]))
+    lies = sum(not judged_choice.is_honest for judged_choice in judged_choices)
+    second = [judged_choice for judged_choice in judged_choices if judged_choice.frequency_changes is not None]
     gap = max(
         float(abs(judged_choice.frequency_changes - judged_choice.choice.confirmed_change).max())
         for judged_choice in second
@@ -117,7 +117,7 @@ def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
         Observed(
             "choice_linear.kept",
             SYSTEM,
-            f"share of {len(choices)} random scenes whose tolerance is kept after confirmation",
+            f"share of {len(judged_choices)} random scenes whose tolerance is kept after confirmation",
             share,
             "",
         ).within(1.0, 0.05, "asked: 95 of 100", "none"),
@@ -141,14 +141,14 @@ def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
     ]
 
 
-def _prediction_row(choices: list[JudgedChoice]) -> Row:
+def _prediction_row(judged_choices: list[JudgedChoice]) -> Row:
     """Row: share of predicted changes that are within a factor of 2 of the confirmed ones, over all choices and all
     quantities whose change is above rounding and below 5 %."""
     predicted, confirmed_ = (
-        np.concatenate([getattr(judged_choice.choice, f"{stage}_change") for judged_choice in choices])
-        for stage in CHANGE_STAGES
+        np.concatenate([getattr(judged_choice.choice, f"{stage}_change") for judged_choice in judged_choices])
+        for stage in STAGES_OF_CHANGE
     )
-    is_judged = (abs(confirmed_) > JUDGED_RANGE[0]) & (abs(confirmed_) < JUDGED_RANGE[1])
+    is_judged = (abs(confirmed_) > JUDGED_CHANGE_RANGE[0]) & (abs(confirmed_) < JUDGED_CHANGE_RANGE[1])
     ratios = predicted[is_judged] / confirmed_[is_judged]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
     return Observed(
@@ -165,40 +165,41 @@ def _prediction_row(choices: list[JudgedChoice]) -> Row:
     )
 
 
-def _adjoint_identity_row(choices: list[JudgedChoice]) -> Row:
+def _adjoint_identity_row(judged_choices: list[JudgedChoice]) -> Row:
     return Observed(
         "choice_linear.identity",
         SYSTEM,
         "difference of the variance of what is left, from the whole scene's covariance and the "
         "reduced adjoint, from the reduced covariance, worst of all scenes",
-        max(judged_choice.identity_error for judged_choice in choices),
+        max(judged_choice.identity_error for judged_choice in judged_choices),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
 
 
-def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
+def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
     """Rows over all scenes: whether the tolerance also holds at other speeds and with changed parameters, and the
     saving. Both are computed by methods that the choice does not use."""
     told_in_advance = sum(
-        bool(judged_choice.choice.refusal_texts) and not judged_choice.choice.left_out for judged_choice in choices
+        bool(judged_choice.choice.refusal_texts) and not judged_choice.choice.left_out
+        for judged_choice in judged_choices
     )
-    gaps = [abs(judged_choice.saving / judged_choice.sampled_saving - 1.0) for judged_choice in choices]
-    saving = [judged_choice for judged_choice in choices if judged_choice.choice.left_out]
+    gaps = [abs(judged_choice.saving / judged_choice.sampled_saving - 1.0) for judged_choice in judged_choices]
+    saving = [judged_choice for judged_choice in judged_choices if judged_choice.choice.left_out]
     return [
         Observed(
             "choice_linear.nearby",
             SYSTEM,
-            f"largest ratio of the change to the tolerance in {len(saving)} of {len(choices)} scenes in "
-            f"which effects were left out, {NEARBY_COUNT} random speeds each, every mass, stiffness and "
+            f"largest ratio of the change to the tolerance in {len(saving)} of {len(judged_choices)} scenes in "
+            f"which effects were left out, {NEARBY_SCENE_COUNT} random speeds each, every mass, stiffness and "
             "damping up to 5 % off at random",
-            max(judged_choice.nearby_ratio for judged_choice in choices),
+            max(judged_choice.nearby_ratio for judged_choice in judged_choices),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
             "choice_linear.said",
             SYSTEM,
-            f"share of {len(choices)} scenes in which all effects that could go were refused with a reason",
-            told_in_advance / len(choices),
+            f"share of {len(judged_choices)} scenes in which all effects that could go were refused with a reason",
+            told_in_advance / len(judged_choices),
             "",
         ).at_most(0.1, "asked: at most a tenth", "none"),
         Observed(
@@ -227,8 +228,10 @@ def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
     ]
 
 
-def _saving_row(choices: list[JudgedChoice]) -> Row:
-    saved = [judged_choice.saving for judged_choice in choices if judged_choice.scene.tolerance == TOLERANCE]
+def _saving_row(judged_choices: list[JudgedChoice]) -> Row:
+    saved = [
+        judged_choice.saving for judged_choice in judged_choices if judged_choice.scene.tolerance == COMMON_TOLERANCE
+    ]
     return Observed(
         "choice_linear.saving",
         SYSTEM,
@@ -303,7 +306,7 @@ def _half_car_rows() -> tuple[list[Row], dict[str, Any]]:
     ], {"alone": alone.tolist(), "both": both.tolist(), "step": step}
 
 
-def _activity_rows() -> list[Row]:
+def _energy_activity_rows() -> list[Row]:
     """Rows: the pitch inertia has a large energy activity, yet locking the pitch does not change the bounce of a
     symmetric body."""
     chooser = _half_car_chooser()
@@ -367,7 +370,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
         100 * abs(np.array([v for judged_choice in case_data["scenes"] for v in judged_choice[key]]))
-        for key in CHANGE_STAGES
+        for key in STAGES_OF_CHANGE
     )
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
@@ -386,10 +389,10 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     add_heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
-    return [(FIGURE_TEXT, figure)]
+    return [(FIGURE_CAPTION, figure)]
 
 
-FIGURE_TEXT = (
+FIGURE_CAPTION = (
     "Random scenes of vehicles, most with stiff bushings and light parts on stiff mounts: what saves calls is left out "
     "as far as the tolerance allows, predicted from one covariance and one adjoint solve of the whole scene, and "
     "confirmed by the exact solve of what is left, between the speeds and with parameters off."

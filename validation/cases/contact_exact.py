@@ -150,7 +150,8 @@ def _carter_rows(cell_count: int) -> list[Row]:
     return [
         _bound_row(
             f"carter.{share:g}",
-            f"error of the force on Carter's cylinder over mu N, {share:g} of the creepage of sliding, {cell_count} cells",
+            f"error of the force on Carter's cylinder over mu N, {share:g} of the creepage of sliding, {cell_count} "
+            "cells",
             abs(_strip_traction(cell_count, share)[2]),
             0.2 / cell_count,
             why,

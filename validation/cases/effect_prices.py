@@ -21,13 +21,13 @@ from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import (
     EFFECTS,
     ENGINES,
-    STEP,
+    TIME_STEP,
     changes_text,
-    count_changes,
-    model,
-    scene,
+    component_count_changes,
+    engine_model,
+    scene_with_effects,
     scenes_without_and_with,
-    write_files,
+    write_input_files,
 )
 from validation.choice.price_of_choice import price_of_choice
 from validation.common.grounds import allowing_breaches
@@ -69,7 +69,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     simulates 2 s instead of 4 s, takes a tenth of the rounds, and each effect in one of the three engines, in turn."""
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
-        write_files(files_folder)
+        write_input_files(files_folder)
         ratios = {
             engine: _ratio_to_hand_built(engine, files_folder, TIMED_STEP_COUNTS[quick], RATIO_ROUNDS[quick])
             for engine in ("exudyn", "mujoco")
@@ -101,8 +101,12 @@ def _ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, r
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
-    bare = scene({}, step_count, work_folder)
-    ours, theirs, times = model(bare, engine_name), hand_built(engine_name, bare), STEP * np.arange(step_count + 1)
+    bare = scene_with_effects({}, step_count, work_folder)
+    ours, theirs, times = (
+        engine_model(bare, engine_name),
+        hand_built(engine_name, bare),
+        TIME_STEP * np.arange(step_count + 1),
+    )
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine_name, times, theirs(), bare.run.duration), theirs]
     seconds = interleave(jobs, round_count, round_interval=(1, 1, UNCHECKED_INTERVAL), clock=time.process_time)
@@ -135,7 +139,8 @@ def _hand_built_rows(engine_name: str, comparison: Saved, step_count: int) -> li
         ),
         ratio_row(
             f"effect_prices.unchecked.{engine_name}",
-            f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
+            f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model whose result nobody "
+            "checks",
             comparison["unchecked"],
             why,
         ),
@@ -305,7 +310,7 @@ def _price_of_effect(effect: str, engine_name: str, work_folder: Path, round_cou
     return {
         "effect": effect,
         "engine": engine_name,
-        "adds": changes_text(count_changes(effect, engine_name, work_folder)) or "nothing",
+        "adds": changes_text(component_count_changes(effect, engine_name, work_folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),

@@ -280,8 +280,8 @@ def _derivative_rows() -> list[Row]:
 
 
 def _forces_with_changed_input(contacts: Contacts, input_name: str, time_step: float) -> Array:
-    """Forces and moments (n, 3) with one input changed by ``time_step``. If the load changes, the ellipse changes with the
-    load."""
+    """Forces and moments (n, 3) with one input changed by ``time_step``. If the load changes, the ellipse changes with
+    the load."""
     moved = {**contacts, input_name: contacts[input_name] + time_step}
     if input_name == "load":
         grown = np.cbrt(moved["load"] / contacts["load"])

@@ -257,7 +257,8 @@ def _explicit_solver_row(engine_name: str) -> Row:
     return Observed(
         f"guards.constraint.{engine_name}",
         SYSTEM,
-        f"error of the enforced moment by an explicit solver, {engine_name}: the pitch is an input, no constraint is active",
+        f"error of the enforced moment by an explicit solver, {engine_name}: the pitch is an input, no constraint is "
+        "active",
         error,
         "of its rms",
     ).at_most(1e-4, "the project's bound at 1 ms", "closed form")

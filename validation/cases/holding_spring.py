@@ -122,7 +122,8 @@ def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine_name: str) -
             behaviour_row(
                 key,
                 SYSTEM,
-                f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, {engine_name}",
+                f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, "
+                f"{engine_name}",
                 "holds" if off <= ALLOWED_PITCH_ERROR else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {ALLOWED_PITCH_ERROR} allowed",

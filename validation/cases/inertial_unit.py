@@ -365,7 +365,8 @@ def _bias_rows(noise_path_count: int) -> list[Row]:
                 ),
                 law,
                 noise_path_count,
-                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {noise_path_count:,} paths, seed {SEED}",
+                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {noise_path_count:,} paths, seed "
+                f"{SEED}",
             )
         )
     return rows

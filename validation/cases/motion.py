@@ -277,7 +277,8 @@ def _recovery_rows(
         Observed(
             f"motion.recovered.{integration_rule}.{what}.{engine_name}",
             SYSTEM,
-            f"error of the {what} recovered from {words}, {engine_name}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
+            f"error of the {what} recovered from {words}, {engine_name}, {len(states) / 1e3:.0f} s at 1 kHz without "
+            "noise",
             float(np.abs(error).max()),
             unit,
         ).at_most(bound, "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")
@@ -325,7 +326,8 @@ def _random_walk_rows(noise_path_count: int) -> tuple[list[Row], dict[str, list[
         ),
         NOISE_DEVIATION**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
         3 * noise_path_count,
-        f"{noise_path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
+        f"{noise_path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period "
+        "time",
     )
     curves = {
         "time": SAMPLE_PERIOD * np.arange(count),
