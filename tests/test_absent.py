@@ -34,7 +34,7 @@ from validation.cases.absent import (
     required_effects,
     scene_with_effects,
 )
-from validation.cases.effect_prices import hand_built
+from validation.cases.effect_prices import hand_built_run
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCE_EFFECT}
@@ -181,7 +181,7 @@ def test_the_copy_is_what_runs_without_the_files(folder, tmp_path):
 def test_the_machinery_adds_nothing_to_a_hand_built_model(engine, folder):
     """The same items in the same order give the same bits; what it costs is measured by the validation."""
     own = scene_with_effects({}, 500, folder)
-    ours, theirs = engine_model(own, engine).run().states, hand_built(engine, own)()
+    ours, theirs = engine_model(own, engine).run().states, hand_built_run(engine, own)()
     assert np.array_equal(ours, theirs)
     assert abs(ours[-1] - ours[0]).max() > 0.01
 

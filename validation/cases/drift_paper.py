@@ -20,7 +20,7 @@ SINGLE_NOISE_SAMPLE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Changes of the scene that leave out the random models and all noise samples but one."""
 SAMPLING_RATES = (200.0, 400.0, 1000.0, 2000.0)
 """Sampling rates (Hz) of the full run; a quick run has only the study's."""
-QUICK_CHANGES = (*SINGLE_NOISE_SAMPLE, "run.duration=15")
+QUICK_SCENE_CHANGES = (*SINGLE_NOISE_SAMPLE, "run.duration=15")
 """Changes of the scene in a quick run: 15 s, in which undisturbed forces do not drift off."""
 
 COMPARED_FIGURES = (
@@ -96,7 +96,7 @@ COMPARED_FIGURES = (
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments and inertia term of the hand-written reference; a quick run has 15 s
     and one sampling rate."""
-    scene = load(STUDY_SCENE, QUICK_CHANGES if quick else ())
+    scene = load(STUDY_SCENE, QUICK_SCENE_CHANGES if quick else ())
     runs, rate = _figures_by_run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
         Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)

@@ -88,7 +88,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {"price": price, "ratios": ratios}
 
 
-def hand_built(engine_name: str, bare_scene: Scene) -> Any:
+def hand_built_run(engine_name: str, bare_scene: Scene) -> Any:
     """Run of the hand-built model of the vehicle without effects in an engine: a function that returns the states."""
     assembly, settings = assembly_of_scene(bare_scene), settings_of(bare_scene, engine_name)
     run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine_name]
@@ -104,7 +104,7 @@ def _ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, r
     bare = scene_with_effects({}, step_count, work_folder)
     ours, theirs, times = (
         engine_model(bare, engine_name),
-        hand_built(engine_name, bare),
+        hand_built_run(engine_name, bare),
         TIME_STEP * np.arange(step_count + 1),
     )
     gap = float(np.abs(ours.run().states - theirs()).max())
@@ -117,7 +117,8 @@ def _ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, r
     }
 
 
-def _hand_built_rows(engine_name: str, comparison: Saved, step_count: int) -> list[Row]:
+def _hand_built_rows(engine_name: str, time_comparison: Saved, step_count: int) -> list[Row]:
+    """Rows: difference of a scene without effects from the hand-built model, and ratio of their computing times."""
     why = (
         f"interleaved runs of {step_count:,} steps, seconds of the processor, median of paired ratios: what the "
         "machinery costs where no effect is named"
@@ -127,27 +128,29 @@ def _hand_built_rows(engine_name: str, comparison: Saved, step_count: int) -> li
             f"effect_prices.same.{engine_name}",
             SYSTEM,
             f"{engine_name}: largest difference of the states of a bare scene from those of a hand-built model",
-            comparison["gap"],
+            time_comparison["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
-        ratio_row(
+        time_ratio_row(
             f"effect_prices.ratio.{engine_name}",
             f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model "
             "whose result passes the same guard",
-            comparison["ratio"],
+            time_comparison["ratio"],
             why,
         ),
-        ratio_row(
+        time_ratio_row(
             f"effect_prices.unchecked.{engine_name}",
             f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model whose result nobody "
             "checks",
-            comparison["unchecked"],
+            time_comparison["unchecked"],
             why,
         ),
     ]
 
 
-def ratio_row(row_id: str, title: str, ratio_and_interval: tuple[float, float, float], tolerance_reason: str) -> Row:
+def time_ratio_row(
+    row_id: str, title: str, ratio_and_interval: tuple[float, float, float], tolerance_reason: str
+) -> Row:
     """Row with a ratio of computing times and its 95 % interval."""
     value, low, high = ratio_and_interval
     return Observed(row_id, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(
@@ -168,7 +171,7 @@ def _wheelset_rows(step_count: int, quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.wheelset",
             "ratio of the time of a bare wheelset to that of the hand-written one, whose path passes the same checks",
             ratio,
@@ -199,7 +202,7 @@ def _ride_rows(quick: bool) -> list[Row]:
                 "the same vehicle on the same road; forces are summed in another order",
                 "none" if engine == "reference" else "native",
             ),
-            ratio_row(
+            time_ratio_row(
                 f"effect_prices.ratio.ride.{engine}",
                 f"{engine}: ratio of the time of a bare ride to that of {HAND_WRITTEN_RIDES[engine]}",
                 ratio,
@@ -226,7 +229,7 @@ def _car_rows(step_count: int, quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "native"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.handling",
             "MuJoCo: ratio of the time of a bare car of handling to that of the "
             "hand-written car, whose path passes the same guard",
@@ -253,7 +256,7 @@ def _stop_rows(quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s, shares",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.braking",
             "ratio of the time of a bare stop to that of the hand-written truck",
             ratio,
@@ -275,7 +278,7 @@ def _contact_rows(quick: bool) -> list[Row]:
             gap,
             "",
         ).at_most(1e-13, "the same cells, sums in another order", "none"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.contact",
             "ratio of the time of a call of FASTSIM on a bare ellipse to that of the hand-written FASTSIM",
             ratio,
@@ -298,19 +301,22 @@ def _choice_row() -> Row:
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price_of_effect(effect: str, engine_name: str, work_folder: Path, round_count: int) -> Saved:
+def _price_of_effect(effect_name: str, engine_name: str, work_folder: Path, round_count: int) -> Saved:
     """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the numbers of
     components that the effect changes."""
     seconds = interleave(
-        [_timed_run(bare, engine_name) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, work_folder)],
+        [
+            _timed_run(bare, engine_name)
+            for bare in scenes_without_and_with(effect_name, EFFECT_STEP_COUNT, work_folder)
+        ],
         round_count,
         5e-3,
     )
     added = (seconds[1] - seconds[0]) / EFFECT_STEP_COUNT * 1e6
     return {
-        "effect": effect,
+        "effect": effect_name,
         "engine": engine_name,
-        "adds": changes_text(component_count_changes(effect, engine_name, work_folder)) or "nothing",
+        "adds": changes_text(component_count_changes(effect_name, engine_name, work_folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
@@ -336,10 +342,13 @@ def tables(case_data: Saved) -> list[Table]:
         "costs nothing."
     )
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
-    return [Table("Price list of effects", note, headings, tuple(_table_line(entry) for entry in case_data["price"]))]
+    return [
+        Table("Price list of effects", note, headings, tuple(_price_list_line(entry) for entry in case_data["price"]))
+    ]
 
 
-def _table_line(saved_entry: Saved) -> tuple[str, ...]:
+def _price_list_line(saved_entry: Saved) -> tuple[str, ...]:
+    """Line of the price list for one effect in one engine."""
     value, low, high = saved_entry["ratio"]
     return (
         saved_entry["effect"],

@@ -26,20 +26,20 @@ DURATION, QUICK_DURATION, ABRUPT_SECONDS, ROUGH_ROAD_SECONDS = 4.0, 1.5, 1.0, 2.
 """Lengths (s) of the runs: of the manoeuvre in a full and in a quick run, of the abrupt start (so long that its ringing
 is not most of the run), and on the study road."""
 SAMPLE_PERIOD = 1e-3
-STEP = 1e-3
+TIME_STEP = 1e-3
 MOMENT_TOLERANCE = 1e-4
-PRESCRIBED_PITCH = {"prescribed_pitch": {"file": "pitch.csv"}}
-BEST_SETTINGS = {
-    "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
-    "mujoco": Settings("RK4", STEP, DURATION),
+PRESCRIBED_PITCH_EFFECT = {"prescribed_pitch": {"file": "pitch.csv"}}
+BEST_SOLVER_SETTINGS = {
+    "exudyn": Settings("GeneralizedAlpha", TIME_STEP, DURATION, spectral_radius=0.6),
+    "mujoco": Settings("RK4", TIME_STEP, DURATION),
 }
 
 
-def write_manoeuvre(work_folder: Path, parameter_set_name: str, abrupt: bool = False) -> None:
+def write_manoeuvre(work_folder: Path, parameter_set_name: str, starts_abruptly: bool = False) -> None:
     """Write pitch and wheel forces of a manoeuvre with frequencies up to 2.7 Hz, the range of a car's pitch and heave
     motion.
 
-    The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``abrupt`` one with
+    The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``starts_abruptly`` one with
     4.4 rad/s^2 at once.
     """
     p = parameter_set(parameter_set_name, "", work_folder)
@@ -48,7 +48,7 @@ def write_manoeuvre(work_folder: Path, parameter_set_name: str, abrupt: bool = F
     s = np.clip(t / 1.0, 0, 1)
     rise = s**3 * (10 - 15 * s + 6 * s**2)
     pitch = rise * (0.06 * np.sin(2 * np.pi * 1.2 * t) + 0.02 * np.sin(2 * np.pi * 2.7 * t))
-    if abrupt:
+    if starts_abruptly:
         pitch = 0.05 * (1 - np.cos(2 * np.pi * 1.5 * t))
     pitch = pitch + rest[3]
     front = p.k1 * rest[0] + rise * (900 * np.sin(2 * np.pi * 1.4 * t) + 300 * np.sin(2 * np.pi * 2.3 * t))
@@ -69,9 +69,9 @@ def exact_moment(scene: Scene) -> np.ndarray:
     return enforced_moment(scene, "reference", Settings("RK4", SAMPLE_PERIOD / 16, scene.run.duration))
 
 
-def relative_rms_error(computed_values: np.ndarray, true_moment: np.ndarray) -> float:
+def relative_rms_error(computed_moment: np.ndarray, true_moment: np.ndarray) -> float:
     """Rms difference of two moments divided by the rms of the true moment."""
-    return float(np.sqrt(np.mean((computed_values - true_moment) ** 2) / np.mean(true_moment**2)))
+    return float(np.sqrt(np.mean((computed_moment - true_moment) ** 2) / np.mean(true_moment**2)))
 
 
 @on_paper_road()
@@ -89,15 +89,18 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows + ringing + rough, {"table": table, "ringing": paths}
 
 
-def _manoeuvre_rows(work_folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
+def _manoeuvre_rows(work_folder: Path, parameter_set_names: tuple[str, ...], duration: float) -> list[Row]:
+    """Rows: error of the enforced moment in Exudyn and MuJoCo during the manoeuvre, for every vehicle."""
     rows = []
-    for parameter_set_name in vehicles:
+    for parameter_set_name in parameter_set_names:
         write_manoeuvre(work_folder, parameter_set_name)
-        scene = force_scene(work_folder, parameter_set_name, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
+        scene = force_scene(
+            work_folder, parameter_set_name, TIME_STEP, duration, "smooth", effects=PRESCRIBED_PITCH_EFFECT
+        )
         true = exact_moment(scene)
-        if parameter_set_name == vehicles[0]:
+        if parameter_set_name == parameter_set_names[0]:
             rows.append(_uncertainty_row(scene, true))
-        for engine, settings in BEST_SETTINGS.items():
+        for engine, settings in BEST_SOLVER_SETTINGS.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
                 Observed(
@@ -133,15 +136,15 @@ def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
 def _ringing_rows(work_folder: Path) -> CaseAnswer:
     """Rows and data on an abrupt start: error of Exudyn's multiplier over the first 0.1 s, with and without consistent
     initial accelerations."""
-    write_manoeuvre(work_folder, "itwm_drift", abrupt=True)
+    write_manoeuvre(work_folder, "itwm_drift", starts_abruptly=True)
     scene = force_scene(
-        work_folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH
+        work_folder, step=TIME_STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH_EFFECT
     )
     true = exact_moment(scene)
     first = slice(1, 101)
-    paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
+    paths: Saved = {"time": (TIME_STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
-        settings = Settings("GeneralizedAlpha", STEP, ABRUPT_SECONDS, spectral_radius=radius)
+        settings = Settings("GeneralizedAlpha", TIME_STEP, ABRUPT_SECONDS, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent_multiplier(scene, settings) - true)[
             first
         ].tolist()
@@ -194,11 +197,11 @@ def _study_road_rows(work_folder: Path, time_steps: tuple[float, ...]) -> tuple[
         duration=ROUGH_ROAD_SECONDS,
         interpolation="smooth",
         override=paper,
-        effects=PRESCRIBED_PITCH,
+        effects=PRESCRIBED_PITCH_EFFECT,
     )
     true = exact_moment(scene)
     table: list[list[Any]] = []
-    for engine, best in BEST_SETTINGS.items():
+    for engine, best in BEST_SOLVER_SETTINGS.items():
         for step in time_steps:
             settings = Settings(best.integrator, step, ROUGH_ROAD_SECONDS, spectral_radius=best.spectral_radius)
             table.append(
@@ -214,7 +217,7 @@ def _study_road_rows(work_folder: Path, time_steps: tuple[float, ...]) -> tuple[
             f"moment.rough.{engine}",
             SYSTEM,
             f"error of the enforced moment on the study road at 1 ms, {engine}, perturbed model",
-            next(row[3] for row in table if row[0] == engine and row[2] == STEP),
+            next(row[3] for row in table if row[0] == engine and row[2] == TIME_STEP),
             "of its rms",
         ).beside(
             MOMENT_TOLERANCE,
@@ -222,7 +225,7 @@ def _study_road_rows(work_folder: Path, time_steps: tuple[float, ...]) -> tuple[
             "table shows the step that it takes",
             "native",
         )
-        for engine in BEST_SETTINGS
+        for engine in BEST_SOLVER_SETTINGS
     ]
     return rows, table
 

@@ -45,7 +45,7 @@ LOAD, FRICTION, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
 MATERIAL_PAIR = MaterialPair()
 FORCE_SCALES = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
 """Scales of fx and fy (N) and of mz (N m)."""
-Contacts = dict[str, Any]
+ContactColumns = dict[str, Any]
 """Type of a set of contacts: arrays by the names of the parameters of ``fastsim``."""
 CELL_COUNTS = (11, 21, 41, 81)
 CONVERGED_CELLS, FINE_CELLS = 161, 321
@@ -70,7 +70,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     rows, data = _discretisation_rows()
     rows += _invariant_rows(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
-    rows += _limit_rows() + _spin_rows() + _derivative_rows() + _random_contact_rows()
+    rows += _creepage_limit_rows() + _spin_moment_rows() + _derivative_rows() + _random_contact_rows()
     if quick:
         return rows, data
     answers, data["model"] = _model_error_rows()
@@ -78,7 +78,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + answers + timed, data
 
 
-def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> Contacts:
+def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> ContactColumns:
     """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
     where c is sqrt(a b) and C is C11, C22 or C23 c."""
     ratio, kind, level = (
@@ -100,7 +100,7 @@ def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float,
     }
 
 
-def _relative_forces(contacts: Contacts, **options: Any) -> Array:
+def _relative_forces(contacts: ContactColumns, **options: Any) -> Array:
     """Forces fx and fy (n, 2) divided by mu N."""
     answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **options)
     return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
@@ -149,13 +149,13 @@ def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
     return rows, {"cells": data}
 
 
-def _invariant_rows(batch_count: int, contact_count: int, first_stream: int) -> list[Row]:
+def _invariant_rows(batch_count: int, contact_count: int, first_random_stream: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batch_count):
         options = COMPUTED_OPTIONS[i % len(COMPUTED_OPTIONS)]
         for name, value in worst_violation(
-            random_contacts(SEED, first_stream + i, contact_count), options, MATERIAL_PAIR
+            random_contacts(SEED, first_random_stream + i, contact_count), options, MATERIAL_PAIR
         ).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
@@ -186,7 +186,7 @@ def _invariant_rows(batch_count: int, contact_count: int, first_stream: int) -> 
     ]
 
 
-def _limit_rows() -> list[Row]:
+def _creepage_limit_rows() -> list[Row]:
     """Rows: agreement with the linear theory at small creepages, and size and direction of the force in full
     sliding."""
     columns = creepage_contacts(("x", "y", "spin"), (1e-6,))
@@ -226,7 +226,7 @@ def _limit_rows() -> list[Row]:
     ]
 
 
-def _spin_rows() -> list[Row]:
+def _spin_moment_rows() -> list[Row]:
     """Rows: moment in full sliding under spin alone, on 21 cells, compared with the integral of mu times Hertz's
     pressure."""
     ratio = np.array(SPIN_AXIS_RATIOS)
@@ -279,10 +279,10 @@ def _derivative_rows() -> list[Row]:
     ]
 
 
-def _forces_with_changed_input(contacts: Contacts, input_name: str, time_step: float) -> Array:
-    """Forces and moments (n, 3) with one input changed by ``time_step``. If the load changes, the ellipse changes with
-    the load."""
-    moved = {**contacts, input_name: contacts[input_name] + time_step}
+def _forces_with_changed_input(contacts: ContactColumns, input_name: str, input_change: float) -> Array:
+    """Forces and moments (n, 3) with one input changed by ``input_change``. If the load changes, the ellipse changes
+    with the load."""
+    moved = {**contacts, input_name: contacts[input_name] + input_change}
     if input_name == "load":
         grown = np.cbrt(moved["load"] / contacts["load"])
         moved |= {"a": contacts["a"] * grown, "b": contacts["b"] * grown}

@@ -35,7 +35,7 @@ from validation.common.scenes import force_scene, on_paper_road, road_scene, vir
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
 SEED = 11
-PATH_COUNT = 3000
+NOISE_PATH_COUNT = 3000
 """Number N of Monte Carlo paths; the relative error of a standard deviation is 1/sqrt(2 N) = 1.3 %."""
 NOISE_DEVIATION, SAMPLING_RATE = 30.7, 1000.0
 """Standard deviation (N) of the noise on each force sample, 0.2 % of the largest force; and the sampling rate (Hz)."""
@@ -43,13 +43,13 @@ MONTE_CARLO_SECONDS = 10
 """Length (s) of the Monte Carlo paths."""
 WINDOW_SECONDS, WINDOW_COUNT = 20, 4
 """Length (s) and number of the windows in which the growth rate is measured."""
-STUDY_ROAD = "20 m/s, Gd 2.4e-3"
-ROADS = {
+STUDY_ROAD_NAME = "20 m/s, Gd 2.4e-3"
+ROAD_SETTINGS_BY_NAME = {
     f"{speed} m/s, Gd {gd}": {"source": "study", "speed": float(speed), "gd": float(gd)}
     for speed, gd in ((20, "2.4e-3"), (20, "6e-4"), (20, "1.5e-4"), (10, "2.4e-3"))
 }
 """The study road at other speeds and roughnesses."""
-LAW_REASON = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
+GROWTH_LAW_REASON = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
 @on_paper_road()
@@ -59,15 +59,26 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     true = virtual_drive(work_folder, MONTE_CARLO_SECONDS)
     spread = _deviations_by_method(true, work_folder, quick)
     if quick:
-        roads = {STUDY_ROAD: _growth_rates(work_folder, ROADS[STUDY_ROAD], 2)}
+        roads = {STUDY_ROAD_NAME: _growth_rates(work_folder, ROAD_SETTINGS_BY_NAME[STUDY_ROAD_NAME], 2)}
         return _deviation_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
-    roads = {name: _growth_rates(work_folder, road) for name, road in ROADS.items()}
-    roads["asymmetric twin"] = _growth_rates(work_folder, ROADS[STUDY_ROAD], parameter_set_name="asymmetric_twin")
-    rows = [*_deviation_rows(spread), *_growth_rows(roads), _twin_row(work_folder), *_engine_rows(work_folder)]
-    return [*rows, _step_row(work_folder), _linear_row(work_folder)], {"spread": spread, "roads": roads}
+    roads = {name: _growth_rates(work_folder, road) for name, road in ROAD_SETTINGS_BY_NAME.items()}
+    roads["asymmetric twin"] = _growth_rates(
+        work_folder, ROAD_SETTINGS_BY_NAME[STUDY_ROAD_NAME], parameter_set_name="asymmetric_twin"
+    )
+    rows = [
+        *_deviation_rows(spread),
+        *_growth_rows(roads),
+        _asymmetric_twin_row(work_folder),
+        *_engine_rows(work_folder),
+    ]
+    return [*rows, _halved_step_row(work_folder), _linearised_vehicle_row(work_folder)], {
+        "spread": spread,
+        "roads": roads,
+    }
 
 
 def _noisy_scene(work_folder: Path, duration: float, time_step: float = 1e-3, noise_path: int = 0) -> Scene:
+    """Scene of the force-excited vehicle on one path of force noise."""
     noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": noise_path}}
     return force_scene(work_folder, step=time_step, duration=duration, effects=noise)
 
@@ -98,12 +109,13 @@ def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> S
     }
     if not quick:
         job = noise_paths(_noisy_scene(work_folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
-        off = run_paths(job, PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
+        off = run_paths(job, NOISE_PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
 
 
 def _force_samples(assembly: Assembly) -> Sampled:
+    """The sampled wheel forces of an assembly."""
     assert isinstance(assembly.input, Sampled)
     return assembly.input
 
@@ -118,11 +130,11 @@ def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, 
 
 
 def _growth_rates(
-    work_folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
+    work_folder: Path, road_settings: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
 ) -> Saved:
     """Growth rates (1/s) of the error on one road by four methods: from the run's pitch rate, from its forces, with
     other cut-off frequencies, and measured in time windows with forces in both frames."""
-    true = virtual_drive(work_folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road)
+    true = virtual_drive(work_folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road_settings)
     assembly = assembly_of_scene(force_scene(work_folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
     p, rate = assembly.parameters, true["pitch_rate"]
     alone = pitch_rate_of_forces(_force_samples(assembly).values, 1 / SAMPLING_RATE, p)
@@ -150,10 +162,10 @@ def _growth_rates(
     }
 
 
-def _deviation_rows(spread_record: Saved) -> list[Row]:
+def _deviation_rows(deviation_record: Saved) -> list[Row]:
     """Rows: standard deviations of pitch and heave under noise, compared with their closed laws."""
-    seen = "pitch" if "pitch" in spread_record else "covariance"
-    by = f"Monte Carlo of {PATH_COUNT} paths" if seen == "pitch" else "covariance along the path"
+    seen = "pitch" if "pitch" in deviation_record else "covariance"
+    by = f"Monte Carlo of {NOISE_PATH_COUNT} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
         Observed(
@@ -164,23 +176,23 @@ def _deviation_rows(spread_record: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, why, "closed form")
         for t, spread_then, expected in zip(
-            spread_record["time"], spread_record[seen], spread_record["law, run"], strict=True
+            deviation_record["time"], deviation_record[seen], deviation_record["law, run"], strict=True
         )
     ]
-    miss = spread_record[seen][-1] / spread_record["t^1.5"][-1]
+    miss = deviation_record[seen][-1] / deviation_record["t^1.5"][-1]
     rows.append(
         Observed(
             "growth.spread.linear",
             SYSTEM,
-            f"ratio of the pitch's standard deviation at {spread_record['time'][-1]} s to t^1.5, the law without "
+            f"ratio of the pitch's standard deviation at {deviation_record['time'][-1]} s to t^1.5, the law without "
             "growth",
             miss,
             "",
         ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
     )
     heave = (
-        np.array(spread_record["heave" if "heave" in spread_record else "heave covariance"])
-        / spread_record["heave law"]
+        np.array(deviation_record["heave" if "heave" in deviation_record else "heave covariance"])
+        / deviation_record["heave law"]
     )
     rows.append(
         Observed(
@@ -191,7 +203,7 @@ def _deviation_rows(spread_record: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
     )
-    alone = np.array(spread_record["covariance"]) / spread_record["law, forces"]
+    alone = np.array(deviation_record["covariance"]) / deviation_record["law, forces"]
     return [
         *rows,
         Observed(
@@ -207,9 +219,10 @@ def _deviation_rows(spread_record: Saved) -> list[Row]:
     ]
 
 
-def _growth_rows(roads: Saved) -> list[Row]:
+def _growth_rows(growth_by_road: Saved) -> list[Row]:
+    """Rows: growth rate of the pitch error on every road, compared with its law."""
     rows = list[Row]()
-    for name, road in roads.items():
+    for name, road in growth_by_road.items():
         key = name.replace(" ", "-").replace(",", "")
         rows += [
             Observed(
@@ -218,7 +231,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
                 f"ratio of the growth rate along the true path to the rms of the fast pitch rate, {name}",
                 road["measured"] / road["run"],
                 "",
-            ).within(1.0, 0.03, LAW_REASON, "closed form"),
+            ).within(1.0, 0.03, GROWTH_LAW_REASON, "closed form"),
             Observed(
                 f"growth.forces.{key}",
                 SYSTEM,
@@ -237,7 +250,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
                 f"{road['swing law']:.3g}", "sqrt(J / (I + J)) times the rms of the fast pitch rate", "closed form"
             ),
         ]
-    worst = max(abs(rate / road["run"] - 1) for road in roads.values() for rate in road["cut-offs"])
+    worst = max(abs(rate / road["run"] - 1) for road in growth_by_road.values() for rate in road["cut-offs"])
     return [
         *rows,
         Observed(
@@ -250,22 +263,25 @@ def _growth_rows(roads: Saved) -> list[Row]:
     ]
 
 
-def _body_force_row(row_id: str, title: str, road: Saved) -> Row:
+def _body_force_row(row_id: str, title: str, growth_record: Saved) -> Row:
     """Row: with body-fixed forces the error does not grow if the vehicle does not couple heave to pitch. The growth of
     a vehicle with this coupling is reported without a verdict.
 
     With coupling c, the wheels' weight has a moment c g cos(pitch) about the common centre of mass, which body-fixed
     forces do not follow: on a hill of pitch beta a stiffness of 2 c g beta remains, of either sign.
     """
-    if road["coupling"] != 0.0:
+    if growth_record["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
-        return Observed(row_id, SYSTEM, title, road["body"], "1/s").beside("small", why, "none")
-    return Observed(row_id, SYSTEM, title, road["body"], "1/s").within(
-        0.0, road["body error"], "zero within its error; the wheels' inertia makes a slow swing of it", "closed form"
+        return Observed(row_id, SYSTEM, title, growth_record["body"], "1/s").beside("small", why, "none")
+    return Observed(row_id, SYSTEM, title, growth_record["body"], "1/s").within(
+        0.0,
+        growth_record["body error"],
+        "zero within its error; the wheels' inertia makes a slow swing of it",
+        "closed form",
     )
 
 
-def _twin_row(work_folder: Path) -> Row:
+def _asymmetric_twin_row(work_folder: Path) -> Row:
     """Row: growth law of a vehicle with unequal front and rear, whose lever arms count from the common centre of
     mass."""
     true = virtual_drive(work_folder, 5.0, parameters="asymmetric_twin")
@@ -308,7 +324,7 @@ def _engine_rows(work_folder: Path) -> list[Row]:
     ]
 
 
-def _step_row(work_folder: Path) -> Row:
+def _halved_step_row(work_folder: Path) -> Row:
     """Row: change of the pitch by half the step under the same noise, divided by the standard deviation of the
     pitch."""
     runs = {
@@ -328,7 +344,7 @@ def _step_row(work_folder: Path) -> Row:
     return Observed("growth.step", SYSTEM, what, gap, "").at_most(1e-4, "noise belongs to the samples", "closed form")
 
 
-def _linear_row(work_folder: Path) -> Row:
+def _linearised_vehicle_row(work_folder: Path) -> Row:
     """Row: if vehicle and measurement are linearised, even the perturbed vehicle does not drift off."""
     linear = {"geometry": "linear"}
     true = simulate(changed_scene(road_scene(duration=60.0), vehicle=linear), "reference")
@@ -377,7 +393,7 @@ def draw(case_data: Saved) -> Drawn:
     spread = case_data["spread"]
     figure, axis = subplots(figsize=(7.0, 3.6))
     marks = {
-        "pitch": ("ok", f"Monte Carlo, {PATH_COUNT} paths"),
+        "pitch": ("ok", f"Monte Carlo, {NOISE_PATH_COUNT} paths"),
         "covariance": ("x", "covariance along the true path"),
         "law, run": ("-", "closed law, rate from the run"),
         "t^1.5": ("--", "noise alone, without growth: t^1.5"),

@@ -18,16 +18,16 @@ from validation.hard_cases import prescribed_pitch, sampled_input, setups
 
 TITLE = "Guards against silent wrong answers"
 SYSTEM: System = "pitch-plane"
-UNSTABLE_STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
-DURATIONS = (0.04, 0.2, 2.0)
-QUICK_STEPS, QUICK_DURATIONS = UNSTABLE_STEPS[::2], DURATIONS[:2]
+UNSTABLE_TIME_STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
+RUN_DURATIONS = (0.04, 0.2, 2.0)
+QUICK_STEPS, QUICK_DURATIONS = UNSTABLE_TIME_STEPS[::2], RUN_DURATIONS[:2]
 """Steps and durations (s) of the runs at unstable steps, in a quick run."""
-SILENT_ERROR = 1.0
+SILENT_ERROR_LIMIT = 1.0
 """Error, divided by the motion, above which a complete run counts as silently wrong: 100 % wrong without a warning."""
-Runner = Callable[..., Any]
+RunFunction = Callable[..., Any]
 
 
-def ending(attempt_run: Callable[[], Any]) -> str:
+def run_ending(attempt_run: Callable[[], Any]) -> str:
     """How an attempt ends: "refused" (InputError), "raised" (RunFailed) or "answered"."""
     try:
         attempt_run()
@@ -38,12 +38,12 @@ def ending(attempt_run: Callable[[], Any]) -> str:
     return "answered"
 
 
-def integrators(engine_name: str, adaptive: bool | None = None) -> list[str]:
-    """Integrators that an engine offers: fixed-step, adaptive, or both if ``adaptive`` is None."""
+def integrator_names(engine_name: str, is_adaptive: bool | None = None) -> list[str]:
+    """Integrators that an engine offers: fixed-step, adaptive, or both if ``is_adaptive`` is None."""
     return [
         name
         for name, facts in CATALOGUE[engine_name].items()
-        if (engine_name, name) not in UNAVAILABLE_INTEGRATORS and adaptive in (None, facts.adaptive)
+        if (engine_name, name) not in UNAVAILABLE_INTEGRATORS and is_adaptive in (None, facts.adaptive)
     ]
 
 
@@ -58,49 +58,50 @@ def _tight_solution(duration: float) -> np.ndarray:
     return setups.tight_solution(road_assembly(), 1e-3, duration).states
 
 
-def unstable_run_counts(engine_name: str, runner: Runner, quick: bool = False) -> dict[str, int]:
+def unstable_run_counts(engine_name: str, run_function: RunFunction, quick: bool = False) -> dict[str, int]:
     """Numbers of runs that end right, refused, raised or silently wrong, for every fixed-step integrator at steps of 2
     to 10 ms and durations of 0.04 and 0.2 s, in a full run also of 2 s."""
     counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
-    for name in integrators(engine_name, adaptive=False):
-        for step in QUICK_STEPS if quick else UNSTABLE_STEPS:
-            for duration in QUICK_DURATIONS if quick else DURATIONS:
-                counts[_ending_of_unstable_run(engine_name, name, step, duration, runner)] += 1
+    for name in integrator_names(engine_name, is_adaptive=False):
+        for step in QUICK_STEPS if quick else UNSTABLE_TIME_STEPS:
+            for duration in QUICK_DURATIONS if quick else RUN_DURATIONS:
+                counts[_ending_of_unstable_run(engine_name, name, step, duration, run_function)] += 1
     return counts
 
 
 def _ending_of_unstable_run(
-    engine_name: str, integrator: str, time_step: float, duration: float, runner: Runner
+    engine_name: str, integrator_name: str, time_step: float, duration: float, run_function: RunFunction
 ) -> str:
+    """How a run at an unstable step ends: right, refused, raised or silently wrong."""
     try:
-        states = runner(engine_name, road_assembly(), time_step, duration, integrator).states
+        states = run_function(engine_name, road_assembly(), time_step, duration, integrator_name).states
     except InputError:
         return "refused"
     except RunFailed:
         return "raised"
     truth = _tight_solution(duration)[:: round(time_step / 1e-3)]
     share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
-    return "right" if share <= SILENT_ERROR else "SILENT"
+    return "right" if share <= SILENT_ERROR_LIMIT else "SILENT"
 
 
 def nan_force_endings(engine_name: str) -> dict[str, str]:
     """How runs end if a force sample is NaN and has not passed the file reader, for every integrator and both
     interpolations."""
     base, endings = setups.vehicle(), {}
-    for name in integrators(engine_name):
+    for name in integrator_names(engine_name):
         for is_held in (True, False):
             forces = setups.static_forces(base, 102, 1e-3, is_held)
             forces.values[57, 0] = np.nan
             attempt = partial(setups.run, engine_name, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
-            endings[f"{name}, {'held' if is_held else 'linear'}"] = ending(attempt)
+            endings[f"{name}, {'held' if is_held else 'linear'}"] = run_ending(attempt)
     return endings
 
 
 def constrained_endings(engine_name: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
-    wrong = [name for name in integrators(engine_name) if not CATALOGUE[engine_name][name].constraints]
+    wrong = [name for name in integrator_names(engine_name) if not CATALOGUE[engine_name][name].constraints]
     return {
-        name: ending(partial(setups.run, engine_name, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name))
+        name: run_ending(partial(setups.run, engine_name, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name))
         for name in wrong
     }
 
@@ -109,17 +110,19 @@ def unchecked_constrained_endings() -> dict[str, str]:
     """How runs with a prescribed pitch end in Exudyn's explicit integrators if the check before the run is bypassed.
     The guard after the run compares the multiplier with the balance of moments."""
     names = [
-        name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED_INTEGRATORS.values()
+        name
+        for name in integrator_names("exudyn", is_adaptive=False)
+        if name not in setups.CONSTRAINED_INTEGRATORS.values()
     ]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
     scene = prescribed_pitch.guided_assembly()
-    return {name: ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
+    return {name: run_ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
-def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
+def _unexpected_endings(run_endings: dict[str, str], expected_ending: str) -> str:
     """The expected ending if all runs ended so; else text that lists the runs that did not."""
-    unexpected = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
-    return "; ".join(unexpected) or expected
+    unexpected = [f"{name}: {ended}" for name, ended in run_endings.items() if ended != expected_ending]
+    return "; ".join(unexpected) or expected_ending
 
 
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
@@ -128,7 +131,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     endings: Saved = {}
     for engine in CATALOGUE:
         rows += _unstable_rows(engine, endings, quick)
-        rows += _input_rows(engine)
+        rows += _wrong_input_rows(engine)
     for name, endings_of in (("refused", constrained_endings("exudyn")), ("raised", unchecked_constrained_endings())):
         how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
@@ -142,7 +145,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
             )
         )
     rows += [_explicit_solver_row(engine) for engine in ("reference", "mujoco")]
-    return [*rows, *_outside_engine_rows(), _disk_row(work_folder)], {"unstable": endings}
+    return [*rows, *_outside_engine_rows(), _full_disk_row(work_folder)], {"unstable": endings}
 
 
 def _outside_engine_rows() -> list[Row]:
@@ -171,7 +174,7 @@ def _outside_engine_rows() -> list[Row]:
     ]
 
 
-def _disk_row(work_folder: Path) -> Row:
+def _full_disk_row(work_folder: Path) -> Row:
     """Row: number of moments at which a full disk leaves an incomplete file or is not reported."""
     return Observed(
         "guards.full_disk",
@@ -183,12 +186,12 @@ def _disk_row(work_folder: Path) -> Row:
     ).at_most(0.0, "files are written whole or not at all", "none")
 
 
-def _unstable_rows(engine_name: str, endings: Saved, quick: bool) -> list[Row]:
+def _unstable_rows(engine_name: str, run_endings: Saved, quick: bool) -> list[Row]:
     """Rows: no run at an unstable step gives a silent wrong result; if the check before the run is bypassed, the guard
     after the run raises an error."""
     checked = unstable_run_counts(engine_name, setups.run, quick)
     past = unstable_run_counts(engine_name, setups.unchecked_run, quick)
-    endings[engine_name] = {"checked": checked, "unchecked": past}
+    run_endings[engine_name] = {"checked": checked, "unchecked": past}
     total = sum(checked.values())
     return [
         Observed(
@@ -202,18 +205,19 @@ def _unstable_rows(engine_name: str, endings: Saved, quick: bool) -> list[Row]:
             f"guards.unstable.{engine_name}.unchecked",
             SYSTEM,
             f"RK4 at 5 ms over 2 s with the step check bypassed, {engine_name}",
-            ending(lambda: setups.unchecked_run(engine_name, road_assembly(), 5e-3, 2.0)),
+            run_ending(lambda: setups.unchecked_run(engine_name, road_assembly(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
         ),
     ]
 
 
-def _input_rows(engine_name: str) -> list[Row]:
+def _wrong_input_rows(engine_name: str) -> list[Row]:
+    """Rows: NaN among the forces, and steps that do not divide the sampling period or the duration, are detected."""
     numbers = nan_force_endings(engine_name)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = ending(lambda: sampled_input.damaged_file(engine_name, Path(files_folder)))
+        file = run_ending(lambda: sampled_input.damaged_file(engine_name, Path(files_folder)))
     return [
         behaviour_row(
             f"guards.nan-file.{engine_name}",
@@ -235,7 +239,7 @@ def _input_rows(engine_name: str) -> list[Row]:
             f"guards.step-sampling.{engine_name}",
             SYSTEM,
             f"a step that does not divide the sampling period, {engine_name}",
-            ending(lambda: sampled_input.uneven_steps(engine_name, Path())),
+            run_ending(lambda: sampled_input.uneven_steps(engine_name, Path())),
             "refused",
             "a held sample would change in a step",
         ),
@@ -243,7 +247,7 @@ def _input_rows(engine_name: str) -> list[Row]:
             f"guards.step-duration.{engine_name}",
             SYSTEM,
             f"a step that does not divide the duration, {engine_name}",
-            ending(lambda: setups.run(engine_name, setups.vehicle(), 3e-4, 1.0)),
+            run_ending(lambda: setups.run(engine_name, setups.vehicle(), 3e-4, 1.0)),
             "refused",
             "the run would end elsewhere",
         ),
@@ -273,8 +277,10 @@ def tables(case_data: Saved) -> list[Table]:
         for how, counts in both.items()
     )
     note = (
-        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in UNSTABLE_STEPS)} ms over "
-        f"{', '.join(f'{duration:g}' for duration in DURATIONS)} s on the study road. Silent: a complete run that is "
+        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in UNSTABLE_TIME_STEPS)} ms "
+        "over "
+        f"{', '.join(f'{duration:g}' for duration in RUN_DURATIONS)} s on the study road. Silent: a complete run "
+        "that is "
         "wrong by more than the motion itself. Past the check, short unstable runs are finite, small and wrong."
     )
     return [Table("Runs at too long steps", note, ("engine", "", *words), rows)]
