@@ -48,11 +48,11 @@ from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-MEAN_BAND = 3.3
+STANDARD_ERRORS_OF_BAND = 3.3
 """Number of standard errors within which a mean lies 999 times in 1,000."""
-UNEQUAL_WALKS = np.array([0.1, 0.3, 0.6])
+UNEQUAL_ANGLE_WALKS = np.array([0.1, 0.3, 0.6])
 """Angle random walk of each axis, rad per sqrt(s)."""
-EQUAL_WALK = 0.5
+EQUAL_ANGLE_WALK = 0.5
 """Angle random walk, rad per sqrt(s), where all axes have the same."""
 SAMPLE_PERIOD, RUN_SECONDS = 5e-3, 2.0
 """Sampling period and length (s) of the Monte Carlo runs; one step contributes some 1e-4 of the law's value."""
@@ -67,7 +67,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         *_exact_rate_rows(),
         *_one_axis_rows(paths),
         *_three_axes_rows(paths),
-        *_norm_rows(paths),
+        *_quaternion_norm_rows(paths),
         *_bias_rows(paths),
     ]
     example, data = _ten_minute_rows(0 if quick else 60)
@@ -104,11 +104,11 @@ def _exact_rate_rows() -> list[Row]:
 
 
 def _closed_form_row(
-    row_name: str, quantity_name: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+    row_name: str, quantity_name: str, error_value: float, unit: str, tolerance_reason: str, error_bound: float = 1e-12
 ) -> Row:
     """Row for an error relative to a closed form."""
     return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, error_value, unit).at_most(
-        bound, tolerance_reason, "closed form"
+        error_bound, tolerance_reason, "closed form"
     )
 
 
@@ -117,7 +117,7 @@ def _one_axis_rows(noise_path_count: int) -> list[Row]:
     motion."""
     rows = []
     for axis in range(3):
-        deviation = EQUAL_WALK / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
+        deviation = EQUAL_ANGLE_WALK / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
         turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, noise_path_count))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
@@ -129,7 +129,7 @@ def _one_axis_rows(noise_path_count: int) -> list[Row]:
                     float(np.mean(turns[:, axis] ** 2)),
                     "rad^2",
                 ),
-                EQUAL_WALK**2 * 200 * SAMPLE_PERIOD,
+                EQUAL_ANGLE_WALK**2 * 200 * SAMPLE_PERIOD,
                 noise_path_count,
                 f"s^2 t; {noise_path_count:,} paths, seed {SEED}",
             ),
@@ -147,12 +147,13 @@ def _one_axis_rows(noise_path_count: int) -> list[Row]:
 def _mean_row(
     row_name: str, quantity_name: str, samples: np.ndarray, expected_mean: float, tolerance_reason: str
 ) -> Row:
-    """Row for a mean that must lie within MEAN_BAND standard errors of its theoretical value."""
+    """Row for a mean that must lie within STANDARD_ERRORS_OF_BAND standard errors of its theoretical value."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
     return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, float(samples.mean()), "").within(
         expected_mean,
-        MEAN_BAND * error,
-        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {MEAN_BAND} standard errors of {error:.2g}",
+        STANDARD_ERRORS_OF_BAND * error,
+        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {STANDARD_ERRORS_OF_BAND} standard errors "
+        f"of {error:.2g}",
         "closed form",
     )
 
@@ -162,21 +163,21 @@ def _three_axes_rows(noise_path_count: int) -> list[Row]:
     mean error matrix and mean quaternion."""
     count = round(RUN_SECONDS / SAMPLE_PERIOD)
     rates, root = turning_rates(count, SAMPLE_PERIOD), SAMPLE_PERIOD**0.5
-    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_WALK / root * np.ones(3), noise_path_count)
-    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_WALKS / root, noise_path_count)
+    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_ANGLE_WALK / root * np.ones(3), noise_path_count)
+    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_ANGLE_WALKS / root, noise_path_count)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
-        mean_error(UNEQUAL_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
+        mean_error(UNEQUAL_ANGLE_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
     )
-    resting = mean_error(UNEQUAL_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
-    all_equal = np.full(3, EQUAL_WALK)
+    resting = mean_error(UNEQUAL_ANGLE_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
+    all_equal = np.full(3, EQUAL_ANGLE_WALK)
     same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
         _mean_row(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
-            mean_trace(EQUAL_WALK, RUN_SECONDS),
+            mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
         _mean_row(
@@ -190,13 +191,13 @@ def _three_axes_rows(noise_path_count: int) -> list[Row]:
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
-            mean_scalar(UNEQUAL_WALKS, RUN_SECONDS),
+            mean_scalar(UNEQUAL_ANGLE_WALKS, RUN_SECONDS),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
-            abs(same - mean_trace(EQUAL_WALK, RUN_SECONDS)),
+            abs(same - mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS)),
             "",
             "both are exact",
         ),
@@ -207,7 +208,7 @@ def _three_axes_rows(noise_path_count: int) -> list[Row]:
             "",
             f"{noise_path_count:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
-            MEAN_BAND,
+            STANDARD_ERRORS_OF_BAND,
         ),
         Observed(
             "inertial_unit.matrix.resting",
@@ -216,14 +217,14 @@ def _three_axes_rows(noise_path_count: int) -> list[Row]:
             "rest, worst entry over its standard error",
             standard_errors(wandered, resting),
             "",
-        ).beside(f"far beyond {MEAN_BAND}", "the rows above can tell the laws apart", "closed form"),
+        ).beside(f"far beyond {STANDARD_ERRORS_OF_BAND}", "the rows above can tell the laws apart", "closed form"),
     ]
 
 
 STRATONOVICH_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
-def _norm_rows(noise_path_count: int) -> list[Row]:
+def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
     """Rows on Ito's theory: the norm of a quaternion that is never normalised grows by a law, and the mean quaternion
     is the true one."""
     rows, steps, span = [], 100, 4.0
@@ -233,10 +234,10 @@ def _norm_rows(noise_path_count: int) -> list[Row]:
         noise[:, :, :axes] = normal_samples(SEED, axes, steps * noise_path_count, axes, source=GYRO).reshape(
             steps, noise_path_count, axes
         )
-        q = euler_quaternions(EQUAL_WALK * period**0.5 * noise, START_ATTITUDE)
+        q = euler_quaternions(EQUAL_ANGLE_WALK * period**0.5 * noise, START_ATTITUDE)
         square = np.sum(q**2, axis=1)
-        law = euler_mean_square(EQUAL_WALK, axes, period, steps)
-        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL_WALK), span), q[:, 0], f"{axes} noisy axes"
+        law = euler_mean_square(EQUAL_ANGLE_WALK, axes, period, steps)
+        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL_ANGLE_WALK), span), q[:, 0], f"{axes} noisy axes"
         means = (
             (
                 "norm",
@@ -266,9 +267,11 @@ def _norm_rows(noise_path_count: int) -> list[Row]:
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the explicit Euler law at 4e6 steps, {axes} noisy axes",
-                euler_mean_square(EQUAL_WALK, axes, 1e-6, 4_000_000) ** 0.5,
+                euler_mean_square(EQUAL_ANGLE_WALK, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
-            ).within(ito_norm(np.full(axes, EQUAL_WALK), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
+            ).within(
+                ito_norm(np.full(axes, EQUAL_ANGLE_WALK), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"
+            ),
         ]
     return rows
 
@@ -331,14 +334,19 @@ def _ten_minute_rows(noise_path_count: int) -> CaseAnswer:
     }
 
 
-def _error_angles(noise_path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
+def _error_angles(noise_path: int, body_rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true_attitudes``
     (601, 4)."""
     attitudes = measured_attitude(
-        rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(noise_path, noise_path + 1), SEED
+        body_rates,
+        1 / SAMPLING_RATE,
+        RATE_DEVIATION * np.ones(3),
+        START_ATTITUDE,
+        range(noise_path, noise_path + 1),
+        SEED,
     )
     return np.degrees(
-        rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true_attitudes) - 1), 0], true_attitudes))
+        rotation_vector(error_rotation(attitudes[:: len(body_rates) // (len(true_attitudes) - 1), 0], true_attitudes))
     )
 
 
@@ -431,6 +439,6 @@ def _recording_rows(noise_path_count: int) -> CaseAnswer:
             standard_errors(wandered, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {noise_path_count:,} paths, seed {SEED}",
-            MEAN_BAND,
+            STANDARD_ERRORS_OF_BAND,
         ),
     ], {"off": off[::20].tolist()}

@@ -27,7 +27,7 @@ from validation.price.tables import curve_name
 
 TITLE = "Instructions per step"
 SYSTEM: System = "cost"
-METHODS = {
+INTEGRATION_METHODS = {
     "exudyn": (
         "GeneralizedAlpha",
         "TrapezoidalIndex2",
@@ -40,13 +40,18 @@ METHODS = {
     ),
     "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
 }
-ENGINE_METHODS = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
-STEP_COUNTS = (40, 120)
+METHODS_OF_ENGINES = tuple(
+    f"{engine} {method}" for engine, methods in INTEGRATION_METHODS.items() for method in methods
+)
+COUNTED_STEP_COUNTS = (40, 120)
 """Numbers of steps of the two runs that are differenced."""
 COUNT_TOLERANCE = 1e-6
 PROCESS_TIMEOUT = 900
 """Time (s) after which a counting process is given up."""
-CASE_ID, CASE_QUANTITY = "instruction_counts", f"instructions of {len(ENGINE_METHODS)} methods counted in two processes"
+CASE_ID, CASE_QUANTITY = (
+    "instruction_counts",
+    f"instructions of {len(METHODS_OF_ENGINES)} methods counted in two processes",
+)
 
 
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
@@ -74,10 +79,12 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
             "number of threads are set, and no clock's reading is printed while they are counted",
             "none",
         )
-        for engine, largest in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)
+        for engine, largest in zip(
+            INTEGRATION_METHODS, np.split(off, [len(INTEGRATION_METHODS["exudyn"])]), strict=True
+        )
     ]
-    per_step = np.diff(first, axis=1)[:, 0] / (STEP_COUNTS[1] - STEP_COUNTS[0])
-    return rows, {"instructions": dict(zip(ENGINE_METHODS, per_step.tolist(), strict=True))}
+    per_step = np.diff(first, axis=1)[:, 0] / (COUNTED_STEP_COUNTS[1] - COUNTED_STEP_COUNTS[0])
+    return rows, {"instructions": dict(zip(METHODS_OF_ENGINES, per_step.tolist(), strict=True))}
 
 
 def _instruction_counts(work_folder: Path) -> np.ndarray:
@@ -88,8 +95,8 @@ def _instruction_counts(work_folder: Path) -> np.ndarray:
         "masses": np.diag(mass).tolist(),
         "damping": damping.tolist(),
         "stiffness": stiffness.tolist(),
-        "methods": METHODS,
-        "steps": STEP_COUNTS,
+        "methods": INTEGRATION_METHODS,
+        "steps": COUNTED_STEP_COUNTS,
     }
     settled = {**os.environ, "PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     command = [
@@ -103,14 +110,14 @@ def _instruction_counts(work_folder: Path) -> np.ndarray:
         json.dumps(march),
     ]
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PROCESS_TIMEOUT)
-    marches = len(ENGINE_METHODS) * len(STEP_COUNTS)
+    marches = len(METHODS_OF_ENGINES) * len(COUNTED_STEP_COUNTS)
     counts = [
         [_count_of_dump(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
         for path in work_folder.glob("count.*")
         if path.with_name(f"{path.name}.{marches + 1}").exists()
     ]
     shutil.rmtree(work_folder)
-    return np.array(counts, float).reshape(2, -1, len(STEP_COUNTS))
+    return np.array(counts, float).reshape(2, -1, len(COUNTED_STEP_COUNTS))
 
 
 def _count_of_dump(dump_file: Path) -> int:

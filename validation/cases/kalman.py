@@ -41,7 +41,7 @@ OUTAGE, LOST_SHARE = (20.0, 25.0), 0.3
 """Start and end (s) of an outage without any measurement, and share of all other samples that are lost."""
 VARIANCE_FACTORS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 """For each filter: factors on the variances of force noise and of measurement noise that the filter assumes."""
-SENSORS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, PITCH_RATE)}
+SENSOR_CHANNELS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, PITCH_RATE)}
 
 
 @on_paper_road()
@@ -55,11 +55,13 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     run_folder = work_folder / "kalman"
     run_folder.mkdir(exist_ok=True)
     if quick:
-        rows = _consistency_rows(run_folder, 2, 4.0, ("right",)) + _gap_rows(run_folder, 4.0, None, ("angle",))
+        rows = _consistency_rows(run_folder, 2, 4.0, ("right",)) + _missing_sample_rows(
+            run_folder, 4.0, None, ("angle",)
+        )
         return rows + _short_run_rows(run_folder), {"damage": [], "deviations": []}
     rows = _consistency_rows(run_folder, 24, 12.0, tuple(VARIANCE_FACTORS))
-    rows += _gap_rows(run_folder, 40.0, OUTAGE, tuple(SENSORS))
-    loop_rows, deviations = _loop_rows(run_folder)
+    rows += _missing_sample_rows(run_folder, 40.0, OUTAGE, tuple(SENSOR_CHANNELS))
+    loop_rows, deviations = _closed_loop_rows(run_folder)
     gyro = gyro_only_pitch_error(run_folder, 600.0, SEED)
     damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLE_COUNT)]
     right = [
@@ -84,8 +86,8 @@ def _consistency_rows(work_folder: Path, run_count: int, duration: float, filter
     )
     runs_text, every = f"{run_count} runs, once a second", f"{run_count} runs, all innovations"
     rows = [
-        _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, runs_text),
-        _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
+        _chi_square_band_row("nees", "normalised error squared of 6 states", errors["right"], 6, runs_text),
+        _chi_square_band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
         *_inconsistency_rows([consistent[2] for consistent in by_filter["right"]]),
     ]
     if "Q" in filter_names:
@@ -126,15 +128,15 @@ def _inconsistency_rows(innovations: list[np.ndarray]) -> list[Row]:
 
 
 def _outside_band_row(
-    row_name: str, quantity_name: str, noise: str, values: np.ndarray, degrees_of_freedom: int
+    row_name: str, quantity_name: str, noise_name: str, normalised_squares: np.ndarray, degrees_of_freedom: int
 ) -> Row:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
-    low, high = _chi_square_band(degrees_of_freedom * len(values))
-    mean = float(values.mean()) / degrees_of_freedom
+    low, high = _chi_square_band(degrees_of_freedom * len(normalised_squares))
+    mean = float(normalised_squares.mean()) / degrees_of_freedom
     return behaviour_row(
         f"kalman.{row_name}",
         SYSTEM,
-        f"{quantity_name} of a filter that assumes 4 times the variance of the {noise}",
+        f"{quantity_name} of a filter that assumes 4 times the variance of the {noise_name}",
         "inside" if low <= mean <= high else "outside",
         "outside",
         f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",
@@ -150,26 +152,29 @@ def _chi_square_band(degrees_of_freedom: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _band_row(row_name: str, quantity_name: str, values: np.ndarray, degrees_of_freedom: int, sample: str) -> Row:
-    low, high = _chi_square_band(degrees_of_freedom * len(values))
-    mean = float(values.mean()) / degrees_of_freedom
+def _chi_square_band_row(
+    row_name: str, quantity_name: str, normalised_squares: np.ndarray, degrees_of_freedom: int, sample_description: str
+) -> Row:
+    """Row: mean normalised square per degree of freedom, which must lie in the chi-square band."""
+    low, high = _chi_square_band(degrees_of_freedom * len(normalised_squares))
+    mean = float(normalised_squares.mean()) / degrees_of_freedom
     why = (
         f"{100 * BAND_PROBABILITY:g} % band {low:.3f} to {high:.3f} of chi-square with "
-        f"{degrees_of_freedom * len(values)} degrees of freedom: {sample}"
+        f"{degrees_of_freedom * len(normalised_squares)} degrees of freedom: {sample_description}"
     )
     return Observed(
         f"kalman.{row_name}", SYSTEM, f"{quantity_name}, mean per degree of freedom, no model error", mean, ""
     ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 
-def _gap_rows(
-    work_folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]
+def _missing_sample_rows(
+    work_folder: Path, duration: float, outage: tuple[float, float] | None, sensor_names: tuple[str, ...]
 ) -> list[Row]:
     """Rows: pitch error and count of missing samples if the file of the angle, of the rate, or of both has missing
     samples."""
     rows = []
-    for name in sensors:
-        gaps = run_with_missing_samples(work_folder, duration, SEED, SENSORS[name], LOST_SHARE, outage)
+    for name in sensor_names:
+        gaps = run_with_missing_samples(work_folder, duration, SEED, SENSOR_CHANNELS[name], LOST_SHARE, outage)
         gaps_text = f"{LOST_SHARE:.0%} of the samples lost" + (
             f", none from {outage[0]:g} to {outage[1]:g} s" if outage else ""
         )
@@ -189,13 +194,14 @@ def _gap_rows(
 
 
 def _short_run_rows(work_folder: Path) -> list[Row]:
+    """Row: largest pitch error of a short stabilised run."""
     error = scores_of_stabilised(work_folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
     what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
     return [Observed("kalman.short", SYSTEM, what, error, "rad").at_most(5e-3, why, "none")]
 
 
-def _loop_rows(work_folder: Path) -> tuple[list[Row], list[list[float]]]:
+def _closed_loop_rows(work_folder: Path) -> tuple[list[Row], list[list[float]]]:
     """Rows and table: variances of the errors of filter estimate and of stabilised run, compared with the discrete
     Lyapunov equation."""
     force = deviation_at_period(35.0, COARSE_PERIOD)
@@ -225,7 +231,8 @@ def _loop_rows(work_folder: Path) -> tuple[list[Row], list[list[float]]]:
     return rows, table
 
 
-def _gyro_rows(gyro: dict[str, float]) -> list[Row]:
+def _gyro_rows(gyro_record: dict[str, float]) -> list[Row]:
+    """Row: pitch deviation that a gyro alone leaves, compared with the averaged Riccati equation."""
     words = "pitch deviation that a gyro of 0.1 rad/s at 1 kHz alone leaves after 600 s"
     why = "the instability makes the pitch visible in its rate; lambda from the true run is good to 5 %"
     return [
@@ -233,14 +240,14 @@ def _gyro_rows(gyro: dict[str, float]) -> list[Row]:
             "kalman.gyro",
             SYSTEM,
             f"ratio of {words} to the averaged Riccati equation",
-            gyro["stated"] / gyro["law"],
+            gyro_record["stated"] / gyro_record["law"],
             "",
         ).within(1.0, 0.1, why, "closed form"),
         Observed(
             "kalman.gyro.error",
             SYSTEM,
             "ratio of the filter's actual error, rms from 100 s on, to the stated deviation",
-            gyro["error"] / gyro["stated"],
+            gyro_record["error"] / gyro_record["stated"],
             "",
         ).within(
             1.0,
@@ -253,17 +260,18 @@ def _gyro_rows(gyro: dict[str, float]) -> list[Row]:
             "kalman.gyro.level",
             SYSTEM,
             "pitch deviation after 600 s of a filter linearised about a level vehicle, A(0): a random walk",
-            gyro["walk"],
+            gyro_record["walk"],
             "rad",
-        ).beside(gyro["stated"], "nothing in A(0) shows the pitch", "closed form"),
+        ).beside(gyro_record["stated"], "nothing in A(0) shows the pitch", "closed form"),
     ]
 
 
-def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
+def _damage_rows(damage_by_run: list[dict[str, dict[str, float]]]) -> list[Row]:
+    """Rows: damage ratio of every section force in every engine, over all noise samples."""
     rows = []
     for engine in ENGINES:
         for name in SECTION_FORCE_CHANNELS:
-            ratios = np.array([run_damage[engine][name] for run_damage in damage])
+            ratios = np.array([run_damage[engine][name] for run_damage in damage_by_run])
             why = (
                 f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
                 f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}"
@@ -281,13 +289,15 @@ INERTIA_REASON = "the model lacks 5 % of the inertia"
 INERTIA_QUANTITY = "mean share by which the estimated 1/I is above the model's"
 
 
-def _moment_rows(damage: list[dict[str, dict[str, float]]], right_model: list[dict[str, float]]) -> list[Row]:
+def _moment_rows(
+    damage_by_run: list[dict[str, dict[str, float]]], moments_of_right_model: list[dict[str, float]]
+) -> list[Row]:
     """Rows: ratio of the filter's artificial moments to the inertia moment I beta''. With a wrong model, only moments
     that the error of the inertia does not explain are judged."""
-    reference = [run_damage["reference"] for run_damage in damage]
+    reference = [run_damage["reference"] for run_damage in damage_by_run]
     rows = []
     for name, words, some, key in (
-        ("right", "artificial moment, right model", right_model, "all"),
+        ("right", "artificial moment, right model", moments_of_right_model, "all"),
         ("pull", "artificial moment without what the inertia lacks, wrong model", reference, "pull"),
     ):
         for band, range_ in (("", "all frequencies"), (", band", "up to 15 Hz")):

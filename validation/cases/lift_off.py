@@ -47,25 +47,31 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: accelerations, bounces, energy and wheel loads of vehicles whose tyres lift off. A quick run has one
     vehicle, half a second of bounces, short runs on roads, and no hub forces."""
     vehicles = VEHICLE_SETS[-1:] if quick else VEHICLE_SETS
-    rows = [row for name in vehicles for row in (*_acceleration_rows(name), *_path_rows(name, 1.5 if quick else 20.0))]
-    rows += [*_bounce_rows(0.5 if quick else 2.0), _order_row(4 if quick else 6), *_energy_rows(0.5 if quick else 2.0)]
-    return [*rows, *_pull_rows(quick), *_spatial_rows(quick), *([] if quick else _hub_force_rows())], {}
+    rows = [
+        row for name in vehicles for row in (*_acceleration_rows(name), *_study_road_rows(name, 1.5 if quick else 20.0))
+    ]
+    rows += [
+        *_bounce_rows(0.5 if quick else 2.0),
+        _convergence_order_row(4 if quick else 6),
+        *_energy_rows(0.5 if quick else 2.0),
+    ]
+    return [*rows, *_tyre_pull_rows(quick), *_ride_vehicle_rows(quick), *([] if quick else _hub_force_rows())], {}
 
 
-def scene(
+def lift_off_scene(
     parameter_set_name: str = VEHICLE_SETS[-1],
     geometry: str = "exact",
     duration: float = 1.0,
-    step: float = STEP,
+    time_step: float = STEP,
     on_study_road: bool = False,
-    override: dict[str, float] | None = None,
+    parameter_overrides: dict[str, float] | None = None,
 ) -> Scene:
     """Scene of the half car on tyres that can lift off: on the study road from rest, or dropped onto a flat road."""
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameter_set_name, "geometry": geometry, "override": override or {}},
-            "run": {"duration": duration, "step": step},
+            "vehicle": {"parameters": parameter_set_name, "geometry": geometry, "override": parameter_overrides or {}},
+            "run": {"duration": duration, "step": time_step},
             "start": {} if on_study_road else START_MOTION,
             "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if on_study_road else {})},
         }
@@ -77,7 +83,7 @@ def _acceleration_rows(parameter_set_name: str) -> list[Row]:
     wheels in the air."""
     rows = []
     for geometry in ("exact", "linear"):
-        lifting = scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
+        lifting = lift_off_scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
         assembly = assembly_of_scene(lifting)
         for engine in ENGINES:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
@@ -95,10 +101,10 @@ def _acceleration_rows(parameter_set_name: str) -> list[Row]:
     return rows
 
 
-def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
+def _study_road_rows(parameter_set_name: str, duration: float) -> list[Row]:
     """Rows: largest difference of the engines' states from the reference's on the study road at the same step, and the
     least wheel load, which must be 0."""
-    lifting = scene(parameter_set_name, duration=duration, step=5e-4, on_study_road=True)
+    lifting = lift_off_scene(parameter_set_name, duration=duration, time_step=5e-4, on_study_road=True)
     runs = {engine: simulate(lifting, engine) for engine in IMPLEMENTATIONS}
     rows = [
         Observed(
@@ -111,7 +117,7 @@ def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
         ).at_most(1e-11, f"{ROUNDING_REASON}; each landing makes the difference some times as large", "native")
         for engine in ENGINES
     ]
-    least = min(_wheel_loads(run).min() for run in runs.values())
+    least = min(_tyre_forces_of_run(run).min() for run in runs.values())
     return [
         *rows,
         Observed(
@@ -124,8 +130,9 @@ def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
     ]
 
 
-def _wheel_loads(run: Result) -> np.ndarray:
-    return np.array([run["f1"], run["f2"]])
+def _tyre_forces_of_run(lift_off_run: Result) -> np.ndarray:
+    """Forces (2, n) in N of the front and of the rear tyre."""
+    return np.array([lift_off_run["f1"], lift_off_run["f2"]])
 
 
 @allowing_breaches(
@@ -139,7 +146,7 @@ def _bounce_rows(duration: float) -> list[Row]:
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
-        lifting = scene(geometry="linear", duration=duration, override=override)
+        lifting = lift_off_scene(geometry="linear", duration=duration, parameter_overrides=override)
         assembly = assembly_of_scene(lifting)
         exact = BouncingVehicle(assembly, STEP).path(assembly.initial, round(duration / STEP))
         for engine in IMPLEMENTATIONS:
@@ -163,9 +170,9 @@ def _bounce_rows(duration: float) -> list[Row]:
     "springs compressed",
     "tyres not flat",
 )
-def _order_row(halving_count: int) -> Row:
+def _convergence_order_row(halving_count: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
-    lifting = scene(geometry="linear")
+    lifting = lift_off_scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halving_count), 1e-3
     exact = BouncingVehicle(assembly_of_scene(lifting), coarse).path(
         assembly_of_scene(lifting).initial, round(1.0 / coarse)
@@ -190,7 +197,7 @@ def _energy_rows(duration: float) -> list[Row]:
     tyres alone."""
     rows = []
     for engine in IMPLEMENTATIONS:
-        undamped = scene(duration=duration, override=NO_DAMPING)
+        undamped = lift_off_scene(duration=duration, parameter_overrides=NO_DAMPING)
         states = simulate(undamped, engine).states
         energies = bounce_energy(assembly_of_scene(undamped), states)
         size = energies[0] - bounce_energy(assembly_of_scene(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
@@ -203,7 +210,7 @@ def _energy_rows(duration: float) -> list[Row]:
                 "of the fall's",
             ).at_most(1e-4, "the error of the step", "closed form")
         )
-        damped = scene(duration=duration, override=NO_DAMPING | {"d1": 2e3, "d2": 500.0})
+        damped = lift_off_scene(duration=duration, parameter_overrides=NO_DAMPING | {"d1": 2e3, "d2": 500.0})
         energies = bounce_energy(assembly_of_scene(damped), simulate(damped, engine).states)
         gain = float((energies - np.minimum.accumulate(energies)).max() / size)
         rows.append(
@@ -219,16 +226,16 @@ def _energy_rows(duration: float) -> list[Row]:
 
 
 @allowing_breaches("what the linear tyre does is what is shown")
-def _pull_rows(quick: bool) -> list[Row]:
+def _tyre_pull_rows(quick: bool) -> list[Row]:
     """Rows: how strongly and how often the paper's linear tyre pulls on the study road, and the ratio of the dynamic
     wheel loads with tyres that lift off to those of linear tyres."""
-    lifting_scene = scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, step=5e-4, on_study_road=True)
+    lifting_scene = lift_off_scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, time_step=5e-4, on_study_road=True)
     lifting, linear = (
         simulate(lifting_scene, "reference"),
         simulate(scene_without(lifting_scene, "lift_off"), "reference"),
     )
-    loads = _wheel_loads(linear)
-    deviations = [root_mean_square(_wheel_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
+    loads = _tyre_forces_of_run(linear)
+    deviations = [root_mean_square(_tyre_forces_of_run(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {lifting_scene.run.duration:g} s"
     share = 100.0 * float((loads < 0.0).any(axis=0).mean())
     words = "ratio of the rms of the dynamic wheel loads with tyres that lift to that of linear tyres"
@@ -251,7 +258,7 @@ def _pull_rows(quick: bool) -> list[Row]:
     ]
 
 
-def _spatial_rows(quick: bool) -> list[Row]:
+def _ride_vehicle_rows(quick: bool) -> list[Row]:
     """Rows on the R19-ride vehicle with tyres that lift off: accelerations compared with hand-written equations, and
     Exudyn and MuJoCo compared on a random road."""
     ride = build_ride(
