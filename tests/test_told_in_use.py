@@ -249,7 +249,7 @@ def sample(ratio, share=1e-3, cost=0.5, told=True):
 
 
 def rows_of(*drawn):
-    found = [stated_errors._sample_as_table("ride", one) for one in drawn]
+    found = [stated_errors._error_sample_as_table("ride", one) for one in drawn]
     return {row.id.removeprefix("stated_errors."): row for row in stated_errors._common_rows(found, False)}
 
 

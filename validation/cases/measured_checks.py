@@ -37,15 +37,20 @@ from validation.spatial.cars import r19
 
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"
-ROADS: tuple[Ride, ...] = (("A", 1, 30.0, 15.0), ("B", 2, 20.0, 5.0), ("C", 3, 20.0, 20.0), ("D", 5, 10.0, 15.0))
+ROADS_OF_CLEAN_RECORDINGS: tuple[Ride, ...] = (
+    ("A", 1, 30.0, 15.0),
+    ("B", 2, 20.0, 5.0),
+    ("C", 3, 20.0, 20.0),
+    ("D", 5, 10.0, 15.0),
+)
 """ISO class, seed, speed (m/s) and duration (s) of the roads of clean recordings."""
 NOISE_SAMPLE_COUNT = 4
-SIZE_TOLERANCE = 0.2
+FAULT_SIZE_TOLERANCE = 0.2
 """Relative tolerance of the size that a check states for a planted fault."""
 VERTICAL_FORCE_CHANNELS = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 DEGREES_PER_RADIAN = 180 / np.pi
 PLANTED_DELAY = 3e-3
-QUICK_FAULTS = (
+FAULTS_OF_QUICK_RUN = (
     PlantedMeasurementFault(
         "3 ms late, one force", "shift", "fl_fz", PLANTED_DELAY, "s", faults={"delay": {"fl_fz": PLANTED_DELAY}}
     ),
@@ -113,7 +118,7 @@ LEVER_FAULTS = {
     "moments about the contact patch, one wheel": (-0.34, ("rr",)),
     "moments referred to the hub twice, one axle": (0.3, ("fl", "fr")),
 }
-FULL_FAULTS = (
+FURTHER_FAULTS = (
     *(
         PlantedMeasurementFault(name, check, place, size, unit, faults={key: amounts})
         for name, check, place, size, unit, key, amounts in TRANSDUCER_FAULTS
@@ -148,7 +153,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     and other noise samples."""
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, finding_texts = [], dict[str, str]()
-    for fault in QUICK_FAULTS if quick else QUICK_FAULTS + FULL_FAULTS:
+    for fault in FAULTS_OF_QUICK_RUN if quick else FAULTS_OF_QUICK_RUN + FURTHER_FAULTS:
         findings = planted_findings(virtual, work_folder, fault.spoil, **fault.faults)
         rows += _fault_rows(fault, findings)
         finding_texts[fault.name] = findings[0].text if findings else "nothing"
@@ -157,20 +162,20 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [
             *_clean_recording_rows(work_folder),
             *_wrong_vehicle_rows(work_folder),
-            *_three_faults_rows(virtual, work_folder),
+            *_three_faults_at_once_rows(virtual, work_folder),
             _mean_delay_row(virtual, work_folder),
         ]
         size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, work_folder), "drift")
         rows += [
             _size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
-            *_moving_car_rows(work_folder),
+            *_moving_car_check_rows(work_folder),
         ]
     return rows, {"said": finding_texts}
 
 
-def _stated_size(findings: Sequence[Finding], check: str, finding_place: str = "") -> float:
+def _stated_size(findings: Sequence[Finding], check_name: str, finding_place: str = "") -> float:
     """Size that the first finding of a check states at a place; NaN if there is no such finding."""
-    sizes = [finding.size for finding in findings if finding.check == check and finding_place in finding.place]
+    sizes = [finding.size for finding in findings if finding.check == check_name and finding_place in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
@@ -178,7 +183,7 @@ def _size_row(row_name: str, quantity_name: str, stated_size: float, unit: str, 
     """Row that compares the size that a check states with the size of the planted fault."""
     id, why = f"measured_checks.{row_name}", "what was planted, 20 %"
     return Observed(id, SYSTEM, quantity_name, stated_size, unit).within(
-        planted_size, SIZE_TOLERANCE * abs(planted_size), why, "closed form"
+        planted_size, FAULT_SIZE_TOLERANCE * abs(planted_size), why, "closed form"
     )
 
 
@@ -188,32 +193,39 @@ def _no_findings_row(row_name: str, quantity_name: str, finding_texts: list[str]
     return Observed(id, SYSTEM, quantity_name, len(finding_texts), "").within(0, 0, finding_text, "closed form")
 
 
-def _fault_rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
+def _fault_rows(planted_fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
     """Rows on one planted fault: the right check names the fault at the right place, no other fault is named, and the
     size is right."""
-    key = fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
-    named = any(finding.check == fault.check and fault.place in finding.place for finding in findings)
-    alone = all(finding.check == fault.check for finding in findings)
+    key = planted_fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
+    named = any(finding.check == planted_fault.check and planted_fault.place in finding.place for finding in findings)
+    alone = all(finding.check == planted_fault.check for finding in findings)
     word = "named" if named and alone else f"{[finding.check for finding in findings]}"
-    why = f"'{fault.check}' at {fault.place or 'the vehicle'}, and nothing else"
+    why = f"'{planted_fault.check}' at {planted_fault.place or 'the vehicle'}, and nothing else"
     rows = [
         behaviour_row(
-            f"measured_checks.{key}.named", SYSTEM, f"the planted fault is named: {fault.name}", word, "named", why
+            f"measured_checks.{key}.named",
+            SYSTEM,
+            f"the planted fault is named: {planted_fault.name}",
+            word,
+            "named",
+            why,
         )
     ]
-    if fault.check != "swapped":
-        size = _stated_size(findings, fault.check, fault.place)
-        rows.append(_size_row(f"{key}.size", f"{fault.name}: its size", size, fault.unit, fault.size))
+    if planted_fault.check != "swapped":
+        size = _stated_size(findings, planted_fault.check, planted_fault.place)
+        rows.append(
+            _size_row(f"{key}.size", f"{planted_fault.name}: its size", size, planted_fault.unit, planted_fault.size)
+        )
     return rows
 
 
-def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
+def _clean_recordings_row(recording_set: str, findings_of_recordings: list[tuple[Finding, ...]]) -> Row:
     """Row: the checks report no error and no doubt for recordings without a fault."""
-    what = f"errors and doubts in {len(recordings)} clean recordings"
+    what = f"errors and doubts in {len(findings_of_recordings)} clean recordings"
     return _no_findings_row(
-        f"clean.{name}",
+        f"clean.{recording_set}",
         what,
-        [finding.text for findings in recordings for finding in findings],
+        [finding.text for findings in findings_of_recordings for finding in findings],
         "noise as stated, nothing planted",
     )
 
@@ -230,7 +242,7 @@ def _clean_recording_rows(work_folder: Path) -> list[Row]:
                 for seed in range(2)
             ],
         )
-        for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
+        for vehicle, roads in (("r19_free", ROADS_OF_CLEAN_RECORDINGS), ("twin", ROADS_OF_CLEAN_RECORDINGS[1::2]))
     ]
 
 
@@ -256,12 +268,12 @@ def _wrong_vehicle_rows(work_folder: Path) -> list[Row]:
         "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     )
     return [
-        Observed(id, SYSTEM, what, excess, "%").within(wanted, SIZE_TOLERANCE * 6.6, why, "closed form"),
+        Observed(id, SYSTEM, what, excess, "%").within(wanted, FAULT_SIZE_TOLERANCE * 6.6, why, "closed form"),
         _no_findings_row("strangers", quantity, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
 
-def _three_faults_rows(virtual_measurement: VirtualMeasurement, work_folder: Path) -> list[Row]:
+def _three_faults_at_once_rows(virtual_measurement: VirtualMeasurement, work_folder: Path) -> list[Row]:
     """Rows: three faults at once are all named, and the size of one of them is right."""
     spoil = exchanged_hubs(("fl", "fr")), scaled_channels(1e-3, "rr_fz")
     findings = planted_findings(virtual_measurement, work_folder, *spoil, delay={"rl_fz": PLANTED_DELAY})
@@ -283,7 +295,7 @@ def _mean_delay_row(virtual_measurement: VirtualMeasurement, work_folder: Path) 
     """Row: mean over several noise samples of the delay that the check states for one channel, as a test of its
     bias."""
     samples = [
-        planted_findings(virtual_measurement, work_folder, seed=seed, **QUICK_FAULTS[0].faults)
+        planted_findings(virtual_measurement, work_folder, seed=seed, **FAULTS_OF_QUICK_RUN[0].faults)
         for seed in range(NOISE_SAMPLE_COUNT)
     ]
     late = 1e3 * float(
@@ -294,7 +306,7 @@ def _mean_delay_row(virtual_measurement: VirtualMeasurement, work_folder: Path) 
     return Observed("measured_checks.spread", SYSTEM, what, late, "ms").within(3.0, 0.15, why, "closed form")
 
 
-def _moving_car_rows(work_folder: Path) -> list[Row]:
+def _moving_car_check_rows(work_folder: Path) -> list[Row]:
     """Rows: inertial checks of a telephone recording in a real car, if the recording is available."""
     path = car.find_recording()
     if path is None:

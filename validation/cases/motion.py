@@ -36,7 +36,7 @@ TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
 SEED = 30
 CLOSED_FORM_BOUND = 1e-12
-GAINS_BY_HEIGHT = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
+NOISE_GAINS_BY_HEIGHT = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
 """Height (m) of the fifth sensor above a floor of 2 m by 1.2 m, with the known noise gain relative to the last sensor
 (1/m)."""
 NOISE_DEVIATION = 0.3
@@ -58,9 +58,9 @@ LOOSE_SENSOR = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "da
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of clean motions in space, noise, each engine's simulated readings, and drift; a quick run has few paths and
     runs of 1 s."""
-    rows = [row for name in SENSOR_ARRANGEMENTS for row in _exact_rows(name)]
-    rows += [_printed_formula_row(), _order_row(), _tilt_error_row()]
-    gains, gain_rows = _gain_rows(4000 if quick else 40_000)
+    rows = [row for name in SENSOR_ARRANGEMENTS for row in _clean_reading_rows(name)]
+    rows += [_printed_formula_row(), _convergence_order_row(), _tilt_error_row()]
+    gains, gain_rows = _noise_gain_rows(4000 if quick else 40_000)
     rows += gain_rows
     for engine in IMPLEMENTATIONS:
         rows += _engine_rows(engine, 1.0 if quick else 5.0)
@@ -68,14 +68,14 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return [*rows, *walked, *_symmetric_part_rows(curves, quick)], {"gains": gains, "curves": curves}
 
 
-def _exact_rows(arrangement: str) -> list[Row]:
+def _clean_reading_rows(arrangement_name: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
-    array = sensor_array(SENSOR_ARRANGEMENTS[arrangement])
+    array = sensor_array(SENSOR_ARRANGEMENTS[arrangement_name])
     clean = readings_on_path(array.positions)
-    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement.replace(',', '').replace(' ', '-')}"
+    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement_name.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
-    what = f"sensors: {arrangement}{', formula for a plane' if array.planar else ''}"
+    what = f"sensors: {arrangement_name}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
         ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),
@@ -113,7 +113,7 @@ def _printed_formula_row() -> Row:
     )
 
 
-def _order_row() -> Row:
+def _convergence_order_row() -> Row:
     """Row: order of convergence in the sampling period of the position recovered from the readings."""
     array = sensor_array(SENSOR_ARRANGEMENTS["5 in a tilted plane"])
     clean = readings_on_path(array.positions)
@@ -133,6 +133,7 @@ def _order_row() -> Row:
 
 
 def _tilt_error_row() -> Row:
+    """Row: false displacement by an error of the initial tilt, compared with its law."""
     array, tilt, count = sensor_array(SENSOR_ARRANGEMENTS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
     drift = -recovered_motion(array, still, 1e-3, StartState.pitched(tilt)).position[:, 0]
@@ -147,11 +148,11 @@ def _tilt_error_row() -> Row:
     )
 
 
-def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
+def _noise_gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     """Table and rows: noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth
     sensor."""
     rows, lines = [], []
-    for i, height in enumerate((*GAINS_BY_HEIGHT, 0.0)):
+    for i, height in enumerate((*NOISE_GAINS_BY_HEIGHT, 0.0)):
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
@@ -176,7 +177,7 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
                 )
             )
             line += [law**0.5, variance**0.5]
-        if height in GAINS_BY_HEIGHT:
+        if height in NOISE_GAINS_BY_HEIGHT:
             rows.append(
                 Observed(
                     f"motion.known_gain.{height:g}",
@@ -185,8 +186,8 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
                     line[1],
                     "1/m",
                 ).within(
-                    GAINS_BY_HEIGHT[height],
-                    0.04 * GAINS_BY_HEIGHT[height],
+                    NOISE_GAINS_BY_HEIGHT[height],
+                    0.04 * NOISE_GAINS_BY_HEIGHT[height],
                     "figures relative to the last sensor; relative to the mean up to 3 % less",
                     "published",
                 )
@@ -258,21 +259,25 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
 def _recovery_rows(
     integration_rule: str,
     engine_name: str,
-    array: SensorArray,
+    sensor_arrangement: SensorArray,
     specific_forces: np.ndarray,
     states: np.ndarray,
-    rates: np.ndarray | None,
+    gyro_rates: np.ndarray | None,
 ) -> list[Row]:
     """Rows: errors of pitch and heave recovered from noise-free readings of a run, with or without its gyro, compared
     with its states (n, 8)."""
     followed = recovered_motion(
-        array, specific_forces, 1e-3, StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates
+        sensor_arrangement,
+        specific_forces,
+        1e-3,
+        StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()),
+        rates=gyro_rates,
     )
     errors = (
         ("pitch", followed.angles()[:, 1] - states[:, 3], "rad", 1e-6),
         ("heave", followed.position[:, 2] - states[:, 2], "m", 1e-5),
     )
-    words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
+    words = "accelerometers alone" if gyro_rates is None else "accelerometers and a gyro"
     return [
         Observed(
             f"motion.recovered.{integration_rule}.{what}.{engine_name}",
@@ -301,6 +306,7 @@ def _turning_body(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarra
 
 
 def _noise_samples(noise_path: int, sample_count: int) -> np.ndarray:
+    """Noise (n, 5, 3) in m/s^2 on the readings of five sensors."""
     return NOISE_DEVIATION * normal_samples(SEED + 1, noise_path, sample_count, 15, source=ACCELEROMETERS).reshape(
         sample_count, 5, 3
     )
@@ -337,7 +343,7 @@ def _random_walk_rows(noise_path_count: int) -> tuple[list[Row], dict[str, list[
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
 
-def _symmetric_part_rows(curves: Saved, quick: bool) -> list[Row]:
+def _symmetric_part_rows(error_curves: Saved, quick: bool) -> list[Row]:
     """Rows: if the symmetric part of the angular matrix serves as a measurement, the rate error stays bounded."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _turning_body(count)
@@ -349,7 +355,7 @@ def _symmetric_part_rows(curves: Saved, quick: bool) -> list[Row]:
     ]
     squares = np.mean([np.mean((held_rates - rates) ** 2, axis=1) for held_rates, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
-    curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
+    error_curves["held"], error_curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
     walked = (
         NOISE_DEVIATION * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
     )

@@ -66,12 +66,13 @@ def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
                 trajectory_difference(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
-            _native_count_row(car_name, car, engine),
+            _native_element_count_row(car_name, car, engine),
         ]
     return rows
 
 
-def _native_count_row(car_name: str, car: CutVehicle, engine_name: str) -> Row:
+def _native_element_count_row(car_name: str, car: CutVehicle, engine_name: str) -> Row:
+    """Row: number of springs, mounts and bars that are native elements of an engine."""
     share = native_share(engine_name, car)
     shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
     return Observed(

@@ -27,7 +27,7 @@ from validation.faults.campaign import FAULT_SYSTEM
 from validation.faults.planting import CONTROLS_WITHOUT_FAULT, DESCRIPTION_FAULTS, EQUATIONS_FAULTS
 
 TITLE = "Planted faults: what each check sees"
-CAMPAIGNS = (
+FAULT_CAMPAIGNS = (
     contact.CAMPAIGN,
     ride.CAMPAIGN,
     wheelset.CAMPAIGN,
@@ -56,35 +56,39 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     )
     data: Saved = {
         "pitch-plane": plane,
-        **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in CAMPAIGNS},
+        **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in FAULT_CAMPAIGNS},
     }
-    rows = [*pitch_plane.rows(plane), *(row for campaign in CAMPAIGNS for row in campaign.rows(data[campaign.id]))]
+    rows = [
+        *pitch_plane.rows(plane),
+        *(row for campaign in FAULT_CAMPAIGNS for row in campaign.rows(data[campaign.id])),
+    ]
     return [*rows, *([] if quick else [_fault_count_row(data)])], data
 
 
 def _fault_count_row(case_data: Saved) -> Row:
-    caught = sum(line[3] != "none" for line in _fault_lines(case_data))
+    """Row: by how much the number of detected faults falls short of the number asked for."""
+    caught = sum(line[3] != "none" for line in _fault_table_lines(case_data))
     return Observed(
         "planted.count",
         FAULT_SYSTEM,
         f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
         max(0, FEWEST_FAULTS - caught),
         "faults",
-    ).at_most(0, f"{caught} of {len(_fault_lines(case_data))} are", "native")
+    ).at_most(0, f"{caught} of {len(_fault_table_lines(case_data))} are", "native")
 
 
-def _fault_lines(case_data: Saved) -> list[tuple[str, ...]]:
+def _fault_table_lines(case_data: Saved) -> list[tuple[str, ...]]:
     """Table lines, one for each fault: system, component with the fault, fault, checks that detect it, and checks that
     alone would have missed it."""
     return [
         *pitch_plane.lines(case_data["pitch-plane"]),
-        *(line for campaign in CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
+        *(line for campaign in FAULT_CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
     ]
 
 
 def tables(case_data: Saved) -> list[Table]:
     """Tables of all faults, and for each system of the errors and descriptions of the checks."""
-    lines = _fault_lines(case_data)
+    lines = _fault_table_lines(case_data)
     systems = len({line[0] for line in lines})
     note = (
         f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
@@ -95,7 +99,7 @@ def tables(case_data: Saved) -> list[Table]:
     return [
         overview,
         *pitch_plane.tables(case_data["pitch-plane"]),
-        *(campaign.table(case_data[campaign.id]) for campaign in CAMPAIGNS),
+        *(campaign.table(case_data[campaign.id]) for campaign in FAULT_CAMPAIGNS),
     ]
 
 

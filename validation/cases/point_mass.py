@@ -23,7 +23,7 @@ STEP_COUNTS = (10, 1_000_000)
 END_TIME = 10.0
 RELATIVE_TOLERANCE = 1e-10
 
-Matrix = list[list[Decimal]]
+DecimalMatrix = list[list[Decimal]]
 BOUND_REASON = (
     "the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
     "integral and no digit shared with the closed form"
@@ -34,8 +34,8 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for both covariances compared with 60-digit arithmetic, for their difference, and for Monte Carlo; a quick
     run has 2000 paths."""
     exact = {
-        "continuous": [_continuous_error(x) for x in DAMPING_PRODUCTS],
-        **{f"{n} steps": [_discrete_error(x, n) for x in DAMPING_PRODUCTS] for n in STEP_COUNTS},
+        "continuous": [_continuous_covariance_error(x) for x in DAMPING_PRODUCTS],
+        **{f"{n} steps": [_discrete_covariance_error(x, n) for x in DAMPING_PRODUCTS] for n in STEP_COUNTS},
     }
     rows = [
         Observed(
@@ -65,7 +65,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {"errors": exact, "differences": differences}
 
 
-def _matrix_power(matrix: Matrix, exponent: int) -> Matrix:
+def _matrix_power(matrix: DecimalMatrix, exponent: int) -> DecimalMatrix:
     """Integer power of a matrix, by squaring."""
     size = range(len(matrix))
     product = [[Decimal(int(i == j)) for j in size] for i in size]
@@ -76,14 +76,18 @@ def _matrix_power(matrix: Matrix, exponent: int) -> Matrix:
     return product
 
 
-def _matrix_product(a: Matrix, b: Matrix) -> Matrix:
+def _matrix_product(first_matrix: DecimalMatrix, second_matrix: DecimalMatrix) -> DecimalMatrix:
+    """Product of two matrices in decimal arithmetic."""
     return [
-        [sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0)) for column in zip(*b, strict=True)]
-        for row in a
+        [
+            sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0))
+            for column in zip(*second_matrix, strict=True)
+        ]
+        for row in first_matrix
     ]
 
 
-def _matrix_exponential(matrix: Matrix) -> Matrix:
+def _matrix_exponential(matrix: DecimalMatrix) -> DecimalMatrix:
     """Matrix exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
     small = [[value / 2**20 for value in row] for row in matrix]
     term = total = _matrix_power(small, 0)
@@ -93,24 +97,24 @@ def _matrix_exponential(matrix: Matrix) -> Matrix:
     return _matrix_power(total, 2**20)
 
 
-def _continuous_error(damping_product: float) -> float:
+def _continuous_covariance_error(damping_product: float) -> float:
     """Largest relative error of the continuous covariance P of position x and velocity v. Exact: d/dt (Pxx, Pxv, Pvv) =
     (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv), with damping eta and noise intensity s^2."""
     eta = damping_product / END_TIME
     with localcontext(prec=DECIMAL_DIGITS):
         e, t = Decimal(eta), Decimal(END_TIME)
         gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
-        rates: Matrix = [
+        rates: DecimalMatrix = [
             [Decimal(0), 2 * t, Decimal(0), Decimal(0)],
             [Decimal(0), -e * t, t, Decimal(0)],
             [Decimal(0), Decimal(0), -2 * e * t, gain * t],
             [Decimal(0)] * 4,
         ]
         truth = [row[3] for row in _matrix_exponential(rates)]
-        return _largest_relative_error(continuous_covariance(END_TIME, DEVIATION, STEP, MASS, eta), truth)
+        return _largest_covariance_error(continuous_covariance(END_TIME, DEVIATION, STEP, MASS, eta), truth)
 
 
-def _discrete_error(damping_product: float, step_count: int) -> float:
+def _discrete_covariance_error(damping_product: float, step_count: int) -> float:
     """Largest relative error of the discrete covariance, compared with the matrix recursion of an Euler step in
     60-digit arithmetic. ``step_count`` steps make END_TIME."""
     step = END_TIME / step_count
@@ -118,20 +122,21 @@ def _discrete_error(damping_product: float, step_count: int) -> float:
     with localcontext(prec=DECIMAL_DIGITS):
         d = Decimal(step)
         r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
-        recursion: Matrix = [
+        recursion: DecimalMatrix = [
             [Decimal(1), 2 * d, d * d, Decimal(0)],
             [Decimal(0), r, d * r, Decimal(0)],
             [Decimal(0), Decimal(0), r * r, kick],
             [Decimal(0)] * 3 + [Decimal(1)],
         ]
         truth = [row[3] for row in _matrix_power(recursion, step_count)]
-        return _largest_relative_error(euler_covariance(step_count, DEVIATION, step, MASS, eta), truth)
+        return _largest_covariance_error(euler_covariance(step_count, DEVIATION, step, MASS, eta), truth)
 
 
-def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal]) -> float:
+def _largest_covariance_error(covariance: np.ndarray, exact_values: Sequence[Decimal]) -> float:
+    """Largest relative error of the entries xx, xv and vv of a covariance."""
     return max(
         float(abs(Decimal(float(value)) / true - 1))
-        for value, true in zip(computed_values[[0, 0, 1], [0, 1, 1]], truth, strict=False)
+        for value, true in zip(covariance[[0, 0, 1], [0, 1, 1]], exact_values, strict=False)
     )
 
 

@@ -34,17 +34,17 @@ ROAD_LEVELS = (1.0, 4.0, 16.0)
 """Road levels as factors on the paper's: about class C, E, and G, where the stops are hit all the time."""
 COPY_COUNTS, COPY_SECONDS = (60, 400), (1.5, 10.0)
 """Number of Monte Carlo copies in a quick and in a full run; and their length (s)."""
-MILD_DAMPING = 1500.0
+SINGLE_LAW_DAMPING = 1500.0
 """Damping (N s/m) of the spring whose friction or stops are tested alone."""
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of gains, fixed point, one road level and a short run in time; a full run has three levels and a vehicle of
     19 degrees of freedom in time."""
-    rows = [*_gain_rows(), *_fixed_point_rows()]
+    rows = [*_equivalent_gain_rows(), *_fixed_point_rows()]
     table = []
     for level in ROAD_LEVELS[: 1 if quick else None]:
-        level_rows, line = _level_rows(level, quick)
+        level_rows, line = _road_level_rows(level, quick)
         rows += level_rows
         table.append(line)
     rows += nonlinear_engine_rows(quick)
@@ -55,7 +55,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + level_rows, {"levels": table, "spectra": shown}
 
 
-def _gain_rows() -> list[Row]:
+def _equivalent_gain_rows() -> list[Row]:
     """Rows: equivalent gains by closed forms compared with their defining integrals, for damper, bump stops and dry
     friction."""
     spring = vehicle_and_road(NONLINEAR_VEHICLE)[0].springs[0]
@@ -101,12 +101,12 @@ def _gain_rows() -> list[Row]:
     ]
 
 
-def normal_expectation(law: Any, cuts: Any) -> float:
+def normal_expectation(force_law: Any, corners: Any) -> float:
     """Expected value of law(x) for a standard normal x, integrated piece by piece between the law's corners
-    ``cuts``."""
-    edges = np.unique(np.clip([-12.0, *cuts, 12.0], -12.0, 12.0))
+    ``corners``."""
+    edges = np.unique(np.clip([-12.0, *corners, 12.0], -12.0, 12.0))
     integrals = [
-        quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
+        quad(lambda x: force_law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
         for a, b in pairwise(edges)
     ]
     return float(sum(integrals)) / np.sqrt(2 * np.pi)
@@ -148,7 +148,7 @@ def _fixed_point_rows() -> list[Row]:
     ]
 
 
-def _level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
+def _road_level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
     """Rows at one road level: standard deviations and mean travel by statistical linearisation, compared with Monte
     Carlo. The tolerance of each is the accuracy that the result states."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
@@ -218,9 +218,9 @@ def _single_law_rows() -> list[Row]:
         "damper": (4.0, {"travel_force": None, "friction": 0.0}),
         "friction of 100 N": (
             0.25,
-            {"travel_force": None, "rate_force": None, "damping": MILD_DAMPING, "friction": 100.0},
+            {"travel_force": None, "rate_force": None, "damping": SINGLE_LAW_DAMPING, "friction": 100.0},
         ),
-        "stops": (64.0, {"rate_force": None, "damping": MILD_DAMPING, "friction": 0.0}),
+        "stops": (64.0, {"rate_force": None, "damping": SINGLE_LAW_DAMPING, "friction": 0.0}),
     }
     rows = []
     for name, (level, laws) in law_cases.items():

@@ -39,7 +39,7 @@ TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
 STATE_COUNT, QUICK_STATE_COUNT = 100, 5
 SOLVER_TOLERANCE = 1e-8
-SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+SCENE_FOLDER = Path(__file__).parents[2] / "studies" / "scenes"
 EXPORTED_SCENES = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
 """Scenes whose vehicle is written as MJCF by ``twinrig export`` and read again."""
 IGNORED_CONTENT = tuple(kind for kind in CONTENT_KINDS if kind not in ("flex", "turning_law"))
@@ -54,49 +54,55 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     if not quick:
         texts |= {f"chain_{count}": random_chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": random_tree(4 + 2 * seed, seed) for seed in range(1, 8)}
-    rows = [_agreement_row(name, _file_of_text(work_folder, name, text), quick) for name, text in texts.items()]
+    rows = [_agreement_row(name, _model_file_of_text(work_folder, name, text), quick) for name, text in texts.items()]
     rows += (
-        [] if quick else [_agreement_row(name, _exported_file(work_folder, name), quick) for name in EXPORTED_SCENES]
+        []
+        if quick
+        else [_agreement_row(name, _model_file_of_exported_scene(work_folder, name), quick) for name in EXPORTED_SCENES]
     )
     return [
         *rows,
         _soft_constraint_row(work_folder, "geared", GEARED),
         _soft_constraint_row(work_folder, "linked", LINKED),
-        *_cart_rows(work_folder),
+        *_cart_path_rows(work_folder),
         _planted_differences_row(work_folder, quick),
     ], {}
 
 
-def _file_of_text(work_folder: Path, name: str, text: str, ignored_content: tuple[str, ...] = ()) -> ModelFile:
-    path = work_folder / f"{name}{'.urdf' if '<robot' in text else '.xml'}"
-    path.write_text(text, encoding="utf-8")
+def _model_file_of_text(
+    work_folder: Path, model_name: str, model_text: str, ignored_content: tuple[str, ...] = ()
+) -> ModelFile:
+    """Write the text of a model to an MJCF or URDF file, and read the file."""
+    path = work_folder / f"{model_name}{'.urdf' if '<robot' in model_text else '.xml'}"
+    path.write_text(model_text, encoding="utf-8")
     return read(path, ignored_content)
 
 
-def _exported_file(work_folder: Path, scene_name: str) -> ModelFile:
-    scene = load(SCENES / f"{scene_name}.toml")
+def _model_file_of_exported_scene(work_folder: Path, scene_name: str) -> ModelFile:
+    """Export the vehicle of a scene as MJCF, and read the file."""
+    scene = load(SCENE_FOLDER / f"{scene_name}.toml")
     answer = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, "mujoco")
-    return _file_of_text(work_folder, f"exported_{scene_name}", answer.text, IGNORED_CONTENT)
+    return _model_file_of_text(work_folder, f"exported_{scene_name}", answer.text, IGNORED_CONTENT)
 
 
-def _agreement_row(model_name: str, file: ModelFile, quick: bool) -> Row:
+def _agreement_row(model_name: str, model_file: ModelFile, quick: bool) -> Row:
     """Row: largest difference of accelerations from the model file, over the models of all engines."""
-    agreements = certificate(file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
+    agreements = certificate(model_file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
     worst: Agreement = max(agreements, key=lambda agreement: agreement.acceleration)
     return Observed(
         f"twin_files.{model_name}",
         SYSTEM,
         f"largest difference of accelerations in Exudyn, MuJoCo and plain equations from the file as MuJoCo parsed it, "
-        f"{file.twin.size} coordinates, {model_name}",
+        f"{model_file.twin.size} coordinates, {model_name}",
         worst.acceleration,
         "of its size",
     ).at_most(SAME, "what counts as alike; an acceleration near 0 is counted by what rounding may make of it", "native")
 
 
-def _soft_constraint_row(work_folder: Path, model_name: str, text: str) -> Row:
+def _soft_constraint_row(work_folder: Path, model_name: str, model_text: str) -> Row:
     """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation in
     independently written equations."""
-    twin = _file_of_text(work_folder, model_name, text).twin
+    twin = _model_file_of_text(work_folder, model_name, model_text).twin
     states = comparison_states(twin, QUICK_STATE_COUNT)
     apart = agreement_of_build(
         "", reference_of_file(twin, states, SOFT_BUILD), motion_at(soft_constraint_equations(twin), states)
@@ -111,10 +117,10 @@ def _soft_constraint_row(work_folder: Path, model_name: str, text: str) -> Row:
     ).at_most(SOLVER_TOLERANCE, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
 
 
-def _cart_rows(work_folder: Path) -> list[Row]:
+def _cart_path_rows(work_folder: Path) -> list[Row]:
     """Rows: largest difference between the states of all engines' models over 1 s, and balance of energy and work, of
     the cart model."""
-    report = compare_paths(_file_of_text(work_folder, "cart", CART).twin)
+    report = compare_paths(_model_file_of_text(work_folder, "cart", CART).twin)
     return [
         Observed(
             "twin_files.path",
@@ -135,10 +141,10 @@ def _cart_rows(work_folder: Path) -> list[Row]:
 
 def _planted_differences_row(work_folder: Path, quick: bool) -> Row:
     """Row: number of planted differences that the comparison names first, with their right size."""
-    first, named = _file_of_text(work_folder, "original", JOINTED).twin, 0
+    first, named = _model_file_of_text(work_folder, "original", JOINTED).twin, 0
     chosen = PLANTED_DIFFERENCES[::5] if quick else PLANTED_DIFFERENCES
     for name, old, new, kind, owner, size in chosen:
-        second = _file_of_text(work_folder, "planted", model_with_change(JOINTED, name, old, new)).twin
+        second = _model_file_of_text(work_folder, "planted", model_with_change(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
         sentence = influential[0].sentence(("original", "planted")) if influential else ""
         named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence

@@ -37,17 +37,17 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of cars on hub forces and of cars on rolling tyres; a quick run has fewer states and simulates a few
     steps."""
     states, duration = (QUICK_STATE_COUNT, QUICK_DURATION) if quick else (STATE_COUNT, DURATION)
-    return [*_law_rows(states), *_hub_rows(states, duration), *_rolling_rows(states, duration)], {}
+    return [*_force_law_rows(states), *_hub_force_car_rows(states, duration), *_rolling_car_rows(states, duration)], {}
 
 
-def _plain_equations_row(row_name: str, quantity_name: str, largest_error: float, unit: str, bound: float) -> Row:
+def _plain_equations_row(row_name: str, quantity_name: str, largest_error: float, unit: str, error_bound: float) -> Row:
     """Row that compares the independently written equations with another implementation of the same laws."""
     return Observed(f"written.{row_name}", SYSTEM, quantity_name, largest_error, unit).at_most(
-        bound, INDEPENDENCE_NOTE, "native"
+        error_bound, INDEPENDENCE_NOTE, "native"
     )
 
 
-def _law_rows(state_count: int) -> list[Row]:
+def _force_law_rows(state_count: int) -> list[Row]:
     """Rows on the creep forces of the tyre, and on the preloads in the design position."""
     rows = [
         _plain_equations_row(
@@ -77,7 +77,7 @@ def _law_rows(state_count: int) -> list[Row]:
     return rows
 
 
-def _hub_rows(state_count: int, duration: float) -> list[Row]:
+def _hub_force_car_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on vehicles that are cut at their wheels and driven by hub forces."""
     rows = []
     for name, car in cut_cars().items():
@@ -115,7 +115,7 @@ def _hub_rows(state_count: int, duration: float) -> list[Row]:
     return rows
 
 
-def _rolling_rows(state_count: int, duration: float) -> list[Row]:
+def _rolling_car_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on cars on rolling tyres: accelerations, tyre reports, and simulations."""
     rows = []
     for name, car in rolling_cars().items():
