@@ -71,7 +71,7 @@ def test_a_refused_scene_is_drawn_anew_and_told(refusing, tmp_path):
 
 
 def test_one_that_is_refused_again_and_again_is_not_held(refusing, tmp_path, monkeypatch):
-    monkeypatch.setattr(case, "REDRAWS", 1)
+    monkeypatch.setattr(case, "REDRAW_COUNT", 1)
     found, refused = case.verdicts_on_scene("pitch-plane", 5, tmp_path)
     rows = {row.id: row for row in case._promise_rows([found, *[[GOOD]] * 9], refused)}
     assert found == [] and rows["recommendation.met"].value == 0.9

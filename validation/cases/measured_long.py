@@ -150,9 +150,8 @@ def _equal_blocks_row(work_folder: Path, engine_name: str, stabiliser: str, reco
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     run_folder = work_folder / f"blocks {recording_seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = section_run_of_recording(
-        run_folder, recording_seconds, PATTERN_SECONDS, engine_name, AttitudeHold(stabiliser)
-    )  # type: ignore[arg-type]
+    hold = AttitudeHold(stabiliser)  # type: ignore[arg-type]
+    job = section_run_of_recording(run_folder, recording_seconds, PATTERN_SECONDS, engine_name, hold)
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine_name} {stabiliser} {block}"
