@@ -25,7 +25,7 @@ from validation.absence.probes import (
 )
 from validation.cases import absent, effect_prices
 from validation.cases.absent import (
-    EFFECTS,
+    EFFECT_NAMES,
     ENGINES,
     FORCE_EFFECT,
     component_count_changes,
@@ -146,7 +146,7 @@ def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", EFFECT_NAMES)
 def test_an_effect_changes_the_counts_by_what_it_declares(effect, engine, folder):
     assert component_count_changes(effect, engine, folder) == declared_count_changes(effect, engine)
 

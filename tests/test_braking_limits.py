@@ -63,7 +63,7 @@ def test_rows_of_limits_hold():
     found = [
         rows._jackknife_row(),
         *rows._rollover_rows(),
-        rows._slow_apply_row(),
+        rows._slow_pressure_rise_row(),
         rows._limit_cycle_row(),
         rows._split_friction_yaw_row(1.0),
     ]

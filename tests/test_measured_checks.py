@@ -88,7 +88,9 @@ def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_pat
 def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
     assert all(
         row.status == "passed"
-        for row in case._fault_rows(fault, bench.planted_findings(ridden, tmp_path, fault.spoil, **fault.faults))
+        for row in case._planted_fault_rows(
+            fault, bench.planted_findings(ridden, tmp_path, fault.spoil, **fault.faults)
+        )
     )
 
 

@@ -15,7 +15,7 @@ from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDam
 from models.vehicles.spatial_linear import linearise
 from validation.cases.ride_engines import (
     GRAVITY,
-    SPEED,
+    TRAVEL_SPEED,
     matrix_difference,
     random_state,
     relative_difference,
@@ -35,8 +35,8 @@ def settings(engine, duration=0.02, step=1e-3):
 def test_linear_vehicle_is_the_analytic_one(engine, name, gravity):
     """1e-11: a factor of 7 above what MuJoCo's differences leave of a force of 1 N beside preloads of 5 kN."""
     vehicle = shipped_vehicle_or_twin(name, gravity)
-    found = build(engine, vehicle, speed=SPEED).linearise()
-    assert matrix_difference(found, linearise(vehicle, SPEED)) < 1e-11
+    found = build(engine, vehicle, speed=TRAVEL_SPEED).linearise()
+    assert matrix_difference(found, linearise(vehicle, TRAVEL_SPEED)) < 1e-11
     assert found.source == f"{engine}, " + ("loaded" if gravity else "unloaded")
 
 
@@ -61,8 +61,8 @@ def test_accelerations_agree_with_the_equations_by_hand():
     """Large random motion of the vehicle that no symmetry helps, curves, gravity, road: rounding only."""
     vehicle = with_nonlinear_springs(shipped_vehicle_or_twin("spatial twin", GRAVITY))
     exudyn, mujoco_, reference = (
-        *(build(engine, vehicle, speed=SPEED) for engine in ENGINES),
-        SpatialReference(vehicle, SPEED),
+        *(build(engine, vehicle, speed=TRAVEL_SPEED) for engine in ENGINES),
+        SpatialReference(vehicle, TRAVEL_SPEED),
     )
     for path in range(5):
         state = random_state(vehicle, path)
@@ -168,7 +168,7 @@ def test_road_is_read_at_half_steps(engine):
 def test_design_position_is_an_equilibrium(engine):
     vehicle = shipped_vehicle_or_twin("spatial twin", GRAVITY)
     zero = np.zeros(len(vehicle.coordinates()))
-    assert np.abs(build(engine, vehicle, speed=SPEED).acceleration(0.0, zero, zero)).max() < 1e-10
+    assert np.abs(build(engine, vehicle, speed=TRAVEL_SPEED).acceleration(0.0, zero, zero)).max() < 1e-10
 
 
 def test_no_curve_code_without_curves():

@@ -42,7 +42,7 @@ PRESCRIBED_PITCH_SETTINGS = {"integrator": "GeneralizedAlpha"}
 """Exudyn settings for a scene with a prescribed pitch: only this integrator solves for the prescribed pitch. The scene
 without the effect uses the same settings."""
 
-EFFECTS = names_of(DEFAULT_SYSTEM)
+EFFECT_NAMES = names_of(DEFAULT_SYSTEM)
 """Names of all effects of the pitch-plane vehicle."""
 
 
@@ -90,7 +90,7 @@ def engine_model(simulated_scene: Scene, engine_name: str) -> Model:
     return build(engine_name, assembly_of_scene(simulated_scene), settings_of(simulated_scene, engine_name))
 
 
-def scenes_without_and_with(effect_name: str, step_count: int, work_folder: Path) -> tuple[Scene, Scene]:
+def scenes_without_and_with_effect(effect_name: str, step_count: int, work_folder: Path) -> tuple[Scene, Scene]:
     """Two scenes that differ by one effect: the first without the effect, the second with the effect."""
     needed, prescribed, module = (
         required_effects(effect_name),
@@ -103,7 +103,7 @@ def scenes_without_and_with(effect_name: str, step_count: int, work_folder: Path
     return scene_below, scene_with_effects({**needed, effect_name: module.EXAMPLE}, step_count, work_folder, prescribed)
 
 
-def counts_of_scene(simulated_scene: Scene, engine_name: str) -> dict[str, int]:
+def component_counts_of_scene(simulated_scene: Scene, engine_name: str) -> dict[str, int]:
     """Numbers of components in an engine's model of a scene, and of the channels that are saved."""
     return {
         **engine_model(simulated_scene, engine_name).plan(),
@@ -115,7 +115,8 @@ def component_count_changes(effect_name: str, engine_name: str, work_folder: Pat
     """Changes of the numbers of components in an engine's model when an effect is added; unchanged numbers are left
     out."""
     before, after = (
-        counts_of_scene(bare, engine_name) for bare in scenes_without_and_with(effect_name, 20, work_folder)
+        component_counts_of_scene(bare, engine_name)
+        for bare in scenes_without_and_with_effect(effect_name, 20, work_folder)
     )
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
@@ -135,15 +136,18 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
         write_input_files(files_folder)
-        rows = [*_import_rows(), *(row for engine in ENGINES for row in _absence_rows(engine, files_folder))]
+        rows = [
+            *_imported_module_rows(),
+            *(row for engine in ENGINES for row in _cost_of_absence_rows(engine, files_folder)),
+        ]
         rows += [
             _positive_control_row(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
-            for i, effect in enumerate(EFFECTS)
+            for i, effect in enumerate(EFFECT_NAMES)
         ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
 
 
-def _import_rows() -> list[Row]:
+def _imported_module_rows() -> list[Row]:
     """Rows: number of effect modules imported, and of kernels compiled, by a fresh process that ran a scene without
     effects in all engines."""
     probed = probe({"title": TITLE, "run": {"duration": 20 * TIME_STEP, "step": TIME_STEP}, "start": START_MOTION})
@@ -164,7 +168,7 @@ def _import_rows() -> list[Row]:
     ]
 
 
-def _absence_rows(engine_name: str, work_folder: Path) -> list[Row]:
+def _cost_of_absence_rows(engine_name: str, work_folder: Path) -> list[Row]:
     """Rows: Python function calls, memory and callbacks that 1,980 more steps of a scene without effects need. All must
     be zero."""
     for bare in (

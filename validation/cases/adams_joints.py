@@ -39,7 +39,7 @@ QUICK_JOINT_FAMILIES = ("Revolute", "Distance")
 MODEL_FILE_NAMES = {"TranSpring": "TransSpring"}
 """Model file names of the joint families whose file has another name."""
 ENGINES = ("exudyn", "mujoco")
-STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
+TIME_STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
 """Step (s); number of steps for each row of the output files; lengths (s) of a full and of a quick run."""
 MJCF_STEP_RATIO = 5
 """Number of steps of the joints in MJCF for each step of the other runs. The spring of the free body has no length at
@@ -160,11 +160,11 @@ def joint_family_rows(
     """Rows for one joint family: positions and reactions of all engines compared with the output file, reactions on the
     motion in the file, and the engines compared with the reference equations."""
     duration = min(QUICK_DURATION if quick else DURATION, float(output_file.times[-1]))
-    motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, STEPS_PER_ROW)
+    motion, reaction = ConstrainedBody(mechanism).run(duration, TIME_STEP, STEPS_PER_ROW)
     runs = {"reference": (motion, reaction)}
     tree = joint_tree(mechanism, motion)
-    runs |= {engine: tree.run(engine, duration, STEP, STEPS_PER_ROW) for engine in ENGINES}
-    rows = [_file_motion_row(joint_family, mechanism, output_file)]
+    runs |= {engine: tree.run(engine, duration, TIME_STEP, STEPS_PER_ROW) for engine in ENGINES}
+    rows = [_reaction_on_file_motion_row(joint_family, mechanism, output_file)]
     for name, (path, pushed) in runs.items():
         rows += _rows_against_output_file(joint_family, name, mechanism, output_file, path, pushed)
     if not mechanism.springs and output_file.energy_lost(mechanism) > ENERGY_LOSS_LIMIT:
@@ -177,7 +177,7 @@ def joint_family_rows(
 def mjcf_rows(joint_family: str, mechanism: Mechanism, work_folder: Path, duration: float) -> list[Row]:
     """Rows for the joint as an MJCF model: the certificate of ``twinrig twin``, and positions compared with those by
     constraint equations."""
-    step, every = STEP / MJCF_STEP_RATIO, MJCF_STEP_RATIO * STEPS_PER_ROW
+    step, every = TIME_STEP / MJCF_STEP_RATIO, MJCF_STEP_RATIO * STEPS_PER_ROW
     accelerations, paths = build_differences(mechanism, work_folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{joint_family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
@@ -216,7 +216,7 @@ def _reaction_difference(
     return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
 
 
-def _file_motion_row(joint_family: str, mechanism: Mechanism, output_file: OutputFile) -> Row:
+def _reaction_on_file_motion_row(joint_family: str, mechanism: Mechanism, output_file: OutputFile) -> Row:
     """Row: difference of the file's reactions from those that Newton's and Euler's equations give for the file's
     motion; no integration is involved."""
     off = _reaction_difference(mechanism, output_file.reaction_of_motion(mechanism), output_file.reaction())
@@ -274,9 +274,9 @@ def _restart_row(joint_family: str, mechanism: Mechanism, output_file: OutputFil
     position is subtracted.
     """
     body, theirs = ConstrainedBody(mechanism), output_file.motion(mechanism)
-    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW_ROW_COUNT, WINDOW_ROW_COUNT)
+    starts = np.arange(0, round(duration / TIME_STEP / STEPS_PER_ROW) - WINDOW_ROW_COUNT, WINDOW_ROW_COUNT)
     ends = [
-        body.state_after(body.state_at_row(theirs, k), WINDOW_ROW_COUNT * STEPS_PER_ROW, STEP)[:3]
+        body.state_after(body.state_at_row(theirs, k), WINDOW_ROW_COUNT * STEPS_PER_ROW, TIME_STEP)[:3]
         for k in starts.tolist()
     ]
     digits = output_file.rounding_error("Pos")[starts] + output_file.rounding_error("Pos")[starts + WINDOW_ROW_COUNT]
@@ -287,7 +287,7 @@ def _restart_row(joint_family: str, mechanism: Mechanism, output_file: OutputFil
     lost = (
         np.abs(total_energy[starts + WINDOW_ROW_COUNT] - total_energy[starts])
         / (mechanism.mass * fastest)
-        * (WINDOW_ROW_COUNT * STEPS_PER_ROW * STEP)
+        * (WINDOW_ROW_COUNT * STEPS_PER_ROW * TIME_STEP)
     )
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{joint_family}: position 0.1 s after each of the file's own states, reference"
@@ -310,7 +310,7 @@ def _same_pendulum_rows(
         read_output(revolute_path),
         Rotation.from_euler("z", -ANGLES_FROM_REVOLUTE[joint_family], degrees=True),
     )
-    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
+    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), TIME_STEP, STEPS_PER_ROW)
     file_position, force = hinge.columns["Pos"], hinge.columns["Rforce"]
     off = float((np.abs(back.apply(motion.position) - file_position) - hinge.rounding_error("Pos")).max())
     pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding_error("Rforce")).max())

@@ -37,10 +37,10 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: published figures, the limit of ideal rolling, energy, and the measured bicycle. A quick run simulates half
     a second, and omits the predictions with one speed left out."""
     benchmark = load_bicycle("benchmark")
-    rows = [*_published_rows(benchmark), *_fault_rows(benchmark)]
+    rows = [*_published_benchmark_rows(benchmark), *_planted_fault_rows(benchmark)]
     gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINES}
     rows += [*_stiff_tyre_limit_rows(gaps), *_energy_rows(0.5 if quick else 5.0)]
-    measured_rows, data = _measured_rows(quick)
+    measured_rows, data = _measured_bicycle_rows(quick)
     return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
 
 
@@ -82,7 +82,7 @@ def _convergence_order_text(eigenvalue_gaps: list[float], stiffness_index: int) 
     return f"{np.log(eigenvalue_gaps[stiffness_index - 1] / eigenvalue_gaps[stiffness_index]) / np.log(stiffer):.3f}"
 
 
-def _published_rows(bicycle: Whipple) -> list[Row]:
+def _published_benchmark_rows(bicycle: Whipple) -> list[Row]:
     """Rows: matrices, eigenvalues and critical speeds of the benchmark bicycle compared with the published ones."""
     M, C1, K0, K2 = bicycle.linear
     matrices = zip((M, C1, bicycle.gravity * K0, K2), PUBLISHED_MATRICES.values(), strict=True)
@@ -101,7 +101,7 @@ def _published_rows(bicycle: Whipple) -> list[Row]:
     ]
 
 
-def _fault_rows(bicycle: Whipple) -> list[Row]:
+def _planted_fault_rows(bicycle: Whipple) -> list[Row]:
     """Row: a trail that is 0.1 % longer must change an eigenvalue by far more than the tolerance of the published
     figures."""
     wrong = bicycle.changed(trail=PLANTED_TRAIL_FACTOR * bicycle.trail)
@@ -179,7 +179,7 @@ def _energy_rows(duration: float) -> list[Row]:
     return [*rows, seen.within(1.019e-3, 1e-5, "the ledger sees a planted fault a hundred thousand times", "none")]
 
 
-def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
+def _measured_bicycle_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     """Rows on the measured bicycle: predictions with nothing fitted, and predictions for each speed with parameters
     that were chosen and fitted on the other speeds."""
     root = os.environ.get("TWINRIG_DATA")

@@ -55,7 +55,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for speed in (11.11, 22.2)
         for name in CONTROLLER_NAMES
     }
-    return [*rows, *_stop_rows(stops), *_substep_rows(), *_ensemble_rows()], {"stops": stops}
+    return [*rows, *_stop_rows(stops), *_substep_rows(), *_ice_stop_ensemble_rows()], {"stops": stops}
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
@@ -156,7 +156,7 @@ def _air_supply_row() -> Row:
     ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
 
 
-def _wheel_at_constant_speed(spin_inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
+def _front_wheel_at_constant_speed(spin_inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
     """A front wheel on dry road whose vehicle keeps its speed."""
     return WheelAtSpeed(
         11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, spin_inertia, LINEAR_BRAKE, table_of_surface("dry")
@@ -166,11 +166,11 @@ def _wheel_at_constant_speed(spin_inertia: float = FRONT_WHEEL.spin_inertia) -> 
 def _limit_cycle_rows(controller_name: str) -> list[Row]:
     """Rows: period and friction utilisation of a five-phase controller's limit cycle, compared with exact values."""
     cycle, (period, used) = (
-        limit_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
-        exact_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+        limit_cycle(_front_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+        exact_cycle(_front_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
     )
     wrong = exact_cycle(
-        _wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[controller_name]
+        _front_wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[controller_name]
     )[0]
     return [
         Observed(
@@ -202,7 +202,7 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
             "relative difference of the period with samples of 5.5 ms from the period of the "
             f"continuous controller, {controller_name}",
             sampled_cycle(
-                _wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
+                _front_wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
             ).period
             / cycle.period
             - 1.0,
@@ -240,9 +240,9 @@ def stop_results(surface_name: str, controller_name: str, start_speed: float) ->
     }
 
 
-def _longest_true_sequence(flags: np.ndarray) -> int:
+def _longest_true_sequence(truth_values: np.ndarray) -> int:
     """Length of the longest uninterrupted sequence of true values."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
+    ends = np.flatnonzero(np.diff(np.concatenate(([False], truth_values, [False])).astype(int)))
     return int((ends[1::2] - ends[::2]).max(initial=0))
 
 
@@ -287,7 +287,7 @@ def _substep_rows() -> list[Row]:
     return rows
 
 
-def _ensemble_rows(run_count: int = 24, fine_substep_count: int = 32) -> list[Row]:
+def _ice_stop_ensemble_rows(run_count: int = 24, fine_substep_count: int = 32) -> list[Row]:
     """Rows: two ensembles of stops on ice from slightly varied speeds, with different numbers of substeps. Single stops
     on ice do not repeat."""
     random = np.random.default_rng(SEED)

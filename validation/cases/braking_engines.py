@@ -30,7 +30,7 @@ from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"
-STEP, SPEED, LAST_SPEED, STEER = 1e-3, 11.11, 0.5, 0.03
+TIME_STEP, START_SPEED, END_SPEED, STEER_ANGLE = 1e-3, 11.11, 0.5, 0.03
 """Step (s), initial and final speed (m/s), and steer angle (rad) of the braked turn."""
 BRAKE_TORQUES = (870.0, 580.0)
 """Brake torque (N m) of each front and of each rear wheel: the truck goes 60 m, and no wheel locks."""
@@ -41,9 +41,9 @@ STIFF_TYRE_SLOPE = 100.0
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the braked turn in engines, by hand-written equations and mirrored, of straight braking, and of the
     trailer. A quick run brakes down to 10 m/s only."""
-    until = 10.0 if quick else LAST_SPEED
+    until = 10.0 if quick else END_SPEED
     compiled = braked_truck_turn(until)
-    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER, BRAKE_TORQUES, SPEED, until)}
+    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER_ANGLE, BRAKE_TORQUES, START_SPEED, until)}
     beside |= {
         name: braked_truck_turn(until, step_function=EngineChassis(name, PAPER_PLANE).advance)
         for name in ("exudyn", "mujoco")
@@ -68,7 +68,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             f"braking_engines.speed.{steps}",
             SYSTEM,
             f"speed of a compiled truck with a bang-bang slip controller on ice, samples of 5.5 ms in {steps} step(s)",
-            simulation_speed(steps),
+            real_time_factor(steps),
             "times real time",
         ).aim(100.0, "asked for; by the processor's time, which wanders", "at least")
         for steps in (1, 4)
@@ -78,32 +78,32 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def braked_truck_turn(
-    end_speed: float, steer_angle: float = STEER, step_function: Callable[..., Any] = advance
+    end_speed: float, steer_angle: float = STEER_ANGLE, step_function: Callable[..., Any] = advance
 ) -> TurnEnd:
-    """End of a braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s), interpolated linearly within the
-    last step."""
+    """End of a braked turn of the truck on ice from START_SPEED down to ``end_speed`` (m/s), interpolated linearly
+    within the last step."""
     truck = RollingTruck(
         on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
-        SPEED,
+        START_SPEED,
         steer=steer_angle,
         step_function=step_function,
     )
     while True:
         passed, position, fast = truck.time, truck.state[0].copy(), truck.speed
-        status, used = truck.on(np.repeat(BRAKE_TORQUES, 2), STEP)
+        status, used = truck.on(np.repeat(BRAKE_TORQUES, 2), TIME_STEP)
         if status != FINE or truck.speed <= end_speed:
             share = (fast - end_speed) / (fast - truck.speed)
             x, y, heading = (float(value) for value in position + share * (truck.state[0] - position))
             return TurnEnd(x, y, heading, float(passed + share * used))
 
 
-def simulation_speed(substep_count: int) -> float:
+def real_time_factor(substep_count: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
     vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
-    vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
+    vehicle.run(SlipBangBang(wheels=4), START_SPEED, 0.1)
     start = time.process_time()
-    path = vehicle.run(SlipBangBang(wheels=4), SPEED)
+    path = vehicle.run(SlipBangBang(wheels=4), START_SPEED)
     return float(path.times[-1]) / (time.process_time() - start)
 
 
@@ -133,7 +133,7 @@ def _axle_load_rows() -> list[Row]:
 
 def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
     """Rows: a turn compared with its mirror image, and no yaw without steering."""
-    mirrored, straight = braked_truck_turn(end_speed, -STEER), braked_truck_turn(end_speed, 0.0)
+    mirrored, straight = braked_truck_turn(end_speed, -STEER_ANGLE), braked_truck_turn(end_speed, 0.0)
     apart = max(
         abs(mirrored.x - steered_turn.x), abs(mirrored.y + steered_turn.y), abs(mirrored.heading + steered_turn.heading)
     )

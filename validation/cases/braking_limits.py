@@ -44,7 +44,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all limits. A quick run takes three of the random stops, and one speed of the slow stops on split
     friction."""
     ends = [random_stop_ending(number) for number in range(STOP_COUNTS[quick])]
-    rows = [_random_stops_row(ends), _jackknife_row(), *_rollover_rows(), _slow_apply_row(), _limit_cycle_row()]
+    rows = [_random_stops_row(ends), _jackknife_row(), *_rollover_rows(), _slow_pressure_rise_row(), _limit_cycle_row()]
     rows += [_split_friction_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
     return rows + [_refused_input_row(*refusal_arguments) for refusal_arguments in REFUSED_INPUTS.items()], {
         "ends": ends
@@ -78,7 +78,7 @@ def _braking_scene(**scene_tables: Any) -> Any:
     return build({"system": "braking", "title": "limit", **scene_tables}, "limit.toml")
 
 
-def _error_of_procedure(scene: Any) -> RunFailed | None:
+def _error_of_braking_procedure(scene: Any) -> RunFailed | None:
     """Error with which the only braking procedure of a scene fails; None if the procedure runs to its end."""
     try:
         run(scene)
@@ -90,7 +90,7 @@ def _error_of_procedure(scene: Any) -> RunFailed | None:
 def _jackknife_row() -> Row:
     """Row: largest recorded hinge angle of a truck and trailer that jackknife while the truck's rear wheels slide,
     compared with the limit angle."""
-    end = _error_of_procedure(
+    end = _error_of_braking_procedure(
         _braking_scene(
             vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
             run={"duration": 6.0},
@@ -122,7 +122,7 @@ def _rollover_rows() -> list[Row]:
     that the error states."""
     track, height = 1.8, 2.2
     axle = {"track": track}
-    end = _error_of_procedure(
+    end = _error_of_braking_procedure(
         _braking_scene(
             vehicle={"override": {"height": height, "front": axle, "rear": axle}},
             load_transfer={"front": 0.5},
@@ -153,7 +153,7 @@ def _rollover_rows() -> list[Row]:
     ]
 
 
-def _slow_apply_row() -> Row:
+def _slow_pressure_rise_row() -> Row:
     """Row: pressure in a brake chamber that fills slowly, compared with an exponential."""
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
     air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
@@ -225,10 +225,10 @@ REFUSED_INPUTS: dict[str, Callable[[], Any]] = {
 """Inputs that are physically impossible, each with a function that must raise InputError."""
 
 
-def _refused_input_row(input_name: str, build_refused: Callable[[], Any]) -> Row:
+def _refused_input_row(input_name: str, build_refused_scene: Callable[[], Any]) -> Row:
     """Row: an impossible input is refused by an error that names the entry and its value."""
     try:
-        build_refused()
+        build_refused_scene()
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"

@@ -97,7 +97,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     told = [_process_fault_outcome(kind, work_folder) for kind in (QUICK_PROCESS_FAULTS if quick else PROCESS_FAULTS)]
     told += [_class_fault_outcome(kind, work_folder) for kind in (("catches everything",) if quick else CLASS_FAULTS)]
     told += [] if quick else [_fmu_fault_outcome(kind, work_folder) for kind in FMU_FAULTS]
-    return rows + [row for outcome in told for row in _fault_rows(outcome)], {"costs": costs, "faults": told}
+    return rows + [row for outcome in told for row in _controller_fault_rows(outcome)], {"costs": costs, "faults": told}
 
 
 def _braking_scene_with_port(work_folder: Path, duration: float, port_table: dict[str, Any]) -> Any:
@@ -312,7 +312,7 @@ class _ExchangeClock:
         return self._ask(controller, controller_input, *arguments)
 
 
-def _fault_rows(fault_outcome: dict[str, Any]) -> list[Row]:
+def _controller_fault_rows(fault_outcome: dict[str, Any]) -> list[Row]:
     """Rows: name of the error with which a faulty controller ends the run, and the time until the run ends."""
     well = misbehaving_client.GOOD_SAMPLES
     slow = (

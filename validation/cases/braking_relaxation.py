@@ -18,7 +18,7 @@ SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
 SLIPPERY_FRICTION_FACTOR = 1e-6
 """Friction of the slippery road divided by that of a wet road: so low that steered wheels do not turn the car."""
-SPEED, STEER = 20.0, 0.02
+STEER_STEP_SPEED, STEER_STEP_ANGLE = 20.0, 0.02
 """Speed (m/s) and steer angle (rad) of the steer step."""
 BRAKE_TORQUES = (200.0, 200.0, 100.0, 100.0)
 """Brake torques (N m) of the four wheels, at which no wheel locks."""
@@ -30,7 +30,11 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     engines = ENGINES[1:] if quick else ENGINES
     vehicles = ("car",) if quick else tuple(whole.VEHICLES)
     rows = [_slip_rise_row(engine) for engine in engines] + [_short_relaxation_row("exudyn")]
-    rows += [_plain_code_row(vehicle, engine, 0.05 if quick else 0.2) for vehicle in vehicles for engine in engines]
+    rows += [
+        _stop_against_plain_code_row(vehicle, engine, 0.05 if quick else 0.2)
+        for vehicle in vehicles
+        for engine in engines
+    ]
     if not quick:
         rows.append(_stiff_suspension_row())
     return rows, {}
@@ -51,10 +55,10 @@ def slip_rise_error(engine_name: str, sample_count: int = 20) -> float:
     """Largest error of the rise of the slip angle's tangent after a steer step at constant speed, compared with its
     exponential."""
     slick = table_of_surface("wet").scaled(SLIPPERY_FRICTION_FACTOR)
-    vehicle = replace(braked_vehicle(car(), slick, engine_name, STEER), relaxation=whole.RELAXATION_LENGTHS)
-    path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, sample_count * vehicle.sample - 1e-6)
-    distances = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
-    risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER)
+    vehicle = replace(braked_vehicle(car(), slick, engine_name, STEER_STEP_ANGLE), relaxation=whole.RELAXATION_LENGTHS)
+    path = vehicle.run(steady_torques(*4 * (0.0,)), STEER_STEP_SPEED, sample_count * vehicle.sample - 1e-6)
+    distances = STEER_STEP_SPEED * np.cos(STEER_STEP_ANGLE) * (path.times[1:] - 0.5 * vehicle.sample)
+    risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER_STEP_ANGLE)
     return float(np.abs(risen - (1.0 - np.exp(-distances[:, None] / whole.RELAXATION_LENGTHS[:2]))).max())
 
 
@@ -89,7 +93,7 @@ def relaxation_shift_ratio(engine_name: str) -> float:
     return float(np.abs(long - none).max() / np.abs(short - none).max())
 
 
-def _plain_code_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+def _stop_against_plain_code_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
     """Row: a stop on relaxing tyres in an engine, compared with independently written plain code."""
     path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration, lags=True)
     return Observed(

@@ -55,7 +55,7 @@ SMALLEST_STEP_IN_FIGURE = 5e-4
 """Smallest of the sweep's steps (s) that the figure shows."""
 FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
 """Surfaces on which the sweep takes every brake torque at every step."""
-TORQUE_LEVELS, LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
+TORQUE_LEVELS, TORQUE_LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
 """Brake torques of the sweep divided by the locking torque; and the selection of these levels for the quick run, and
 for other surfaces in steps below the paper's."""
 SLOW_START_SPEED = 0.5
@@ -68,16 +68,18 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all stops. A quick run has the four headline cases, and a sweep with two steps on two surfaces."""
     steps = tuple(step for step in SWEEP_STEPS[quick] if step >= SMALLEST_STEP_IN_FIGURE)
     curves = {
-        name: _distance_errors_by_time_step(*headline_arguments, steps)
+        name: _stopping_distance_errors(*headline_arguments, steps)
         for name, headline_arguments in HEADLINE_CASES.items()
     }
-    rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
+    rows = [row for name, curve in curves.items() for row in _headline_case_rows(name, curve)]
     if not quick:
-        rows += [_distance_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
+        rows += [
+            _stopping_distance_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()
+        ]
     rows += [
         _torque_sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
-            TORQUE_LEVELS[LEVEL_SELECTION] if quick else TORQUE_LEVELS,
+            TORQUE_LEVELS[TORQUE_LEVEL_SELECTION] if quick else TORQUE_LEVELS,
             SWEEP_STEPS[quick],
         ),
         _locked_wheel_row(),
@@ -87,7 +89,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"curves": curves, "steps": steps}
 
 
-def _distance_errors_by_time_step(
+def _stopping_distance_errors(
     surface_name: str, steady_slip: float, start_speed: float, time_steps: tuple[float, ...]
 ) -> dict[str, Any]:
     """Errors of twinrig's and of other integration schemes over the step: relative error of the stopping distance, and
@@ -115,7 +117,7 @@ def _distance_errors_by_time_step(
     }
 
 
-def _headline_rows(case_name: str, error_curves: dict[str, Any]) -> list[Row]:
+def _headline_case_rows(case_name: str, error_curves: dict[str, Any]) -> list[Row]:
     """Rows of a headline case: error of the stopping distance, and that of other integration schemes."""
     key, at = f"braking_stop.{case_name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", error_curves["at"]
     errors = {scheme: curves[at] for scheme, curves in error_curves["errors"].items()}
@@ -153,7 +155,7 @@ def _headline_rows(case_name: str, error_curves: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def _distance_row(
+def _stopping_distance_row(
     case_name: str,
     surface_name: str,
     steady_slip: float,
@@ -211,7 +213,7 @@ def _torque_sweep_row(surface_names: tuple[str, ...], torque_levels: np.ndarray,
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_START_SPEED
         for level in (
-            torque_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else torque_levels[LEVEL_SELECTION]
+            torque_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else torque_levels[TORQUE_LEVEL_SELECTION]
         ):
             faults = broken_plausibility_rules(
                 constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, STANDSTILL_SECONDS),

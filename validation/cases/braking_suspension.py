@@ -49,9 +49,9 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [
             *_locked_wheel_rows(HARD_FRICTION),
             *_engine_rows(wet),
-            *_ice_rows(),
+            *_ice_stop_rows(),
             *_substep_rows(wet),
-            _simulation_speed_row(wet),
+            _real_time_factor_row(wet),
         ]
         data["limit"] = stiff_suspension_distances(wet)
         rows += _stiff_suspension_rows(data["limit"])
@@ -106,11 +106,11 @@ def _locked_wheel_rows(mu: float) -> list[Row]:
             ).at_most(1e-3, "what stands has no slip, and friction holds it", "closed form"),
         ]
         if name == "box":
-            rows += _pitch_rows(mu, pitch, gained)
+            rows += _pitch_and_load_transfer_rows(mu, pitch, gained)
     return rows
 
 
-def _pitch_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
+def _pitch_and_load_transfer_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
     exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD_FRICTION else 2e-3
     return [
         Observed(
@@ -181,7 +181,7 @@ def _substep_rows(wet_tyre_table: TyreTable) -> list[Row]:
     ]
 
 
-def _ice_rows() -> list[Row]:
+def _ice_stop_rows() -> list[Row]:
     """Rows: stop on ice by the slip controller, with the suspension and with the plane vehicle with load transfer."""
     ice, speed = table_of_surface("ice"), 11.11
     stops = [
@@ -222,7 +222,7 @@ class _TimedController:
         return command
 
 
-def _simulation_speed_row(wet_tyre_table: TyreTable) -> Row:
+def _real_time_factor_row(wet_tyre_table: TyreTable) -> Row:
     """Row of the simulation speed, from the fastest tenth of the samples, which other processes disturb least."""
     vehicle, controller = (
         braked_vehicle(car(), wet_tyre_table, substeps=4, gradient=150.0),

@@ -38,7 +38,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for engine in engines
     ]
     if not quick:
-        rows += [_locked_wheels_row(), *_caravan_brakes_rows(), *_slip_control_rows(), *_fault_rows()]
+        rows += [_locked_wheels_row(), *_caravan_brakes_rows(), *_slip_control_rows(), *_planted_fault_rows()]
     return rows, {}
 
 
@@ -136,7 +136,7 @@ def _slip_control_rows() -> list[Row]:
     ]
 
 
-def _fault_rows() -> list[Row]:
+def _planted_fault_rows() -> list[Row]:
     """Rows: faults planted in the force table that Exudyn and MuJoCo share must be caught."""
     pulled = train.relative_difference(train.caravan_run(train.plant_brakes_on_car), train.caravan_closed_form())
     turned = whole.towing_car.__wrapped__()

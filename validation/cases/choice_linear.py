@@ -41,29 +41,29 @@ class JudgedChoice:
     of the identity that relates covariance and adjoint; frequency_changes (quantities,) : changes by frequency
     responses, or None.
 
-    nearby_ratio : largest change at random speeds and with random parameters, divided by the tolerance;
+    nearby_change_ratio : largest change at random speeds and with random parameters, divided by the tolerance;
     sampled_saving : saving by the covariance of sampled runs.
     """
 
-    scene: LinearRide
-    choice: RideChoice
+    ride: LinearRide
+    effect_choice: RideChoice
     identity_error: float
     frequency_changes: np.ndarray | None
-    nearby_ratio: float
+    nearby_change_ratio: float
     sampled_saving: float
 
     @property
-    def saving(self) -> float:
+    def force_call_saving(self) -> float:
         """Number of force calls that the complete scene needs, divided by that of the reduced scene, at equal
         accuracy."""
-        return self.choice.cost_before.calls / self.choice.cost_after.calls
+        return self.effect_choice.cost_before.calls / self.effect_choice.cost_after.calls
 
     @property
     def is_honest(self) -> bool:
         """False if the choice claims to keep the tolerance although frequency responses or, without them, its own
         confirmed changes show that it does not."""
-        changes = self.choice.confirmed_change if self.frequency_changes is None else self.frequency_changes
-        return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
+        changes = self.effect_choice.confirmed_change if self.frequency_changes is None else self.frequency_changes
+        return not self.effect_choice.within_tolerance or bool((abs(changes) <= self.ride.tolerance * (1 + 1e-2)).all())
 
 
 def judge_choice_for_ride(ride: LinearRide, with_frequency_responses: bool) -> JudgedChoice:
@@ -95,9 +95,9 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         )
         for seed in seeds
     ]
-    rows = [*_tolerance_rows(choices), _adjoint_identity_row(choices), *_nearby_and_saving_rows(choices)]
+    rows = [*_kept_tolerance_rows(choices), _adjoint_identity_row(choices), *_nearby_and_saving_rows(choices)]
     if not quick:
-        rows += [_prediction_row(choices), _saving_row(choices), *_solver_count_rows()]
+        rows += [_predicted_change_row(choices), _saving_row(choices), *_solved_equation_count_rows()]
     pair_rows, pair = _half_car_rows()
     return [*rows, *pair_rows, *_energy_activity_rows()], {
         "scenes": [_summary_of_choice(choice) for choice in choices],
@@ -105,14 +105,11 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def _tolerance_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
-    share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in judged_choices]))
-    lies = sum(not judged_choice.is_honest for judged_choice in judged_choices)
-    second = [judged_choice for judged_choice in judged_choices if judged_choice.frequency_changes is not None]
-    gap = max(
-        float(abs(judged_choice.frequency_changes - judged_choice.choice.confirmed_change).max())
-        for judged_choice in second
-    )
+def _kept_tolerance_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
+    share = float(np.mean([judged.effect_choice.within_tolerance for judged in judged_choices]))
+    lies = sum(not judged.is_honest for judged in judged_choices)
+    second = [judged for judged in judged_choices if judged.frequency_changes is not None]
+    gap = max(float(abs(judged.frequency_changes - judged.effect_choice.confirmed_change).max()) for judged in second)
     return [
         Observed(
             "choice_linear.kept",
@@ -141,11 +138,11 @@ def _tolerance_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
     ]
 
 
-def _prediction_row(judged_choices: list[JudgedChoice]) -> Row:
+def _predicted_change_row(judged_choices: list[JudgedChoice]) -> Row:
     """Row: share of predicted changes that are within a factor of 2 of the confirmed ones, over all choices and all
     quantities whose change is above rounding and below 5 %."""
     predicted, confirmed_ = (
-        np.concatenate([getattr(judged_choice.choice, f"{stage}_change") for judged_choice in judged_choices])
+        np.concatenate([getattr(judged.effect_choice, f"{stage}_change") for judged in judged_choices])
         for stage in STAGES_OF_CHANGE
     )
     is_judged = (abs(confirmed_) > JUDGED_CHANGE_RANGE[0]) & (abs(confirmed_) < JUDGED_CHANGE_RANGE[1])
@@ -171,7 +168,7 @@ def _adjoint_identity_row(judged_choices: list[JudgedChoice]) -> Row:
         SYSTEM,
         "difference of the variance of what is left, from the whole scene's covariance and the "
         "reduced adjoint, from the reduced covariance, worst of all scenes",
-        max(judged_choice.identity_error for judged_choice in judged_choices),
+        max(judged.identity_error for judged in judged_choices),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
 
@@ -180,11 +177,10 @@ def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
     """Rows over all scenes: whether the tolerance also holds at other speeds and with changed parameters, and the
     saving. Both are computed by methods that the choice does not use."""
     told_in_advance = sum(
-        bool(judged_choice.choice.refusal_texts) and not judged_choice.choice.left_out
-        for judged_choice in judged_choices
+        bool(judged.effect_choice.refusal_texts) and not judged.effect_choice.left_out for judged in judged_choices
     )
-    gaps = [abs(judged_choice.saving / judged_choice.sampled_saving - 1.0) for judged_choice in judged_choices]
-    saving = [judged_choice for judged_choice in judged_choices if judged_choice.choice.left_out]
+    gaps = [abs(judged.force_call_saving / judged.sampled_saving - 1.0) for judged in judged_choices]
+    saving = [judged for judged in judged_choices if judged.effect_choice.left_out]
     return [
         Observed(
             "choice_linear.nearby",
@@ -192,7 +188,7 @@ def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
             f"largest ratio of the change to the tolerance in {len(saving)} of {len(judged_choices)} scenes in "
             f"which effects were left out, {NEARBY_SCENE_COUNT} random speeds each, every mass, stiffness and "
             "damping up to 5 % off at random",
-            max(judged_choice.nearby_ratio for judged_choice in judged_choices),
+            max(judged.nearby_change_ratio for judged in judged_choices),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
@@ -220,7 +216,7 @@ def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
-            str(sum(judged_choice.saving < 1.0 + EQUAL_COST_LOG for judged_choice in saving)),
+            str(sum(judged.force_call_saving < 1.0 + EQUAL_COST_LOG for judged in saving)),
             "0",
             "what saves nothing stays in",
             "none",
@@ -229,9 +225,7 @@ def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
 
 
 def _saving_row(judged_choices: list[JudgedChoice]) -> Row:
-    saved = [
-        judged_choice.saving for judged_choice in judged_choices if judged_choice.scene.tolerance == COMMON_TOLERANCE
-    ]
+    saved = [judged.force_call_saving for judged in judged_choices if judged.ride.tolerance == COMMON_TOLERANCE]
     return Observed(
         "choice_linear.saving",
         SYSTEM,
@@ -242,7 +236,7 @@ def _saving_row(judged_choices: list[JudgedChoice]) -> Row:
     ).beside("", "it depends on what is asked of which vehicle: a wheel's force needs the wheel", "none")
 
 
-def _solver_count_rows() -> list[Row]:
+def _solved_equation_count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and of Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom, divided by the square of its number of effects."""
     chooser = Chooser.from_scene(car_scene())
@@ -335,14 +329,14 @@ def _energy_activity_rows() -> list[Row]:
 
 
 def _summary_of_choice(judged_choice: JudgedChoice) -> dict[str, Any]:
-    choice = judged_choice.choice
+    choice = judged_choice.effect_choice
     return {
-        "tolerance": judged_choice.scene.tolerance,
+        "tolerance": judged_choice.ride.tolerance,
         "predicted": choice.predicted_change.tolist(),
         "confirmed": choice.confirmed_change.tolist(),
-        "saving": judged_choice.saving,
+        "saving": judged_choice.force_call_saving,
         "kept": choice.within_tolerance,
-        "nearby": judged_choice.nearby_ratio,
+        "nearby": judged_choice.nearby_change_ratio,
         "measured": judged_choice.sampled_saving,
         "said": list(choice.refusal_texts),
         "left out": len(choice.left_out),

@@ -31,7 +31,7 @@ FRESH_COPIES_RATIO, FRESH_SEED = 4, 77
 these copies."""
 UNDERSAMPLED_SEED, FINE_TOLERANCE = 4, 0.005
 """Seed of a random ride, and a tolerance that is too fine for the fewest Monte Carlo copies."""
-RESAMPLE_COUNT, LOW_QUANTILE = 4000, 0.0015
+RESAMPLE_COUNT, SIGNIFICANT_CHANGE_QUANTILE = 4000, 0.0015
 """Number of bootstrap samples of the copies, and the quantile of the resampled changes that counts as significant."""
 QUICK_SCENE_SEEDS = (0, 2, 3)
 """Seeds of the pitch-plane scenes in a quick run, which has no other system."""
@@ -75,7 +75,7 @@ def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.
         len(full_mean_squares), size=(RESAMPLE_COUNT, len(full_mean_squares))
     )
     changes = np.abs(np.sqrt(reduced_mean_squares[picked].mean(axis=1) / full_mean_squares[picked].mean(axis=1)) - 1.0)
-    return float(np.quantile(changes, LOW_QUANTILE))
+    return float(np.quantile(changes, SIGNIFICANT_CHANGE_QUANTILE))
 
 
 @allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
@@ -89,10 +89,10 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     choices = [judge_choice_for_scene(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
         *_kept_tolerance_rows(choices),
-        _prediction_row(choices, quick),
+        _predicted_change_row(choices, quick),
         *(row for system in seeds for row in _saving_rows(choices, system)),
     ]
-    rows += [] if quick else [_refusal_row()]
+    rows += [] if quick else [_refused_choice_row()]
     return rows, {"scenes": [_summary_of_choice(judged_choice) for judged_choice in choices], "systems": list(seeds)}
 
 
@@ -118,7 +118,7 @@ def _kept_tolerance_rows(judged_choices: list[ChoiceCheckedByRuns]) -> list[Row]
     ]
 
 
-def _refusal_row() -> Row:
+def _refused_choice_row() -> Row:
     """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed the
     tolerance."""
     asked, outcome = random_nonlinear_ride(UNDERSAMPLED_SEED), "a choice"
@@ -139,7 +139,7 @@ def _refusal_row() -> Row:
     )
 
 
-def _predicted_and_confirmed(judged_choices: list[ChoiceCheckedByRuns]) -> np.ndarray:
+def _predicted_and_confirmed_changes(judged_choices: list[ChoiceCheckedByRuns]) -> np.ndarray:
     """Predicted and confirmed relative changes (n, 2) of all quantities whose confirmed change is in
     JUDGED_CHANGE_RANGE."""
     pairs = [
@@ -152,8 +152,8 @@ def _predicted_and_confirmed(judged_choices: list[ChoiceCheckedByRuns]) -> np.nd
     )
 
 
-def _prediction_row(judged_choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
-    ratios = np.divide(*_predicted_and_confirmed(judged_choices).T)
+def _predicted_change_row(judged_choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
+    ratios = np.divide(*_predicted_and_confirmed_changes(judged_choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
     quantity = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"

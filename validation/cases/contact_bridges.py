@@ -31,7 +31,7 @@ from validation.contact import slow_wheels
 TITLE = "What a contact kernel costs inside an engine"
 SYSTEM: System = "rolling-vehicle"
 TIME_STEP = 2e-5
-STEP_COUNTS = {
+STEP_COUNT_BY_BRIDGE = {
     "none": 1000,
     "empty": 600,
     "native": 160,
@@ -42,11 +42,18 @@ STEP_COUNTS = {
 }
 """Number of steps of a timed run, by bridge, for an integrator with one force call per step. The runs take a few
 milliseconds, so that some of them are not disturbed by other processes."""
-CONTACT_LAWS = (("linear", 0), ("fastsim", 7), ("fastsim", 11), ("fastsim", 21), ("fastsim", 41), ("simplified", 21))
+CONTACT_THEORIES_AND_CELLS = (
+    ("linear", 0),
+    ("fastsim", 7),
+    ("fastsim", 11),
+    ("fastsim", 21),
+    ("fastsim", 41),
+    ("simplified", 21),
+)
 """Contact theories, each with a number of cells per strip."""
-MAIN_CONTACT_LAW = CONTACT_LAWS[3]
+MAIN_CONTACT_LAW = CONTACT_THEORIES_AND_CELLS[3]
 WHEEL_COUNTS = (1, 4, 8)
-CALLS_PER_STEP = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
+FORCE_CALLS_PER_STEP = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Number of force calls per step of each integrator."""
 ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 THEORY_NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
@@ -101,20 +108,20 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     Costs are measured by the full run only: a few timing rounds are not enough.
     """
     rows, done = slow_wheels.rows(quick)
-    rows += [_threads_row(), _agreement_row()]
+    rows += [_equal_bits_in_threads_row(), _engine_agreement_row()]
     data: dict[str, Any] = {"slow": [asdict(run) for run in done]}
     if quick:
         return rows, data
-    setups = all_setups()
+    setups = all_timing_setups()
     listed_setups = [setup for setup in setups if setup.is_reported]
-    rows += _cost_rows(
+    rows += _bridge_cost_rows(
         MeasuredContactTimes([*listed_setups, *(setup.without_contact for setup in listed_setups)], TIMING_ROUNDS)
     )
     shown = MeasuredContactTimes(setups, FIGURE_ROUNDS)
     return rows, {**data, "points": [shown.table_entry(setup) for setup in setups]}
 
 
-def all_setups() -> list[ContactTimingSetup]:
+def all_timing_setups() -> list[ContactTimingSetup]:
     """All timed combinations of engine, integrator, bridge, contact law and number of wheels."""
     setups = []
     for engine, (usual, fine) in INTEGRATORS.items():
@@ -123,14 +130,14 @@ def all_setups() -> list[ContactTimingSetup]:
             setups += [ContactTimingSetup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
             setups += [
                 ContactTimingSetup(engine, method, best, law, count)
-                for law in (CONTACT_LAWS if method == usual else (MAIN_CONTACT_LAW,))
+                for law in (CONTACT_THEORIES_AND_CELLS if method == usual else (MAIN_CONTACT_LAW,))
             ]
         setups += [
             ContactTimingSetup(engine, method, other_bridge, MAIN_CONTACT_LAW, 4)
             for method in (usual, fine)
             for other_bridge in other_bridges
         ]
-    return [*setups, ContactTimingSetup("mujoco", "Euler", "plain", CONTACT_LAWS[-1], 4)]
+    return [*setups, ContactTimingSetup("mujoco", "Euler", "plain", CONTACT_THEORIES_AND_CELLS[-1], 4)]
 
 
 class MeasuredContactTimes:
@@ -164,7 +171,7 @@ class MeasuredContactTimes:
             (full_time - first) / steps
             for full_time, first, steps in (self._steps[timing_setup], self._steps[timing_setup.without_contact])
         )
-        calls = 1 if timing_setup.bridge == "before each step" else CALLS_PER_STEP[timing_setup.integrator]
+        calls = 1 if timing_setup.bridge == "before each step" else FORCE_CALLS_PER_STEP[timing_setup.integrator]
         return (
             step,
             bare,
@@ -203,20 +210,20 @@ def _timed_kernel(contact_law: tuple[str, int], wheel_count: int) -> tuple[Calla
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_kernel(table_of_wheels, q, v, force_sum, repeat_count):
+def _repeat_kernel(wheel_table, q, v, force_sum, repeat_count):
     for _ in range(repeat_count):
-        forces(start(table_of_wheels), 0.0, start(q), start(v), start(force_sum))
+        forces(start(wheel_table), 0.0, start(q), start(v), start(force_sum))
 
 
 def _timed_march(timing_setup: ContactTimingSetup) -> tuple[Callable[[int], Any], int]:
     """Function that simulates a given number of steps, and the number of steps to time."""
     wheels = timing_setup.wheels()
-    kind = timing_setup.bridge if timing_setup.bridge in STEP_COUNTS else "native"
+    kind = timing_setup.bridge if timing_setup.bridge in STEP_COUNT_BY_BRIDGE else "native"
     if wheels.theory == "simplified":
         kind = "plain simplified" if timing_setup.bridge == "plain" else "simplified"
     law = contact_law_of_library(wheels) if timing_setup.bridge == "plain" else None
     march = (_mujoco_march if timing_setup.engine == "mujoco" else _exudyn_march)(timing_setup, wheels, law)
-    return march, max(2, STEP_COUNTS[kind] // CALLS_PER_STEP[timing_setup.integrator])
+    return march, max(2, STEP_COUNT_BY_BRIDGE[kind] // FORCE_CALLS_PER_STEP[timing_setup.integrator])
 
 
 def _mujoco_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law: Any) -> Callable[[int], Any]:
@@ -258,7 +265,7 @@ def contact_law_of_library(wheels: Wheels) -> Callable[[Array, Array, Array, Arr
     """Contact law that calls the library's Python functions: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
-    def add(table_of_wheels: Array, q: Array, v: Array, force_sum: Array) -> None:
+    def add(wheel_table: Array, q: Array, v: Array, force_sum: Array) -> None:
         pressed: Any
         creep: Any
         for k, (position, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
@@ -276,14 +283,14 @@ def contact_law_of_library(wheels: Wheels) -> Callable[[Array, Array, Array, Arr
     return add
 
 
-def _cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
+def _bridge_cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
     """Rows: cost of the bridge in each engine, with the main contact law at four wheels."""
     rows = []
     for setup in measured_times.setups:
         if not setup.is_reported:
             continue
         step, bare, kernel = measured_times.times_by_round(setup)
-        name, calls = f"contact_bridges.{setup.engine}.{setup.integrator}", CALLS_PER_STEP[setup.integrator]
+        name, calls = f"contact_bridges.{setup.engine}.{setup.integrator}", FORCE_CALLS_PER_STEP[setup.integrator]
         if setup.engine == "mujoco":
             value, low, high = median(step / (bare + kernel))
             what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
@@ -299,7 +306,7 @@ def _cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
     return rows
 
 
-def _threads_row() -> Row:
+def _equal_bits_in_threads_row() -> Row:
     """Row: runs from ten initial states give the same bits in two threads as in one."""
     wheels = Wheels()
     states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
@@ -316,7 +323,7 @@ def _threads_row() -> Row:
     )
 
 
-def _agreement_row() -> Row:
+def _engine_agreement_row() -> Row:
     """Row: difference of the states in Exudyn and MuJoCo after 0.1 s, by Runge-Kutta's method."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()

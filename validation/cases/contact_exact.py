@@ -19,10 +19,10 @@ from validation.common.scenes import data_folder
 
 TITLE = "The exact theory of contact on cells"
 SYSTEM: System = "contact"
-MATERIAL_PAIR, MU, LOAD, CONTACT_SIZE = MaterialPair(), 0.3, 8e4, 5e-3
+MATERIAL_PAIR, FRICTION_COEFFICIENT, NORMAL_LOAD, CONTACT_SIZE = MaterialPair(), 0.3, 8e4, 5e-3
 """Materials, coefficient of friction mu, normal load N (N), and sqrt(a b) (m) of the contact ellipse with the semi-axes
 a and b."""
-FRICTION_LIMIT = MU * LOAD
+FRICTION_LIMIT = FRICTION_COEFFICIENT * NORMAL_LOAD
 SAMPLE_FILE = "contact_sample.csv"
 STRIP_AXIS_RATIO = 0.02
 """Axis ratio a/b of a slender ellipse, whose middle is nearly a cylinder contact."""
@@ -56,8 +56,8 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         *_carter_rows(20 if quick else 80),
         *_cattaneo_rows(),
         *_sliding_rows(),
-        *_symmetry_rows(),
-        *_refinement_rows(refined),
+        *_creepage_symmetry_rows(),
+        *_grid_refinement_rows(refined),
     ]
     sample, sample_rows = _sample_file_rows(quick)
     rows += [] if quick else [_convergence_row()]
@@ -83,10 +83,12 @@ def numerical_hertz_contact(axis_ratio: float, cell_count: int) -> tuple[NormalS
     """Numerical solution of the normal problem for a Hertzian ellipse with the axis ratio a/b, and its relative errors
     (3,) of approach, peak pressure and area."""
     a, b = CONTACT_SIZE * axis_ratio**0.5, CONTACT_SIZE / axis_ratio**0.5
-    truth = by_axes(a, b, MATERIAL_PAIR, load=LOAD)
+    truth = by_axes(a, b, MATERIAL_PAIR, load=NORMAL_LOAD)
     dx, dy = 2 * a / cell_count, 2 * b / cell_count
     x, y = centres(cell_count + 5, dx), centres(cell_count + 5, dy)
-    solved = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, MATERIAL_PAIR, load=LOAD)
+    solved = solve_normal(
+        float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, MATERIAL_PAIR, load=NORMAL_LOAD
+    )
     values = np.array([solved.approach, solved.pressure.max(), solved.area])
     return solved, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
 
@@ -138,9 +140,11 @@ def _strip_traction(cell_count: int, creepage_share: float) -> tuple[list[float]
     by that of full sliding. share: creepage divided by the creepage of full sliding."""
     b = CONTACT_SIZE / STRIP_AXIS_RATIO**0.5
     a = STRIP_AXIS_RATIO * b
-    pressed = hertzian(a, b, LOAD, cell_count + 1)  # odd: one strip of cells lies in the middle
-    bound = MU * 1.5 * LOAD / (np.pi * a * b)
-    solved = solve_rolling(pressed, MU, 2 * creepage_share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR)
+    pressed = hertzian(a, b, NORMAL_LOAD, cell_count + 1)  # odd: one strip of cells lies in the middle
+    bound = FRICTION_COEFFICIENT * 1.5 * NORMAL_LOAD / (np.pi * a * b)
+    solved = solve_rolling(
+        pressed, FRICTION_COEFFICIENT, 2 * creepage_share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR
+    )
     traction = -solved.traction[cell_count // 2, :, 0] / bound
     error = float(traction.sum() * pressed.dx / (np.pi * a / 2) - (1 - (1 - creepage_share) ** 2))
     return (pressed.x / a).tolist(), traction.tolist(), error
@@ -170,7 +174,9 @@ def shifted_ball(force_share: float, poisson_ratio: float, cell_count: int) -> R
     shift_distance = (
         3 * FRICTION_LIMIT * (2 - poisson_ratio) / (8 * CONTACT_SIZE * pair.G) * (1 - (1 - force_share) ** (2 / 3))
     )
-    return solve_shift(hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, cell_count), MU, shift_distance, 0.0, pair)
+    return solve_shift(
+        hertzian(CONTACT_SIZE, CONTACT_SIZE, NORMAL_LOAD, cell_count), FRICTION_COEFFICIENT, shift_distance, 0.0, pair
+    )
 
 
 def _cattaneo_rows() -> list[Row]:
@@ -189,22 +195,24 @@ def _cattaneo_rows() -> list[Row]:
 
 
 def rolling_forces(case_name: str, cell_count: int, creepage_sign: float = 1.0, mirror_sign: float = 1.0) -> Array:
-    """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). ``creepage_sign`` reverses
-    the creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
+    """Forces (3,) of one of CREEPAGE_CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). ``creepage_sign``
+    reverses the creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
     ratio, xi_x, xi_y, spin = CREEPAGE_CASES[case_name]
     creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * creepage_sign
-    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cell_count)
+    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, NORMAL_LOAD, cell_count)
     across = mirror_sign * creepage
-    solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR)
+    solved = solve_rolling(
+        pressed, FRICTION_COEFFICIENT, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR
+    )
     return np.array([solved.fx, solved.fy, solved.mz / CONTACT_SIZE]) / FRICTION_LIMIT
 
 
 def _sliding_rows() -> list[Row]:
     """Rows on creepages so large that the whole contact area slides."""
-    pressed = hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, 20)
+    pressed = hertzian(CONTACT_SIZE, CONTACT_SIZE, NORMAL_LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
-        solved = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, MATERIAL_PAIR)
+        solved = solve_rolling(pressed, FRICTION_COEFFICIENT, np.cos(angle), np.sin(angle), 0.0, MATERIAL_PAIR)
         gap = (
             np.hypot(solved.fx + FRICTION_LIMIT * np.cos(angle), solved.fy + FRICTION_LIMIT * np.sin(angle))
             / FRICTION_LIMIT
@@ -228,7 +236,7 @@ def _sliding_rows() -> list[Row]:
     ]
 
 
-def _symmetry_rows() -> list[Row]:
+def _creepage_symmetry_rows() -> list[Row]:
     """Rows: reversed and mirrored creepages must give reversed and mirrored forces, up to the solver's residual."""
     name, cells = "x, y against spin", 20
     there, back, mirror = (
@@ -248,7 +256,7 @@ def _symmetry_rows() -> list[Row]:
     ]
 
 
-def _refinement_rows(forces_by_grid: dict[str, list[list[float]]]) -> list[Row]:
+def _grid_refinement_rows(forces_by_grid: dict[str, list[list[float]]]) -> list[Row]:
     """Rows: error relative to the limit of infinitely small cells, which is extrapolated from the two finest grids at
     order 1; and the observed order."""
     rows = []
@@ -292,8 +300,8 @@ def random_contact_case(random_generator: np.random.Generator) -> tuple[ContactC
     case = ContactCase(
         CONTACT_SIZE * ratio**0.5,
         CONTACT_SIZE / ratio**0.5,
-        LOAD,
-        MU,
+        NORMAL_LOAD,
+        FRICTION_COEFFICIENT,
         MaterialPair(body, body),
         "drawn",
         (x, y, spin),
@@ -307,7 +315,7 @@ def _convergence_row() -> Row:
     rng, failed = np.random.default_rng(SEED), 0
     for case, cells in (random_contact_case(rng) for _ in range(RANDOM_CONTACT_COUNT)):
         try:
-            solve_rolling(hertzian(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
+            solve_rolling(hertzian(case.a, case.b, NORMAL_LOAD, cells), FRICTION_COEFFICIENT, *case.motion, case.pair)
         except RunFailed:
             failed += 1
     return _bound_row(

@@ -17,7 +17,7 @@ TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
 DECIMAL_DIGITS = 60
 RELATIVE_TOLERANCE = 1e-10
-LOAD = 1e5
+NORMAL_LOAD = 1e5
 PEAK_PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
 """Peak pressure (Pa) and short semi-axis (m) of the contacts compared."""
 MATERIAL_PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
@@ -178,13 +178,13 @@ def _refusal_rows() -> list[Row]:
     )
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
-        "flat": lambda: by_load(0.0, 1.0, LOAD, MATERIAL_PAIR),
-        "concave": lambda: by_load(1.0, -0.1, LOAD, MATERIAL_PAIR),
-        "not finite": lambda: by_load(1.0, np.nan, LOAD, MATERIAL_PAIR),
-        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, MATERIAL_PAIR),
+        "flat": lambda: by_load(0.0, 1.0, NORMAL_LOAD, MATERIAL_PAIR),
+        "concave": lambda: by_load(1.0, -0.1, NORMAL_LOAD, MATERIAL_PAIR),
+        "not finite": lambda: by_load(1.0, np.nan, NORMAL_LOAD, MATERIAL_PAIR),
+        "radius in mm": lambda: by_load(1 / 920, 1 / 600, NORMAL_LOAD, MATERIAL_PAIR),
         "modulus in MPa": lambda: Material(E=2.1e5, nu=0.28),
         "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, MATERIAL_PAIR),
-        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, MATERIAL_PAIR),
+        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], NORMAL_LOAD, MATERIAL_PAIR),
         "friction of steel on aluminium": MATERIAL_PAIR.require_likeness,
     }
     rows = [
@@ -247,7 +247,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
-    touching = by_load(curvature, 1.0, LOAD, MaterialPair())
+    touching = by_load(curvature, 1.0, NORMAL_LOAD, MaterialPair())
     for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):
         left.loglog(curvature, values * 1e3, label=name)
     left.set(title="Steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B [-]", ylabel="semi-axis [mm]")

@@ -51,7 +51,12 @@ RECOMPUTED_CASES = (
 the first two on coarser grids."""
 CELL_COUNTS = (7, 11, 21, 41)
 """Cells per strip at which the stated discretisation errors are judged; a quick run takes 21 alone."""
-JUDGED_CHOICES: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
+JUDGED_FASTSIM_OPTIONS: tuple[dict[str, str], ...] = (
+    {},
+    {"bound": "elliptic"},
+    {"march": "plain"},
+    {"flexibilities": "one"},
+)
 """Options of FASTSIM, changed from the best ones, whose stated discretisation errors are judged; a quick run takes the
 first alone."""
 REFERENCE_TOLERANCES = {True: 0.01, False: 0.005}
@@ -62,14 +67,14 @@ two."""
 MOMENT_TOLERANCES = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
 """Bounds of the moment's error divided by mu N sqrt(ab), by the traction bound of FASTSIM: of its mean, and of its 95 %
 quantile."""
-CONVERGED_CELLS = 161
+CONVERGED_CELL_COUNT = 161
 """Cells per strip whose result counts as exact when fewer cells are judged."""
-SLENDER_REASON = (
+SLENDER_CONTACT_REASON = (
     "reached for a/b 0.2 to 5 at every Poisson's ratio, not beyond: by mu N and the longer semi-axis the error "
     "is alike on slender ellipses, and that semi-axis is up to 3.2 sqrt(ab)"
 )
 """Reason why the moments of slender contacts by the elliptic traction bound miss their tolerance."""
-TABLE_ROWS, SEED = 100_000, 41
+LONG_TABLE_ROW_COUNT, SEED = 100_000, 41
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -78,7 +83,9 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     cases = read_contacts()
     wide = read_wide(JUDGED_PART)
     rows = _stored_forces_rows(cases, quick) + _error_band_rows(cases, quick) + _total_error_rows(wide)
-    rows += _moment_rows(cases, read_drawn(JUDGED_PART), wide) + _discretisation_error_rows([*cases, *wide], quick)
+    rows += _moment_error_rows(cases, read_drawn(JUDGED_PART), wide) + _discretisation_error_rows(
+        [*cases, *wide], quick
+    )
     if quick:
         return rows, {}
     programs = compare_programs(cases[::2])
@@ -159,7 +166,7 @@ def _total_error_rows(contact_cases: list[ContactCase]) -> list[Row]:
     ]
 
 
-def _moment_rows(
+def _moment_error_rows(
     contact_cases: list[ContactCase], random_cases: list[ContactCase], wide_cases: list[ContactCase]
 ) -> list[Row]:
     """Rows: error of FASTSIM's moment compared with the exact theory, by traction bound and set of contacts."""
@@ -183,7 +190,7 @@ def _moment_rows(
                 "mu N sqrt(ab)",
             )
             rows.append(
-                observed.aim(allowed, SLENDER_REASON)
+                observed.aim(allowed, SLENDER_CONTACT_REASON)
                 if (bound, row_name) == ("elliptic", "wide")
                 else observed.at_most(allowed, "the exact theory, kept", "native")
             )
@@ -193,8 +200,8 @@ def _moment_rows(
 def _discretisation_error_rows(contact_cases: list[ContactCase], quick: bool) -> list[Row]:
     """Rows: share of contacts whose discretisation error, measured with many cells, exceeds the stated one."""
     rows, some = [], contact_cases[::9] if quick else contact_cases
-    for choices, cells in product(JUDGED_CHOICES[: 1 if quick else None], (21,) if quick else CELL_COUNTS):
-        share = _shares_beyond_stated(some, cells, choices)
+    for choices, cells in product(JUDGED_FASTSIM_OPTIONS[: 1 if quick else None], (21,) if quick else CELL_COUNTS):
+        share = _shares_beyond_stated_error(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
             rows.append(
@@ -211,14 +218,14 @@ def _discretisation_error_rows(contact_cases: list[ContactCase], quick: bool) ->
     return rows
 
 
-def _shares_beyond_stated(
+def _shares_beyond_stated_error(
     contact_cases: list[ContactCase], cell_count: int, fastsim_options: dict[str, str]
 ) -> list[float]:
     """Shares of contacts whose discretisation errors of force and of moment exceed the stated ones."""
     answers = []
     for case in contact_cases:
         contact = case.contact(Fastsim, **{**BEST_CHOICES, **fastsim_options})
-        fine, true = contact.roll(case.motion, cell_count), contact.roll(case.motion, CONVERGED_CELLS)
+        fine, true = contact.roll(case.motion, cell_count), contact.roll(case.motion, CONVERGED_CELL_COUNT)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
             np.array(off)
@@ -247,7 +254,7 @@ def _long_table_row(work_folder: Path) -> Row:
     path, out = work_folder / "contact_cases.csv", work_folder / "contact_forces.csv"
     np.savetxt(
         path,
-        rng.uniform(low, high, (TABLE_ROWS, 7)),
+        rng.uniform(low, high, (LONG_TABLE_ROW_COUNT, 7)),
         fmt="%.8g",
         delimiter=",",
         comments="",
@@ -258,8 +265,8 @@ def _long_table_row(work_folder: Path) -> Row:
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()
-    assert answers == {"rows": TABLE_ROWS, "wrong": 0}
-    what = f"time to answer a CSV of {TABLE_ROWS:,} contacts with errors and status, measured once"
+    assert answers == {"rows": LONG_TABLE_ROW_COUNT, "wrong": 0}
+    what = f"time to answer a CSV of {LONG_TABLE_ROW_COUNT:,} contacts with errors and status, measured once"
     return Observed("contact_price.table", SYSTEM, what, seconds, "s").beside(
         "seconds", "reported and never gated", "none"
     )

@@ -75,7 +75,9 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data["grown"] = {shape.name: _approach_errors(shape) for shape in merged_shapes()} | _rail_approach_errors()
     data["nets"] = {str(net): _errors_on_hertz_ellipse(5.0, replace(PLAIN, net=net)) for net in MESHES_PER_SIDE}
     data["time"] = _computing_times()
-    return rows + _shape_rows(data["shapes"]) + _merged_rows(data["grown"]) + _time_rows(data["time"]), data
+    return rows + _contact_shape_rows(data["shapes"]) + _merged_patch_rows(data["grown"]) + _computing_time_rows(
+        data["time"]
+    ), data
 
 
 def _errors_on_hertz_ellipse(curvature_ratio: float, fitting_options: SimplifiedOptions) -> dict[str, float]:
@@ -129,7 +131,9 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
         name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
         for name, fitting_options in FITTING_OPTIONS.items()
     }
-    normal = exact_normal(contact_shape, EXACT_CELL_COUNT, contact_shape.box or _box_around(contacts["elliptic"]))
+    normal = exact_normal(
+        contact_shape, EXACT_CELL_COUNT, contact_shape.box or _box_around_patches(contacts["elliptic"])
+    )
     motions = creepages(normal.area, contact_shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
@@ -170,7 +174,7 @@ def _rail_approach_errors() -> dict[str, dict[str, float]]:
     return errors
 
 
-def _box_around(normal_contact: NormalContact) -> Box:
+def _box_around_patches(normal_contact: NormalContact) -> Box:
     """Box around all patches of a contact, enlarged by a fifth of its size on every side."""
     x0, x1, y0, y1 = np.array([patch_pressure.box for patch_pressure in normal_contact.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
@@ -235,7 +239,7 @@ def _jump_row(load_jump: float) -> Row:
     )
 
 
-def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
+def _contact_shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
     """Rows: errors of approach and forces for every contact shape, compared with the exact theory."""
     rows = []
     for name, case in errors_by_shape.items():
@@ -261,7 +265,7 @@ def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def _merged_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
+def _merged_patch_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
     """Rows: largest error of the approach among contacts whose patches have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
@@ -282,7 +286,7 @@ def _merged_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
     return rows
 
 
-def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
+def _computing_time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
     """Rows: ratios of computing times of the theories."""
     why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
     return [
@@ -291,7 +295,7 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             SYSTEM,
             f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
             f"the 1982 program, {cost(seconds_by_program['1982'])}",
-            _time_ratio(seconds_by_program, "roll", "1982"),
+            _computing_time_ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
         Observed(
@@ -299,13 +303,13 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
             f"{cost(seconds_by_program['exact'])}, to that of this method, {cost(seconds_by_program['press'])}",
-            _time_ratio(seconds_by_program, "exact", "press"),
+            _computing_time_ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),
     ]
 
 
-def _time_ratio(seconds_by_program: dict[str, list[float]], numerator: str, denominator: str) -> float:
+def _computing_time_ratio(seconds_by_program: dict[str, list[float]], numerator: str, denominator: str) -> float:
     """Ratio of the median computing times of two programs."""
     return float(np.median(seconds_by_program[numerator]) / np.median(seconds_by_program[denominator]))
 
@@ -372,11 +376,10 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
     """Sentences on the mean errors of the variants over all shapes."""
 
-    def mean(variant: str, error_name: str) -> str:
+    def mean(variant_name: str, error_name: str) -> str:
         scale = 1.0 if error_name == "force" else 100.0
-        return (
-            f"{scale * np.nanmean([abs(case['ways'][variant][error_name]) for case in errors_by_shape.values()]):.1f} %"
-        )
+        errors = [abs(case["ways"][variant_name][error_name]) for case in errors_by_shape.values()]
+        return f"{scale * np.nanmean(errors):.1f} %"
 
     apart = errors_by_shape["two patches"]["ways"]
     return (

@@ -35,7 +35,7 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
 SEED = 12
-PATH_COUNT, QUICK_PATH_COUNT = 300, 60
+NOISE_PATH_COUNT, QUICK_NOISE_PATH_COUNT = 300, 60
 """Number of noise paths, in the full and in the quick run."""
 TIME_STEP = 5e-4
 """Step (s) of the runs without noise."""
@@ -99,7 +99,7 @@ def _drift_off_statistics(scenario: DriftOffScenario, work_folder: Path, quick: 
     members = {"noise": _drift_by_noise, "interpolation": _drift_by_sampling, "model": _drift_by_model_error}[
         scenario.error_source
     ]
-    predicted, measured = members(scenario, work_folder, QUICK_PATH_COUNT if quick else PATH_COUNT)
+    predicted, measured = members(scenario, work_folder, QUICK_NOISE_PATH_COUNT if quick else NOISE_PATH_COUNT)
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile_with_interval(np.array(measured), 0.5)
     inner = [quantile_with_interval(np.array(measured), level)[0] for level in (0.25, 0.75)]

@@ -185,12 +185,16 @@ def _treatment_record(
 
 
 def _noisy_states(
-    engine_name: str, assembly: Assembly, force_samples: np.ndarray, cutoff_frequency: float | None, settings: Settings
+    engine_name: str,
+    assembly: Assembly,
+    force_samples: np.ndarray,
+    cutoff_frequency: float | None,
+    solver_settings: Settings,
 ) -> np.ndarray:
     """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff_frequency``
     (Hz) is given."""
     forces = Sampled(_low_pass(force_samples, cutoff_frequency), 1 / NOISE_SAMPLING_RATE, held=False)
-    return build(engine_name, replace(assembly, input=forces), settings).run().states
+    return build(engine_name, replace(assembly, input=forces), solver_settings).run().states
 
 
 def _low_pass(force_samples: np.ndarray, cutoff_frequency: float | None) -> np.ndarray:

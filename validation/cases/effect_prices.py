@@ -19,14 +19,14 @@ from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import (
-    EFFECTS,
+    EFFECT_NAMES,
     ENGINES,
     TIME_STEP,
     changes_text,
     component_count_changes,
     engine_model,
     scene_with_effects,
-    scenes_without_and_with,
+    scenes_without_and_with_effect,
     write_input_files,
 )
 from validation.choice.price_of_choice import price_of_choice
@@ -42,7 +42,7 @@ comparison."""
 RATIO_ROUNDS, PRICE_ROUNDS = {True: 7, False: 80}, {True: 5, False: 15}
 """Numbers of timing rounds, for a quick run (True) and a full run (False): of the ratios to hand-built models, and of
 the price of each effect."""
-UNCHECKED_INTERVAL = 4
+ROUNDS_BETWEEN_UNCHECKED_RUNS = 4
 """The hand-built run without a result check is timed in the first of every so many rounds."""
 RIDE_STEP_COUNTS = {
     "reference": {True: 50, False: 500},
@@ -71,12 +71,12 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         files_folder = Path(name)
         write_input_files(files_folder)
         ratios = {
-            engine: _ratio_to_hand_built(engine, files_folder, TIMED_STEP_COUNTS[quick], RATIO_ROUNDS[quick])
+            engine: _time_ratio_to_hand_built(engine, files_folder, TIMED_STEP_COUNTS[quick], RATIO_ROUNDS[quick])
             for engine in ("exudyn", "mujoco")
         }
         price = [
             _price_of_effect(effect, engine, files_folder, PRICE_ROUNDS[quick])
-            for i, effect in enumerate(EFFECTS)
+            for i, effect in enumerate(EFFECT_NAMES)
             for j, engine in enumerate(ENGINES)
             if not quick or i % len(ENGINES) == j
         ]
@@ -84,7 +84,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         row for engine, ratio in ratios.items() for row in _hand_built_rows(engine, ratio, TIMED_STEP_COUNTS[quick])
     ]
     rows += _wheelset_rows(TIMED_STEP_COUNTS[quick] // 4, quick) + _ride_rows(quick) + _contact_rows(quick)
-    rows += _car_rows(TIMED_STEP_COUNTS[quick] // 20, quick) + _stop_rows(quick) + ([] if quick else [_choice_row()])
+    rows += (
+        _car_rows(TIMED_STEP_COUNTS[quick] // 20, quick) + _stop_rows(quick) + ([] if quick else [_effect_choice_row()])
+    )
     return rows, {"price": price, "ratios": ratios}
 
 
@@ -95,7 +97,7 @@ def hand_built_run(engine_name: str, bare_scene: Scene) -> Any:
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, round_count: int) -> Saved:
+def _time_ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, round_count: int) -> Saved:
     """Ratio of the computing time of twinrig's model of a scene without effects to that of the hand-built model, and
     the largest difference of their states.
 
@@ -109,11 +111,15 @@ def _ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, r
     )
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine_name, times, theirs(), bare.run.duration), theirs]
-    seconds = interleave(jobs, round_count, round_interval=(1, 1, UNCHECKED_INTERVAL), clock=time.process_time)
+    seconds = interleave(
+        jobs, round_count, round_interval=(1, 1, ROUNDS_BETWEEN_UNCHECKED_RUNS), clock=time.process_time
+    )
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
         "gap": gap,
-        "unchecked": paired_ratio(seconds[0, ::UNCHECKED_INTERVAL], seconds[2, ::UNCHECKED_INTERVAL]),
+        "unchecked": paired_ratio(
+            seconds[0, ::ROUNDS_BETWEEN_UNCHECKED_RUNS], seconds[2, ::ROUNDS_BETWEEN_UNCHECKED_RUNS]
+        ),
     }
 
 
@@ -287,7 +293,7 @@ def _contact_rows(quick: bool) -> list[Row]:
     ]
 
 
-def _choice_row() -> Row:
+def _effect_choice_row() -> Row:
     """Row: ratio of the time of a choice of effects for a linear car to the time of the car's full covariance."""
     (ratio, low, high), predicted_seconds = price_of_choice()
     return Observed(
@@ -307,7 +313,7 @@ def _price_of_effect(effect_name: str, engine_name: str, work_folder: Path, roun
     seconds = interleave(
         [
             _timed_run(bare, engine_name)
-            for bare in scenes_without_and_with(effect_name, EFFECT_STEP_COUNT, work_folder)
+            for bare in scenes_without_and_with_effect(effect_name, EFFECT_STEP_COUNT, work_folder)
         ],
         round_count,
         5e-3,
@@ -347,14 +353,14 @@ def tables(case_data: Saved) -> list[Table]:
     ]
 
 
-def _price_list_line(saved_entry: Saved) -> tuple[str, ...]:
+def _price_list_line(effect_cost_record: Saved) -> tuple[str, ...]:
     """Line of the price list for one effect in one engine."""
-    value, low, high = saved_entry["ratio"]
+    value, low, high = effect_cost_record["ratio"]
     return (
-        saved_entry["effect"],
-        saved_entry["engine"],
-        saved_entry["adds"],
-        f"{saved_entry['step']:.2f}",
-        f"{saved_entry['us']['median']:+.2f} +/- {saved_entry['us']['mad']:.2f}",
+        effect_cost_record["effect"],
+        effect_cost_record["engine"],
+        effect_cost_record["adds"],
+        f"{effect_cost_record['step']:.2f}",
+        f"{effect_cost_record['us']['median']:+.2f} +/- {effect_cost_record['us']['mad']:.2f}",
         f"{value:.2f} ({low:.2f} to {high:.2f})",
     )

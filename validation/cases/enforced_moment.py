@@ -57,10 +57,10 @@ def write_manoeuvre(work_folder: Path, parameter_set_name: str, starts_abruptly:
     write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
 
 
-def enforced_moment(scene: Scene, engine_name: str, settings: Settings) -> np.ndarray:
+def enforced_moment(scene: Scene, engine_name: str, solver_settings: Settings) -> np.ndarray:
     """Enforced moment (n,) in N m at every millisecond of a scene."""
-    finer = replace(settings, duration=scene.run.duration)
-    return simulate(scene, engine_name, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / settings.step)]
+    finer = replace(solver_settings, duration=scene.run.duration)
+    return simulate(scene, engine_name, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / solver_settings.step)]
 
 
 def exact_moment(scene: Scene) -> np.ndarray:
@@ -176,9 +176,9 @@ def _ringing_rows(work_folder: Path) -> CaseAnswer:
     return rows, paths
 
 
-def _inconsistent_multiplier(scene: Scene, settings: Settings) -> np.ndarray:
+def _inconsistent_multiplier(scene: Scene, solver_settings: Settings) -> np.ndarray:
     """Exudyn's multiplier (n,) in N m if its initial accelerations are not made consistent with the constraint."""
-    model: Any = build("exudyn", assembly_of_scene(scene), settings)
+    model: Any = build("exudyn", assembly_of_scene(scene), solver_settings)
     model._first = 0.0
     model._consistent_start = lambda options: None
     multiplier = model.run().moment

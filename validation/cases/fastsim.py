@@ -40,10 +40,10 @@ CREEPAGE_KINDS = {
 CREEPAGE_LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING_LEVELS = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Creepage levels around the level from which the whole contact area slides."""
-LOAD, FRICTION, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
+NORMAL_LOAD, FRICTION_COEFFICIENT, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
 """Normal load (N), coefficient of friction, and sqrt(a b) (m) of the ellipses with the semi-axes a and b."""
 MATERIAL_PAIR = MaterialPair()
-FORCE_SCALES = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
+FORCE_SCALES = FRICTION_COEFFICIENT * NORMAL_LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
 """Scales of fx and fy (N) and of mz (N m)."""
 ContactColumns = dict[str, Any]
 """Type of a set of contacts: arrays by the names of the parameters of ``fastsim``."""
@@ -59,7 +59,7 @@ INVARIANT_TOLERANCES = {
     "similarity": EXACT_TO_ROUNDING,
     "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell"),
 }
-GRID_REASON = "the same model with 321 cells per strip; a fifth of the model's own error"
+CELL_COUNT_REASON = "the same model with 321 cells per strip; a fifth of the model's own error"
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -74,7 +74,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     answers, data["model"] = _model_error_rows()
-    timed, data["speed"] = speed_rows_and_table(MATERIAL_PAIR, LOAD, FRICTION, MEAN_SEMI_AXIS)
+    timed, data["speed"] = speed_rows_and_table(MATERIAL_PAIR, NORMAL_LOAD, FRICTION_COEFFICIENT, MEAN_SEMI_AXIS)
     return rows + answers + timed, data
 
 
@@ -85,25 +85,28 @@ def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float,
         grid.ravel() for grid in np.meshgrid(AXIS_RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
     )
     creepage_parts = np.array([CREEPAGE_KINDS[name] for name in kind_names])[kind] * level[:, None]
-    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2)
+    known, unit = (
+        coefficients(ratio, MATERIAL_PAIR.nu),
+        FRICTION_COEFFICIENT * NORMAL_LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2),
+    )
     scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_SEMI_AXIS], axis=1)
     xi_x, xi_y, spin = (creepage_parts * scale).T
     a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     return {
         "a": a,
         "b": b,
-        "load": np.full(len(a), LOAD),
-        "mu": np.full(len(a), FRICTION),
+        "load": np.full(len(a), NORMAL_LOAD),
+        "mu": np.full(len(a), FRICTION_COEFFICIENT),
         "xi_x": xi_x,
         "xi_y": xi_y,
         "spin": spin,
     }
 
 
-def _relative_forces(contacts: ContactColumns, **options: Any) -> Array:
+def _relative_forces(contacts: ContactColumns, **fastsim_options: Any) -> Array:
     """Forces fx and fy (n, 2) divided by mu N."""
-    answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **options)
-    return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
+    answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **fastsim_options)
+    return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION_COEFFICIENT * NORMAL_LOAD)
 
 
 def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
@@ -127,7 +130,7 @@ def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
                     f"largest error of the force at 21 cells per strip, {bound} bound, {len(truth)} cases",
                     float(errors[1].max()),
                     "mu N",
-                ).at_most(0.004, GRID_REASON, "none")
+                ).at_most(0.004, CELL_COUNT_REASON, "none")
             )
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
             order = float(np.log(mean[0] / mean[-1]) / np.log(CELL_COUNTS[-1] / CELL_COUNTS[0]))
@@ -203,7 +206,7 @@ def _creepage_limit_rows() -> list[Row]:
     slid = fastsim(RollingEllipse(**sliding), MATERIAL_PAIR)
     slides = slid.stick == 0.0
     off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True))[slides].max()
-    short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0)[slides].max()
+    short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION_COEFFICIENT * NORMAL_LOAD) - 1.0)[slides].max()
     return [
         Observed(
             "fastsim.slope",
@@ -232,10 +235,10 @@ def _spin_moment_rows() -> list[Row]:
     ratio = np.array(SPIN_AXIS_RATIOS)
     a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     longer, shorter = np.maximum(a, b), np.minimum(a, b)
-    most = FRICTION * LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
+    most = FRICTION_COEFFICIENT * NORMAL_LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
     rows = []
     for bound in POWERS:
-        ellipse = RollingEllipse(a=a, b=b, load=LOAD, mu=FRICTION, xi_x=0.0, xi_y=0.0, spin=1e5)
+        ellipse = RollingEllipse(a=a, b=b, load=NORMAL_LOAD, mu=FRICTION_COEFFICIENT, xi_x=0.0, xi_y=0.0, spin=1e5)
         spun = fastsim(ellipse, MATERIAL_PAIR, bound=bound)
         beyond = float(np.max(np.abs(spun.mz) / most - 1.0))
         what = f"moment of sliding about the centre beyond that of Hertz's pressure, {bound} bound, a/b 0.1 to 10"
@@ -257,7 +260,7 @@ def _spin_moment_rows() -> list[Row]:
 def _derivative_rows() -> list[Row]:
     """Row: difference of the forces' analytic derivatives from central differences."""
     columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
-    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": LOAD}
+    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": NORMAL_LOAD}
     known, off = derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_forces_with_changed_input(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]

@@ -43,8 +43,8 @@ MONTE_CARLO_SECONDS = 10
 """Length (s) of the Monte Carlo paths."""
 WINDOW_SECONDS, WINDOW_COUNT = 20, 4
 """Length (s) and number of the windows in which the growth rate is measured."""
-STUDY_ROAD_NAME = "20 m/s, Gd 2.4e-3"
-ROAD_SETTINGS_BY_NAME = {
+STUDY_ROAD = "20 m/s, Gd 2.4e-3"
+ROAD_SETTINGS = {
     f"{speed} m/s, Gd {gd}": {"source": "study", "speed": float(speed), "gd": float(gd)}
     for speed, gd in ((20, "2.4e-3"), (20, "6e-4"), (20, "1.5e-4"), (10, "2.4e-3"))
 }
@@ -59,22 +59,14 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     true = virtual_drive(work_folder, MONTE_CARLO_SECONDS)
     spread = _deviations_by_method(true, work_folder, quick)
     if quick:
-        roads = {STUDY_ROAD_NAME: _growth_rates(work_folder, ROAD_SETTINGS_BY_NAME[STUDY_ROAD_NAME], 2)}
+        roads = {STUDY_ROAD: _growth_rates(work_folder, ROAD_SETTINGS[STUDY_ROAD], 2)}
         return _deviation_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
-    roads = {name: _growth_rates(work_folder, road) for name, road in ROAD_SETTINGS_BY_NAME.items()}
-    roads["asymmetric twin"] = _growth_rates(
-        work_folder, ROAD_SETTINGS_BY_NAME[STUDY_ROAD_NAME], parameter_set_name="asymmetric_twin"
-    )
-    rows = [
-        *_deviation_rows(spread),
-        *_growth_rows(roads),
-        _asymmetric_twin_row(work_folder),
-        *_engine_rows(work_folder),
-    ]
-    return [*rows, _halved_step_row(work_folder), _linearised_vehicle_row(work_folder)], {
-        "spread": spread,
-        "roads": roads,
-    }
+    roads = {name: _growth_rates(work_folder, road) for name, road in ROAD_SETTINGS.items()}
+    study_road = ROAD_SETTINGS[STUDY_ROAD]
+    roads["asymmetric twin"] = _growth_rates(work_folder, study_road, parameter_set_name="asymmetric_twin")
+    rows = [*_deviation_rows(spread), *_growth_rows(roads), _asymmetric_twin_row(work_folder)]
+    rows += [*_engine_rows(work_folder), _halved_step_row(work_folder), _linearised_vehicle_row(work_folder)]
+    return rows, {"spread": spread, "roads": roads}
 
 
 def _noisy_scene(work_folder: Path, duration: float, time_step: float = 1e-3, noise_path: int = 0) -> Scene:
@@ -121,8 +113,8 @@ def _force_samples(assembly: Assembly) -> Sampled:
 
 
 def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, sample_count: int) -> TangentPath:
-    """Error path over a section of a run that starts at sample number ``first_sample`` in the state ``start_state``
-    (8,)."""
+    """Error path over a section of a run that starts at sample number ``first_sample`` in the state
+    ``start_state`` (8,)."""
     forces = replace(
         _force_samples(assembly), values=_force_samples(assembly).values[first_sample : first_sample + sample_count + 1]
     )
@@ -273,11 +265,9 @@ def _body_force_row(row_id: str, title: str, growth_record: Saved) -> Row:
     if growth_record["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
         return Observed(row_id, SYSTEM, title, growth_record["body"], "1/s").beside("small", why, "none")
+    why = "zero within its error; the wheels' inertia makes a slow swing of it"
     return Observed(row_id, SYSTEM, title, growth_record["body"], "1/s").within(
-        0.0,
-        growth_record["body error"],
-        "zero within its error; the wheels' inertia makes a slow swing of it",
-        "closed form",
+        0.0, growth_record["body error"], why, "closed form"
     )
 
 

@@ -20,7 +20,7 @@ TITLE = "Guards against silent wrong answers"
 SYSTEM: System = "pitch-plane"
 UNSTABLE_TIME_STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
 RUN_DURATIONS = (0.04, 0.2, 2.0)
-QUICK_STEPS, QUICK_DURATIONS = UNSTABLE_TIME_STEPS[::2], RUN_DURATIONS[:2]
+QUICK_TIME_STEPS, QUICK_DURATIONS = UNSTABLE_TIME_STEPS[::2], RUN_DURATIONS[:2]
 """Steps and durations (s) of the runs at unstable steps, in a quick run."""
 SILENT_ERROR_LIMIT = 1.0
 """Error, divided by the motion, above which a complete run counts as silently wrong: 100 % wrong without a warning."""
@@ -47,7 +47,7 @@ def integrator_names(engine_name: str, is_adaptive: bool | None = None) -> list[
     ]
 
 
-def road_assembly() -> Assembly:
+def study_road_assembly() -> Assembly:
     """Assembly of the vehicle on the study road."""
     return setups.vehicle(effects={"road": {"source": "study", "speed": 20.0}})
 
@@ -55,7 +55,7 @@ def road_assembly() -> Assembly:
 @cache
 def _tight_solution(duration: float) -> np.ndarray:
     """States at every millisecond by an integrator with tight tolerances."""
-    return setups.tight_solution(road_assembly(), 1e-3, duration).states
+    return setups.tight_solution(study_road_assembly(), 1e-3, duration).states
 
 
 def unstable_run_counts(engine_name: str, run_function: RunFunction, quick: bool = False) -> dict[str, int]:
@@ -63,7 +63,7 @@ def unstable_run_counts(engine_name: str, run_function: RunFunction, quick: bool
     to 10 ms and durations of 0.04 and 0.2 s, in a full run also of 2 s."""
     counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
     for name in integrator_names(engine_name, is_adaptive=False):
-        for step in QUICK_STEPS if quick else UNSTABLE_TIME_STEPS:
+        for step in QUICK_TIME_STEPS if quick else UNSTABLE_TIME_STEPS:
             for duration in QUICK_DURATIONS if quick else RUN_DURATIONS:
                 counts[_ending_of_unstable_run(engine_name, name, step, duration, run_function)] += 1
     return counts
@@ -74,7 +74,7 @@ def _ending_of_unstable_run(
 ) -> str:
     """How a run at an unstable step ends: right, refused, raised or silently wrong."""
     try:
-        states = run_function(engine_name, road_assembly(), time_step, duration, integrator_name).states
+        states = run_function(engine_name, study_road_assembly(), time_step, duration, integrator_name).states
     except InputError:
         return "refused"
     except RunFailed:
@@ -205,7 +205,7 @@ def _unstable_rows(engine_name: str, run_endings: Saved, quick: bool) -> list[Ro
             f"guards.unstable.{engine_name}.unchecked",
             SYSTEM,
             f"RK4 at 5 ms over 2 s with the step check bypassed, {engine_name}",
-            run_ending(lambda: setups.unchecked_run(engine_name, road_assembly(), 5e-3, 2.0)),
+            run_ending(lambda: setups.unchecked_run(engine_name, study_road_assembly(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
         ),

@@ -33,8 +33,8 @@ SYSTEM: System = "rolling-vehicle"
 R19_CAR = load_vehicle("r19_free")
 R19_CAR_WITHOUT_DRAG = replace(R19_CAR, drags=())
 WHEEL_NAMES = ("fl", "fr", "rl", "rr")
-LANE_CHANGE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
-SMALL_LANE_CHANGE = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE_CHANGE.steer))
+LANE_CHANGE_CONTROLS = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
+SMALL_LANE_CHANGE_CONTROLS = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE_CHANGE_CONTROLS.steer))
 ROAD_LEVEL, SEED, SPEED = 4e-6, 3, 25.0
 SLOPE, GENTLE_FRICTION = 0.1, 0.05
 TIMING_ROUNDS = 60
@@ -42,7 +42,9 @@ TIMING_ROUNDS = 60
 
 def car_in_lane_change(**setting_changes: Any) -> Handling:
     """The car in a lane change on a rough road; keyword arguments replace its settings."""
-    return Handling(R19_CAR, controls=LANE_CHANGE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**setting_changes)
+    return Handling(R19_CAR, controls=LANE_CHANGE_CONTROLS, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(
+        **setting_changes
+    )
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -51,11 +53,11 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     duration = 0.3 if quick else 1.0
     drives = {engine: drive_run(engine, car_in_lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
     rows = [
-        _engines_row(drives),
+        _engine_agreement_row(drives),
         *_single_tyre_rows(),
         _friction_power_row(drives["mujoco"]),
         _mirror_row(duration),
-        _threads_row(),
+        _equal_bits_in_threads_row(),
     ]
     if not quick:
         rows += [
@@ -64,7 +66,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             *_load_transfer_rows(),
             _slope_standstill_row(),
             *_energy_rows(),
-            *_fault_rows(),
+            *_planted_fault_rows(),
             _tyre_cost_row(),
         ]
     return rows, {}
@@ -80,7 +82,7 @@ def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
     )
 
 
-def _engines_row(drives_by_engine: dict[str, Drive]) -> Row:
+def _engine_agreement_row(drives_by_engine: dict[str, Drive]) -> Row:
     """Row: largest difference between Exudyn and MuJoCo in a lane change on a rough road."""
     return Observed(
         "handling.engines",
@@ -246,7 +248,10 @@ def _slope_standstill_row() -> Row:
 
 def _energy_rows() -> list[Row]:
     gaps = {}
-    for name, friction, controls in (("held", 20.0, SMALL_LANE_CHANGE), ("sliding", 0.9, LANE_CHANGE)):
+    for name, friction, controls in (
+        ("held", 20.0, SMALL_LANE_CHANGE_CONTROLS),
+        ("sliding", 0.9, LANE_CHANGE_CONTROLS),
+    ):
         for step in (1e-3, 5e-4):
             drive = drive_run(
                 "mujoco", car_in_lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
@@ -291,7 +296,7 @@ def _reverse_steer(handling_car: Handling) -> None:
     handling_car.tyre_numbers(1)[at.STEERED] *= -1.0
 
 
-def _fault_rows() -> list[Row]:
+def _planted_fault_rows() -> list[Row]:
     soft, rough = Handling(R19_CAR), car_in_lane_change()
     soft.tyre_numbers(0)[at.BRISTLES] *= 1.01
     rough.tyre_numbers(2)[at.GRIP] *= 1.0 + 1e-6
@@ -333,7 +338,7 @@ def _tyre_cost_row() -> Row:
     ).aim(0.3, "seconds of the processor, median of interleaved rounds")
 
 
-def _threads_row() -> Row:
+def _equal_bits_in_threads_row() -> Row:
     """Row: lane changes at three speeds give the same bits in two threads of MuJoCo as in one."""
     handling = car_in_lane_change()
     built = FreeMujoco(driven_by(handling))

@@ -31,7 +31,7 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
 SEED = 13
-DURATION, STEP, ALLOWED_PITCH_ERROR = 60.0, 1e-3, 0.2
+DURATION, TIME_STEP, ALLOWED_PITCH_ERROR = 60.0, 1e-3, 0.2
 """Length and step (s) of the runs, and largest pitch error (rad) of a run that the spring holds."""
 FORCE_NOISE = 30.7
 """Standard deviation (N) of the noise on each force sample at 1 kHz."""
@@ -99,11 +99,13 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
 
 def _runs_without_spring(work_folder: Path) -> RunsWithoutSpring:
     """The virtual measurement, the runs without a spring, and the stiffness predicted from the wheel forces."""
-    true = virtual_drive(work_folder, DURATION, STEP, STEP)
+    true = virtual_drive(work_folder, DURATION, TIME_STEP, TIME_STEP)
     noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
-    quiet = assembly_of_scene(force_scene(work_folder, step=STEP, duration=DURATION))
+    quiet = assembly_of_scene(force_scene(work_folder, step=TIME_STEP, duration=DURATION))
     noisy = assembly_of_scene(
-        force_scene(work_folder, step=STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise)
+        force_scene(
+            work_folder, step=TIME_STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise
+        )
     )
     predicted_stiffness = holding_stiffness(quiet.parameters, pitch_error_growth(quiet).rate)
     return RunsWithoutSpring(

@@ -30,7 +30,7 @@ from validation.spatial.cars import hub_forces_by_jacobians, r19, random_states,
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"
-SEED, PATH_COUNT, NOISE_SECONDS = 31, 48, 4.0
+SEED, NOISE_PATH_COUNT, NOISE_SECONDS = 31, 48, 4.0
 """Seed, number of paths and their length (s) in the ensemble."""
 TILT_ANGLE = 0.1
 """Roll angle (rad) with which the effect of gravity on a tilted vehicle is tested."""
@@ -45,19 +45,19 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [
         *_acceleration_rows("r19_free", car),
         _hub_wrench_row(car),
-        *_gravity_rows(car),
+        *_tilted_vehicle_rows(car),
         _toppling_rate_row(car),
         _noisy_engines_row(car, 0.2 if quick else 2.0),
         *hub_inputs.rows(car, quick),
     ]
     if quick:
         return rows, {}
-    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduction_rows(car), *_growth_rows(car)]
+    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduction_rows(car), *_noise_growth_rows(car)]
     scenes = {frame: _hub_force_study_scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
         rows += [*_stabilised_rows(frame, comparison), _prescribed_angles_row(frame, comparison)]
-    return rows + _fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
+    return rows + _planted_fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
 
 
 def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
@@ -128,7 +128,7 @@ def _tilted_run(vehicle: CutVehicle, force_frame: str, roll_angle: float, durati
     )
 
 
-def _gravity_rows(vehicle: CutVehicle) -> list[Row]:
+def _tilted_vehicle_rows(vehicle: CutVehicle) -> list[Row]:
     """Rows: a tilted vehicle under body-fixed static forces moves sideways as a rigid body, and its section forces do
     not change."""
     run = _tilted_run(vehicle, "hub", TILT_ANGLE, 1.0)
@@ -226,7 +226,7 @@ def _reproduction_rows(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _growth_rows(vehicle: CutVehicle) -> list[Row]:
+def _noise_growth_rows(vehicle: CutVehicle) -> list[Row]:
     """Rows: mean squares of an ensemble under white noise divided by their laws. They follow a chi-square distribution
     with as many degrees of freedom as paths."""
     steps, step = round(NOISE_SECONDS / 2e-3), 2e-3
@@ -235,20 +235,20 @@ def _growth_rows(vehicle: CutVehicle) -> list[Row]:
     ends = np.array(
         [
             hub_model("mujoco", vehicle, still.with_noise(deviation, SEED, path), step, NOISE_SECONDS).run().states[-1]
-            for path in range(PATH_COUNT)
+            for path in range(NOISE_PATH_COUNT)
         ]
     )
     body, at = rigid_vehicle(vehicle), np.array([NOISE_SECONDS])
     law = body.angle_variance(deviation, step, at)[0]
     sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
-    low, high = chi2.ppf([5e-4, 1 - 5e-4], PATH_COUNT) / PATH_COUNT
+    low, high = chi2.ppf([5e-4, 1 - 5e-4], NOISE_PATH_COUNT) / NOISE_PATH_COUNT
     named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
     return [
         Observed(
             f"hub_forces.growth_{name}",
             SYSTEM,
             f"ratio of the mean square of {name} after {NOISE_SECONDS:g} s of white noise to its law, "
-            f"{PATH_COUNT} paths",
+            f"{NOISE_PATH_COUNT} paths",
             float(np.mean(ends[:, i] ** 2) / variance),
             "1",
         ).within(
@@ -334,7 +334,7 @@ def _prescribed_angles_row(force_frame: str, run_comparison: Comparison) -> Row:
     ).at_most(0.1, "force noise of 0.2 % alone changes lightly loaded bushes by some per cent", "none")
 
 
-def _fault_rows(study_scene: HubScene) -> list[Row]:
+def _planted_fault_rows(study_scene: HubScene) -> list[Row]:
     """Rows: hub forces in a wrong frame, or of exchanged hubs, are refused because they contradict the measured angles.
 
     The runs take 5 s: in 2 s, another frame cannot be distinguished from an offset of 30 N at a wheel, which is no

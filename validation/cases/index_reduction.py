@@ -36,7 +36,7 @@ PITCH_BANDWIDTH = 5.0
 """Bandwidth (Hz) of the pitch angle that is integrated from such a gyro."""
 HAND_WRITTEN_FORMULATIONS: dict[str, Saved] = {
     "index 1": {},
-    "index 1, Baumgarte": {"alpha": BAUMGARTE_RATE},
+    "index 1, Baumgarte": {"baumgarte_rate": BAUMGARTE_RATE},
     "index 1, projection": {"with_projection": True},
 }
 EXUDYN_INTEGRATORS = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
@@ -324,11 +324,11 @@ CONSTRAINT_JACOBIAN = np.array([[0.0, 0.0, 0.0, 1.0]])
 class IndexOneVehicle:
     """The vehicle with prescribed pitch, its constraint differentiated twice (index 1).
 
-    alpha : Baumgarte's rate in 1/s, 0 for none; with_projection : whether each step ends on the constraint
+    baumgarte_rate : Baumgarte's rate in 1/s, 0 for none; with_projection : whether each step ends on the constraint
     """
 
-    def __init__(self, assembly: Assembly, alpha: float = 0.0, with_projection: bool = False) -> None:
-        self.assembly, self.alpha, self.with_projection = assembly, alpha, with_projection
+    def __init__(self, assembly: Assembly, baumgarte_rate: float = 0.0, with_projection: bool = False) -> None:
+        self.assembly, self.alpha, self.with_projection = assembly, baumgarte_rate, with_projection
         self._mass = matrices(assembly.vehicle)[0]
         self._solve = np.linalg.inv(
             np.block([[self._mass, -CONSTRAINT_JACOBIAN.T], [CONSTRAINT_JACOBIAN, np.zeros((1, 1))]])

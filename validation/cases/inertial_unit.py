@@ -68,10 +68,10 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         *_one_axis_rows(paths),
         *_three_axes_rows(paths),
         *_quaternion_norm_rows(paths),
-        *_bias_rows(paths),
+        *_gyro_bias_rows(paths),
     ]
     example, data = _ten_minute_rows(0 if quick else 60)
-    recorded, seen = _recording_rows(paths)
+    recorded, seen = _real_car_recording_rows(paths)
     return [*rows, *example, *recorded, *([] if quick else _section_force_rows())], {
         "ten minutes": data,
         "recording": seen,
@@ -145,14 +145,15 @@ def _one_axis_rows(noise_path_count: int) -> list[Row]:
 
 
 def _mean_row(
-    row_name: str, quantity_name: str, samples: np.ndarray, expected_mean: float, tolerance_reason: str
+    row_name: str, quantity_name: str, simulated_values: np.ndarray, expected_mean: float, tolerance_reason: str
 ) -> Row:
     """Row for a mean that must lie within STANDARD_ERRORS_OF_BAND standard errors of its theoretical value."""
-    error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
-    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, float(samples.mean()), "").within(
+    error = float(simulated_values.std(ddof=1) / math.sqrt(len(simulated_values)))
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, float(simulated_values.mean()), "").within(
         expected_mean,
         STANDARD_ERRORS_OF_BAND * error,
-        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {STANDARD_ERRORS_OF_BAND} standard errors "
+        f"{tolerance_reason}; {len(simulated_values):,} paths, seed {SEED}, within {STANDARD_ERRORS_OF_BAND} "
+        "standard errors "
         f"of {error:.2g}",
         "closed form",
     )
@@ -221,7 +222,7 @@ def _three_axes_rows(noise_path_count: int) -> list[Row]:
     ]
 
 
-STRATONOVICH_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
+STRATONOVICH_LAW_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
 def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
@@ -258,7 +259,7 @@ def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
                 f"mean scalar part q1 by explicit Euler, normalised at the end, {noisy}",
                 true / square**0.5,
                 scalar,
-                STRATONOVICH_REASON,
+                STRATONOVICH_LAW_REASON,
             ),
         )
         rows += [
@@ -350,7 +351,7 @@ def _error_angles(noise_path: int, body_rates: np.ndarray, true_attitudes: np.nd
     )
 
 
-def _bias_rows(noise_path_count: int) -> list[Row]:
+def _gyro_bias_rows(noise_path_count: int) -> list[Row]:
     """Rows: mean square angle error by simulated gyro biases, constant and wandering, compared with its law."""
     rows, grade, tau = [], 10.0 * DEGREES_PER_HOUR, 100.0
     for name, turn_on, instability, span in (
@@ -408,7 +409,7 @@ def _section_force_rows() -> list[Row]:
     ]
 
 
-def _recording_rows(noise_path_count: int) -> CaseAnswer:
+def _real_car_recording_rows(noise_path_count: int) -> CaseAnswer:
     """Rows and data from a recording of a minute in a real car: gyro compared with camera, and the noise law on the
     car's motion."""
     path = recording.find_recording()

@@ -37,7 +37,7 @@ ENGINES = ("reference", "exudyn", "mujoco")
 SAMPLE_COUNT, DURATION = 20, 30.0
 """Number of noise samples and length (s) of the runs that are judged by damage."""
 LOOP_RUN_COUNT, LOOP_SECONDS = 6, 60.0
-OUTAGE, LOST_SHARE = (20.0, 25.0), 0.3
+OUTAGE_TIMES, LOST_SAMPLE_SHARE = (20.0, 25.0), 0.3
 """Start and end (s) of an outage without any measurement, and share of all other samples that are lost."""
 VARIANCE_FACTORS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 """For each filter: factors on the variances of force noise and of measurement noise that the filter assumes."""
@@ -60,7 +60,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         )
         return rows + _short_run_rows(run_folder), {"damage": [], "deviations": []}
     rows = _consistency_rows(run_folder, 24, 12.0, tuple(VARIANCE_FACTORS))
-    rows += _missing_sample_rows(run_folder, 40.0, OUTAGE, tuple(SENSOR_CHANNELS))
+    rows += _missing_sample_rows(run_folder, 40.0, OUTAGE_TIMES, tuple(SENSOR_CHANNELS))
     loop_rows, deviations = _closed_loop_rows(run_folder)
     gyro = gyro_only_pitch_error(run_folder, 600.0, SEED)
     damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLE_COUNT)]
@@ -88,7 +88,7 @@ def _consistency_rows(work_folder: Path, run_count: int, duration: float, filter
     rows = [
         _chi_square_band_row("nees", "normalised error squared of 6 states", errors["right"], 6, runs_text),
         _chi_square_band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
-        *_inconsistency_rows([consistent[2] for consistent in by_filter["right"]]),
+        *_consistency_test_rows([consistent[2] for consistent in by_filter["right"]]),
     ]
     if "Q" in filter_names:
         rows += [
@@ -98,20 +98,20 @@ def _consistency_rows(work_folder: Path, run_count: int, duration: float, filter
     return rows
 
 
-INNOVATION_MEAN, INNOVATION_CORRELATION = 0.2, 0.3
+PLANTED_INNOVATION_MEAN, PLANTED_INNOVATION_CORRELATION = 0.2, 0.3
 """Faults planted into the innovations of correct filters: a mean, in standard deviations, and a correlation with the
 sample before."""
 
 
-def _inconsistency_rows(innovations: list[np.ndarray]) -> list[Row]:
+def _consistency_test_rows(innovations: list[np.ndarray]) -> list[Row]:
     """Rows: number of correct filters that the consistency test rejects, and of wrong filters that the test accepts."""
     count = len(innovations)
     alarms = sum(not consistency(innovation_series, ("pitch",)).consistent for innovation_series in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "larger by a quarter": lambda w: 1.25 * w,
-        f"with a mean of {INNOVATION_MEAN:g} deviations": lambda w: w + INNOVATION_MEAN,
-        f"correlated by {INNOVATION_CORRELATION:g}": lambda w: np.vstack(
-            [w[:1], w[1:] + INNOVATION_CORRELATION * w[:-1]]
+        f"with a mean of {PLANTED_INNOVATION_MEAN:g} deviations": lambda w: w + PLANTED_INNOVATION_MEAN,
+        f"correlated by {PLANTED_INNOVATION_CORRELATION:g}": lambda w: np.vstack(
+            [w[:1], w[1:] + PLANTED_INNOVATION_CORRELATION * w[:-1]]
         ),
     }
     stated = f"of {count} runs; stated level {ALARMS:g} of all runs"
@@ -174,8 +174,8 @@ def _missing_sample_rows(
     samples."""
     rows = []
     for name in sensor_names:
-        gaps = run_with_missing_samples(work_folder, duration, SEED, SENSOR_CHANNELS[name], LOST_SHARE, outage)
-        gaps_text = f"{LOST_SHARE:.0%} of the samples lost" + (
+        gaps = run_with_missing_samples(work_folder, duration, SEED, SENSOR_CHANNELS[name], LOST_SAMPLE_SHARE, outage)
+        gaps_text = f"{LOST_SAMPLE_SHARE:.0%} of the samples lost" + (
             f", none from {outage[0]:g} to {outage[1]:g} s" if outage else ""
         )
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest ratio of the pitch error to its stated deviation"

@@ -38,9 +38,9 @@ IMPLEMENTATIONS = ("reference", *ENGINES)
 STATE_UNITS = "m, rad, m/s, rad/s"
 START_MOTION = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
 """Initial displacements (m) and pitch (rad): both wheels are in the air, one higher than the other."""
-STEP, SEED, SPEED = 1e-4, 7, 20.0
+TIME_STEP, SEED, SPEED = 1e-4, 7, 20.0
 ROUNDING_REASON = "the same tableau and laws; sums are taken in another order"
-NO_DAMPING = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
+ZERO_DAMPING_OVERRIDES = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
@@ -60,9 +60,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
 
 def lift_off_scene(
     parameter_set_name: str = VEHICLE_SETS[-1],
-    geometry: str = "exact",
+    geometry_name: str = "exact",
     duration: float = 1.0,
-    time_step: float = STEP,
+    time_step: float = TIME_STEP,
     on_study_road: bool = False,
     parameter_overrides: dict[str, float] | None = None,
 ) -> Scene:
@@ -70,7 +70,11 @@ def lift_off_scene(
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameter_set_name, "geometry": geometry, "override": parameter_overrides or {}},
+            "vehicle": {
+                "parameters": parameter_set_name,
+                "geometry": geometry_name,
+                "override": parameter_overrides or {},
+            },
             "run": {"duration": duration, "step": time_step},
             "start": {} if on_study_road else START_MOTION,
             "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if on_study_road else {})},
@@ -146,9 +150,9 @@ def _bounce_rows(duration: float) -> list[Row]:
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
-        lifting = lift_off_scene(geometry="linear", duration=duration, parameter_overrides=override)
+        lifting = lift_off_scene(geometry_name="linear", duration=duration, parameter_overrides=override)
         assembly = assembly_of_scene(lifting)
-        exact = BouncingVehicle(assembly, STEP).path(assembly.initial, round(duration / STEP))
+        exact = BouncingVehicle(assembly, TIME_STEP).path(assembly.initial, round(duration / TIME_STEP))
         for engine in IMPLEMENTATIONS:
             error = float(np.abs(simulate(lifting, engine).states - exact).max())
             name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
@@ -172,7 +176,7 @@ def _bounce_rows(duration: float) -> list[Row]:
 )
 def _convergence_order_row(halving_count: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
-    lifting = lift_off_scene(geometry="linear")
+    lifting = lift_off_scene(geometry_name="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halving_count), 1e-3
     exact = BouncingVehicle(assembly_of_scene(lifting), coarse).path(
         assembly_of_scene(lifting).initial, round(1.0 / coarse)
@@ -197,7 +201,7 @@ def _energy_rows(duration: float) -> list[Row]:
     tyres alone."""
     rows = []
     for engine in IMPLEMENTATIONS:
-        undamped = lift_off_scene(duration=duration, parameter_overrides=NO_DAMPING)
+        undamped = lift_off_scene(duration=duration, parameter_overrides=ZERO_DAMPING_OVERRIDES)
         states = simulate(undamped, engine).states
         energies = bounce_energy(assembly_of_scene(undamped), states)
         size = energies[0] - bounce_energy(assembly_of_scene(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
@@ -210,7 +214,9 @@ def _energy_rows(duration: float) -> list[Row]:
                 "of the fall's",
             ).at_most(1e-4, "the error of the step", "closed form")
         )
-        damped = lift_off_scene(duration=duration, parameter_overrides=NO_DAMPING | {"d1": 2e3, "d2": 500.0})
+        damped = lift_off_scene(
+            duration=duration, parameter_overrides=ZERO_DAMPING_OVERRIDES | {"d1": 2e3, "d2": 500.0}
+        )
         energies = bounce_energy(assembly_of_scene(damped), simulate(damped, engine).states)
         gain = float((energies - np.minimum.accumulate(energies)).max() / size)
         rows.append(

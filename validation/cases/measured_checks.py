@@ -155,7 +155,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows, finding_texts = [], dict[str, str]()
     for fault in FAULTS_OF_QUICK_RUN if quick else FAULTS_OF_QUICK_RUN + FURTHER_FAULTS:
         findings = planted_findings(virtual, work_folder, fault.spoil, **fault.faults)
-        rows += _fault_rows(fault, findings)
+        rows += _planted_fault_rows(fault, findings)
         finding_texts[fault.name] = findings[0].text if findings else "nothing"
     rows.append(_clean_recordings_row("quick", [planted_findings(virtual, work_folder)]))
     if not quick:
@@ -167,7 +167,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ]
         size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, work_folder), "drift")
         rows += [
-            _size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
+            _stated_size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
             *_moving_car_check_rows(work_folder),
         ]
     return rows, {"said": finding_texts}
@@ -179,7 +179,7 @@ def _stated_size(findings: Sequence[Finding], check_name: str, finding_place: st
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _size_row(row_name: str, quantity_name: str, stated_size: float, unit: str, planted_size: float) -> Row:
+def _stated_size_row(row_name: str, quantity_name: str, stated_size: float, unit: str, planted_size: float) -> Row:
     """Row that compares the size that a check states with the size of the planted fault."""
     id, why = f"measured_checks.{row_name}", "what was planted, 20 %"
     return Observed(id, SYSTEM, quantity_name, stated_size, unit).within(
@@ -193,7 +193,7 @@ def _no_findings_row(row_name: str, quantity_name: str, finding_texts: list[str]
     return Observed(id, SYSTEM, quantity_name, len(finding_texts), "").within(0, 0, finding_text, "closed form")
 
 
-def _fault_rows(planted_fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
+def _planted_fault_rows(planted_fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
     """Rows on one planted fault: the right check names the fault at the right place, no other fault is named, and the
     size is right."""
     key = planted_fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
@@ -214,7 +214,9 @@ def _fault_rows(planted_fault: PlantedMeasurementFault, findings: tuple[Finding,
     if planted_fault.check != "swapped":
         size = _stated_size(findings, planted_fault.check, planted_fault.place)
         rows.append(
-            _size_row(f"{key}.size", f"{planted_fault.name}: its size", size, planted_fault.unit, planted_fault.size)
+            _stated_size_row(
+                f"{key}.size", f"{planted_fault.name}: its size", size, planted_fault.unit, planted_fault.size
+            )
         )
     return rows
 
@@ -285,7 +287,7 @@ def _three_faults_at_once_rows(virtual_measurement: VirtualMeasurement, work_fol
     last = [finding for finding in findings if finding.check == "shift"][-1:]
     return [
         behaviour_row(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
-        _size_row(
+        _stated_size_row(
             "together.size", "size of the delay among several faults", _stated_size(last, "shift"), "s", PLANTED_DELAY
         ),
     ]
@@ -345,7 +347,7 @@ def _moving_car_check_rows(work_folder: Path) -> list[Row]:
             "az, q and pitch",
             "gravity and the turning of the pose tell",
         ),
-        _size_row(
+        _stated_size_row(
             "car.degrees",
             "moving car with degrees for radians in pitch: size of the fault",
             size,

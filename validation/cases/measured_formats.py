@@ -36,7 +36,7 @@ FILE_COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
 CHANNEL_NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
 CHANNEL_UNITS = ("kN", "°", "m/s^2")
 CHANNEL_COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
-SAMPLE_COUNT, SAMPLE_PERIOD, BLOCK_SAMPLES = 5000, 1e-3, 1234
+SAMPLE_COUNT, SAMPLE_PERIOD, SAMPLES_PER_BLOCK = 5000, 1e-3, 1234
 """Number of samples, sampling period (s), and samples in a block that is read."""
 
 
@@ -66,7 +66,7 @@ def largest_relative_difference(read_values: np.ndarray, true_values: np.ndarray
     return float(np.nanmax(np.abs(read_values - true_values) / np.abs(true_values)))
 
 
-def preserved_texts(measurement_source: Source) -> dict[str, bool]:
+def preserved_metadata(measurement_source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {
@@ -89,8 +89,8 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             format_rows, line = round_trip_rows(Path(name) / f"trip{extension}", extension)
             rows += format_rows
             lines.append(line)
-        rows += [two_rates_row(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
-        rows += resolution_rows(Path(name))
+        rows += [two_sampling_rates_row(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
+        rows += sample_resolution_rows(Path(name))
         rows += file_form_rows(Path(name))
         if not quick:
             rows += [
@@ -106,7 +106,7 @@ def round_trip_rows(file_path: Path, file_extension: str) -> tuple[list[Row], di
     truth, form = written_values(), FORMAT_NAMES[file_extension]
     began = time.perf_counter()
     source = open_source(write_in_blocks(file_path, truth))
-    blocks = list(source.blocks(CHANNEL_NAMES, BLOCK_SAMPLES))
+    blocks = list(source.blocks(CHANNEL_NAMES, SAMPLES_PER_BLOCK))
     seconds = time.perf_counter() - began
     values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
     library, reading = LIBRARIES[file_extension]
@@ -118,7 +118,7 @@ def round_trip_rows(file_path: Path, file_extension: str) -> tuple[list[Row], di
         float(np.abs(times - SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)).max()),
         largest_relative_difference(there, truth),
     )
-    lost = ", ".join(what for what, good in preserved_texts(source).items() if not good)
+    lost = ", ".join(what for what, good in preserved_metadata(source).items() if not good)
     key, why = f"measured_formats.{file_extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
         Observed(
@@ -157,7 +157,7 @@ def round_trip_rows(file_path: Path, file_extension: str) -> tuple[list[Row], di
     }
 
 
-def two_rates_row(file_path: Path, file_extension: str) -> Row:
+def two_sampling_rates_row(file_path: Path, file_extension: str) -> Row:
     """Row: largest change of times and values of two groups with different sampling rates, written to one file and read
     back."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
@@ -239,7 +239,7 @@ def wheel_force_with_pothole() -> np.ndarray:
     return load
 
 
-def resolution_rows(work_folder: Path) -> list[Row]:
+def sample_resolution_rows(work_folder: Path) -> list[Row]:
     """Rows: change of the damage of the road without its pothole by integer and by floating-point samples. RPC III
     files are written in floating point for this reason."""
     load = wheel_force_with_pothole()

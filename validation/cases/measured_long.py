@@ -51,7 +51,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for engine, seconds in lasting.items()
         for method in ("none", "kalman", "prescribed")
     ]
-    return [*rows, _killed_row(work_folder), *_memory_rows(work_folder), *_export_rows(work_folder)], {}
+    return [*rows, _killed_run_row(work_folder), *_peak_memory_rows(work_folder), *_export_rows(work_folder)], {}
 
 
 def _guide_force_rows(quick: bool) -> list[Row]:
@@ -169,7 +169,7 @@ def _equal_blocks_row(work_folder: Path, engine_name: str, stabiliser: str, reco
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
 
 
-def _killed_row(work_folder: Path) -> Row:
+def _killed_run_row(work_folder: Path) -> Row:
     """Row: number of channels that differ between a run that was killed twice and a run that was not."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):
@@ -192,7 +192,7 @@ def _killed_row(work_folder: Path) -> Row:
     ).at_most(0.0, "a checkpoint is written whole or not at all", "closed form")
 
 
-def _memory_rows(work_folder: Path) -> list[Row]:
+def _peak_memory_rows(work_folder: Path) -> list[Row]:
     """Rows: peak memory for an hour of recording, extrapolated from a shorter recording, and speed of the run."""
     section_run_of_recording(work_folder, LONG_DURATION, PATTERN_SECONDS)
     words = map(str, (work_folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))

@@ -78,7 +78,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return _quick_rows(work_folder), {}
     rows, data = list[Row](), dict[str, Any]()
     for chain_test in MEASUREMENT_CHAIN_TESTS:
-        proved, ratios = _format_rows(chain_test, work_folder / chain_test.name)
+        proved, ratios = _file_format_rows(chain_test, work_folder / chain_test.name)
         rows += proved
         data[chain_test.name] = ratios
     return [*rows, *_trust_time_rows(), *_moving_car_rows(work_folder / "moving")], data
@@ -121,7 +121,7 @@ def planted_faults(converter_bits: int) -> Faults:
 
 def recording_from_files(
     simulated_measurement: VirtualMeasurement,
-    samples: np.ndarray,
+    measured_samples: np.ndarray,
     vehicle_name: str,
     format_name: str,
     work_folder: Path,
@@ -137,7 +137,7 @@ def recording_from_files(
         signals = tuple(signal for signal, taken in zip(simulated_measurement.signals, chosen, strict=True) if taken)
         write(
             work_folder / f"{name}.{format_name}",
-            [channel_group(signals, samples[:, chosen], simulated_measurement.period)],
+            [channel_group(signals, measured_samples[:, chosen], simulated_measurement.period)],
         )
         text.append(map_lines(signals, f"{name}.{format_name}", offset))
     (work_folder / "scene.toml").write_text("\n".join(text))
@@ -153,7 +153,9 @@ def stabilised_run(
     return SectionRun(vehicle, recording, Sections(vehicle), engine_name, attitude_hold)
 
 
-def _format_rows(chain_test: MeasurementChainTest, work_folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
+def _file_format_rows(
+    chain_test: MeasurementChainTest, work_folder: Path
+) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """Rows and mean damage ratios of ten noise samples through every file format, stabilised. The first sample is also
     run free and in the other engine."""
     work_folder.mkdir()
@@ -186,7 +188,7 @@ def _format_rows(chain_test: MeasurementChainTest, work_folder: Path) -> tuple[l
     first = recording_from_files(
         true, true.samples(planted, SEED), chain_test.vehicle_file, "csv", work_folder / "beside"
     )
-    return [*rows, *_other_run_rows(chain_test, first, true, work_folder)], means
+    return [*rows, *_engine_and_free_run_rows(chain_test, first, true, work_folder)], means
 
 
 def _differ_by_rounding(first_samples: np.ndarray, second_samples: np.ndarray) -> bool:
@@ -195,17 +197,21 @@ def _differ_by_rounding(first_samples: np.ndarray, second_samples: np.ndarray) -
     return bool(np.allclose(first_samples / largest, second_samples / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
-def _largest_channel_change(recording: Recording, true_measurement: VirtualMeasurement, samples: np.ndarray) -> float:
+def _largest_channel_change(
+    recording: Recording, true_measurement: VirtualMeasurement, measured_samples: np.ndarray
+) -> float:
     """Largest change of a hub channel by writing, mapping and resampling, divided by the channel's largest value;
     infinite if other samples are missing."""
     largest_change = 0.0
     for i, signal in enumerate(true_measurement.signals):
         if signal.at in true_measurement.vehicle.hubs:
             back = recording.samples(next(s for s in recording.signals if s.channel == signal.channel))
-            gone = np.isnan(samples[:, i])
+            gone = np.isnan(measured_samples[:, i])
             if (np.isnan(back) != gone).any():
                 return np.inf
-            off = float(np.nanmax(np.abs(back - samples[:, i]))) / max(float(np.nanmax(np.abs(samples[:, i]))), 1e-300)
+            off = float(np.nanmax(np.abs(back - measured_samples[:, i]))) / max(
+                float(np.nanmax(np.abs(measured_samples[:, i]))), 1e-300
+            )
             largest_change = max(largest_change, off)
     return largest_change
 
@@ -242,7 +248,7 @@ def _damage_rows(
     ]
 
 
-def _other_run_rows(
+def _engine_and_free_run_rows(
     chain_test: MeasurementChainTest, recording: Recording, true_measurement: VirtualMeasurement, work_folder: Path
 ) -> list[Row]:
     """Rows: the recording simulated in Exudyn and MuJoCo, free and stabilised, and the verdicts on these runs."""

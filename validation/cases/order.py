@@ -33,7 +33,7 @@ JUDGED_INTEGRATORS: tuple[tuple[str, str, dict[str, float], float, float], ...] 
 )
 """Engine, integrator, options, expected order, and tolerance of the observed order."""
 TIME_STEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
-QUICK_STEPS, QUICK_DURATION = TIME_STEPS[1:3], 0.5
+QUICK_TIME_STEPS, QUICK_DURATION = TIME_STEPS[1:3], 0.5
 """Steps (s) and length (s) of a quick run: one halving of the step over half a second."""
 ORDER_REASON = "halvings inside the asymptotic range; the band leaves room for the next term of the error"
 
@@ -67,7 +67,7 @@ def fitted_order(time_steps: tuple[float, ...], errors_by_time_step: list[float]
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each integrator, compared with DOP853 at a tolerance of 1e-13. A quick run has one halving of the step
     over half a second."""
-    steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (TIME_STEPS, DURATION)
+    steps, duration = (QUICK_TIME_STEPS, QUICK_DURATION) if quick else (TIME_STEPS, DURATION)
     truth = simulate(
         road_scene(step=COMPARED_TIME_GRID, duration=duration),
         "reference",

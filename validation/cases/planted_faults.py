@@ -42,7 +42,7 @@ FAULT_CAMPAIGNS = (
     advice.CAMPAIGN,
 )
 QUICK_FAULTS = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
-QUICK_SPACING, FEWEST_FAULTS = 16, 40
+QUICK_FAULT_SPACING, FEWEST_FAULT_COUNT = 16, 40
 """Every so many faults of a campaign are planted in a quick run; and the least number of faults that must be caught."""
 
 
@@ -56,7 +56,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     )
     data: Saved = {
         "pitch-plane": plane,
-        **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in FAULT_CAMPAIGNS},
+        **{campaign.id: campaign.measure(QUICK_FAULT_SPACING if quick else 1) for campaign in FAULT_CAMPAIGNS},
     }
     rows = [
         *pitch_plane.rows(plane),
@@ -71,8 +71,8 @@ def _fault_count_row(case_data: Saved) -> Row:
     return Observed(
         "planted.count",
         FAULT_SYSTEM,
-        f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
-        max(0, FEWEST_FAULTS - caught),
+        f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULT_COUNT}",
+        max(0, FEWEST_FAULT_COUNT - caught),
         "faults",
     ).at_most(0, f"{caught} of {len(_fault_table_lines(case_data))} are", "native")
 

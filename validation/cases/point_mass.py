@@ -15,7 +15,7 @@ TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
 SEED = 20
 DECIMAL_DIGITS = 60
-DEVIATION, STEP, MASS = 32.0, 1e-3, 780.0
+FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS = 32.0, 1e-3, 780.0
 """Standard deviation of the force noise (N), step (s) and mass (kg) of the paper's vehicle."""
 DAMPING_PRODUCTS = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
 """Products of the damping rate and the time, dimensionless."""
@@ -103,7 +103,7 @@ def _continuous_covariance_error(damping_product: float) -> float:
     eta = damping_product / END_TIME
     with localcontext(prec=DECIMAL_DIGITS):
         e, t = Decimal(eta), Decimal(END_TIME)
-        gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
+        gain = Decimal(FORCE_NOISE_DEVIATION) ** 2 * Decimal(TIME_STEP) / Decimal(VEHICLE_MASS) ** 2
         rates: DecimalMatrix = [
             [Decimal(0), 2 * t, Decimal(0), Decimal(0)],
             [Decimal(0), -e * t, t, Decimal(0)],
@@ -111,7 +111,9 @@ def _continuous_covariance_error(damping_product: float) -> float:
             [Decimal(0)] * 4,
         ]
         truth = [row[3] for row in _matrix_exponential(rates)]
-        return _largest_covariance_error(continuous_covariance(END_TIME, DEVIATION, STEP, MASS, eta), truth)
+        return _largest_covariance_error(
+            continuous_covariance(END_TIME, FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, eta), truth
+        )
 
 
 def _discrete_covariance_error(damping_product: float, step_count: int) -> float:
@@ -121,7 +123,7 @@ def _discrete_covariance_error(damping_product: float, step_count: int) -> float
     eta = min(damping_product / END_TIME, 1.9 / step)
     with localcontext(prec=DECIMAL_DIGITS):
         d = Decimal(step)
-        r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
+        r, kick = 1 - Decimal(eta) * d, (Decimal(FORCE_NOISE_DEVIATION) * d / Decimal(VEHICLE_MASS)) ** 2
         recursion: DecimalMatrix = [
             [Decimal(1), 2 * d, d * d, Decimal(0)],
             [Decimal(0), r, d * r, Decimal(0)],
@@ -129,7 +131,9 @@ def _discrete_covariance_error(damping_product: float, step_count: int) -> float
             [Decimal(0)] * 3 + [Decimal(1)],
         ]
         truth = [row[3] for row in _matrix_power(recursion, step_count)]
-        return _largest_covariance_error(euler_covariance(step_count, DEVIATION, step, MASS, eta), truth)
+        return _largest_covariance_error(
+            euler_covariance(step_count, FORCE_NOISE_DEVIATION, step, VEHICLE_MASS, eta), truth
+        )
 
 
 def _largest_covariance_error(covariance: np.ndarray, exact_values: Sequence[Decimal]) -> float:
@@ -143,7 +147,7 @@ def _largest_covariance_error(covariance: np.ndarray, exact_values: Sequence[Dec
 def _discretisation_difference(damping_product: float, step_count: int) -> float:
     """1 minus the ratio of the discrete to the continuous variance of the position."""
     step = END_TIME / step_count
-    arguments = (DEVIATION, step, MASS, damping_product / END_TIME)
+    arguments = (FORCE_NOISE_DEVIATION, step, VEHICLE_MASS, damping_product / END_TIME)
     return 1 - float(euler_covariance(step_count, *arguments)[0, 0] / continuous_covariance(END_TIME, *arguments)[0, 0])
 
 
@@ -151,7 +155,7 @@ def _monte_carlo_rows(damping_product: float, noise_path_count: int) -> list[Row
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
-    arguments = (DEVIATION, STEP, MASS, damping_product / (steps * STEP))
+    arguments = (FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, damping_product / (steps * TIME_STEP))
     law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(noise_path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
     why = f"{noise_path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
@@ -202,11 +206,16 @@ def draw(case_data: Saved) -> Drawn:
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
-        exact = [continuous_covariance(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
+        exact = [
+            continuous_covariance(t, FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, eta)[0, 0] ** 0.5 for t in times
+        ]
         step_counts = np.unique(np.geomspace(10, 1e5, 13).astype(int))
-        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in step_counts]
+        euler = [
+            euler_covariance(int(n), FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, eta)[0, 0] ** 0.5
+            for n in step_counts
+        ]
         axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
-        axes[0].loglog(step_counts * STEP, euler, "o", color=f"C{i}", markersize=3.5)
+        axes[0].loglog(step_counts * TIME_STEP, euler, "o", color=f"C{i}", markersize=3.5)
     axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
     axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
     steps, *columns = np.array(case_data["differences"]).T

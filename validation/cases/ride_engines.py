@@ -23,9 +23,9 @@ from validation.spatial import spatial_twin
 TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"
 SYSTEM: System = "ride"
 ENGINES = ("exudyn", "mujoco")
-SPEED, GRAVITY = 20.0, 9.81
+TRAVEL_SPEED, GRAVITY = 20.0, 9.81
 SEED = 20261121
-STATE_COUNT, STEP = 100, 1e-3
+STATE_COUNT, TIME_STEP = 100, 1e-3
 VEHICLE_NAMES = (
     ("quarter_car", "r19_ride"),
     ("quarter_car", "seven_freedoms", "r19_ride", "r19_free", "three_axle_truck", "spatial twin"),
@@ -105,14 +105,14 @@ def _matrix_rows(
     vehicle: SpatialVehicle, vehicle_name: str, load_case: str, tolerance_of_engine: dict[str, float]
 ) -> list[Row]:
     """Rows: linearised matrices of a vehicle in each engine, compared with the analytic ones."""
-    expected = linearise(vehicle, SPEED)
+    expected = linearise(vehicle, TRAVEL_SPEED)
     return [
         Observed(
             f"ride_engines.matrices.{vehicle_name}.{load_case}.{engine}",
             SYSTEM,
             f"difference of M, D, K, road columns and outputs of {vehicle_name} in {engine} from the analytic ones, "
             f"{load_case}",
-            matrix_difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
+            matrix_difference(build(engine, vehicle, speed=TRAVEL_SPEED).linearise(), expected),
             "relative",
         ).at_most(tolerance_of_engine[engine], DIFFERENCES_REASON, "native")
         for engine in ENGINES
@@ -144,8 +144,8 @@ def _acceleration_rows(vehicle_name: str) -> list[Row]:
         if vehicle_name != "quarter_car"
         else shipped_vehicle_or_twin(vehicle_name, GRAVITY)
     )
-    built = (build(engine, vehicle, speed=SPEED) for engine in ENGINES)
-    models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, SPEED)]
+    built = (build(engine, vehicle, speed=TRAVEL_SPEED) for engine in ENGINES)
+    models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, TRAVEL_SPEED)]
     worst = np.zeros(3)
     for path in range(STATE_COUNT):
         exudyn, mujoco, reference = (model.acceleration(0.0, *random_state(vehicle, path)) for model in models)
@@ -166,7 +166,7 @@ def _acceleration_rows(vehicle_name: str) -> list[Row]:
 
 def _settings(engine_name: str, duration: float = 1.0) -> Settings:
     """Settings of an engine's usual integrator."""
-    return Settings(INTEGRATORS[engine_name], STEP, duration)
+    return Settings(INTEGRATORS[engine_name], TIME_STEP, duration)
 
 
 def _simulation_rows() -> tuple[list[Row], list[list[str]]]:
@@ -176,7 +176,7 @@ def _simulation_rows() -> tuple[list[Row], list[list[str]]]:
     for what in ("linear", "curved"):
         vehicle = shipped_vehicle_or_twin("r19_ride", GRAVITY)
         vehicle = with_nonlinear_springs(vehicle) if what == "curved" else vehicle
-        road = 1e-4 * np.cumsum(normal_samples(SEED, 0, 2 * round(1.0 / STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
+        road = 1e-4 * np.cumsum(normal_samples(SEED, 0, 2 * round(1.0 / TIME_STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
         runs = {}
         for engine in ENGINES:
             model = build(engine, vehicle, _settings(engine), None, road)
@@ -234,12 +234,12 @@ def _eigenvalue_shift_rows() -> list[Row]:
     rows = []
     for name in VEHICLE_NAMES[1]:
         analytic = eigenvalue_shifts(
-            *(linearise(shipped_vehicle_or_twin(name, gravity), SPEED) for gravity in (0.0, GRAVITY))
+            *(linearise(shipped_vehicle_or_twin(name, gravity), TRAVEL_SPEED) for gravity in (0.0, GRAVITY))
         )
         for engine in ENGINES:
             shifted = eigenvalue_shifts(
                 *(
-                    build(engine, shipped_vehicle_or_twin(name, gravity), speed=SPEED).linearise()
+                    build(engine, shipped_vehicle_or_twin(name, gravity), speed=TRAVEL_SPEED).linearise()
                     for gravity in (0.0, GRAVITY)
                 )
             )

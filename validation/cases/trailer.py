@@ -26,7 +26,7 @@ STEADY_TURN_TOLERANCE = 1e-3
 
 def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on static loads and engines; a full run also has turns, a circle, energy, and a planted fault."""
-    rows = [_static_loads_row(), *(_engines_row(name, 0.05 if quick else 1.0) for name in VEHICLE_TRAINS)]
+    rows = [_static_loads_row(), *(_engine_agreement_row(name, 0.05 if quick else 1.0) for name in VEHICLE_TRAINS)]
     if not quick:
         rows += [
             *(row for name in VEHICLE_TRAINS for row in _steady_turn_rows(name)),
@@ -53,7 +53,7 @@ def _static_loads_row() -> Row:
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
 
-def _engines_row(train_name: str, duration: float) -> Row:
+def _engine_agreement_row(train_name: str, duration: float) -> Row:
     """Row: a turn on a rough road in Exudyn and MuJoCo."""
     first, second = (_rough_turn(engine, VEHICLE_TRAINS[train_name](), duration).run for engine in ("mujoco", "exudyn"))
     gap = max(np.abs(first.positions - second.positions).max(), np.abs(first.rates - second.rates).max())

@@ -64,7 +64,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         *rows,
         _soft_constraint_row(work_folder, "geared", GEARED),
         _soft_constraint_row(work_folder, "linked", LINKED),
-        *_cart_path_rows(work_folder),
+        *_simulated_cart_rows(work_folder),
         _planted_differences_row(work_folder, quick),
     ], {}
 
@@ -117,7 +117,7 @@ def _soft_constraint_row(work_folder: Path, model_name: str, model_text: str) ->
     ).at_most(SOLVER_TOLERANCE, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
 
 
-def _cart_path_rows(work_folder: Path) -> list[Row]:
+def _simulated_cart_rows(work_folder: Path) -> list[Row]:
     """Rows: largest difference between the states of all engines' models over 1 s, and balance of energy and work, of
     the cart model."""
     report = compare_paths(_model_file_of_text(work_folder, "cart", CART).twin)

@@ -32,7 +32,7 @@ TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
 EDGE_RAIL_HEAD_RADIUS = 2e-3
 """Head radius (m) of rails that are nearly edges, as in Klingel's formula."""
-STEP, DURATION = 5e-4, 1.0
+TIME_STEP, DURATION = 5e-4, 1.0
 RANDOM_STATE_DEVIATIONS = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
 """Standard deviations of random states about rest, so large that flanges touch, wheels lift off, and creep forces
 saturate."""
@@ -54,7 +54,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [
             _no_critical_speed_row("heavy", HEAVY_WHEELSET, "unstable"),
             _no_critical_speed_row("stiff", STIFF_WHEELSET, "stable"),
-            *_fault_rows(),
+            *_planted_fault_rows(),
         ]
     orbit_fields = ("speed", "amplitude", "frequency", "error", "frequency_error")
     return rows, {
@@ -111,12 +111,11 @@ def _wavelength_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     ]
 
 
-def _critical_speed_rows(critical_speeds_by_wheelset: CriticalSpeeds) -> list[Row]:
+def _critical_speed_rows(critical_speed_table: CriticalSpeeds) -> list[Row]:
     """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
     wheelsets have one."""
     there = [
-        [speed for speed in of_engine.values() if speed is not None]
-        for of_engine in critical_speeds_by_wheelset.values()
+        [speed for speed in of_engine.values() if speed is not None] for of_engine in critical_speed_table.values()
     ]
     agreed = all(len(of_engine) in (0, len(IMPLEMENTATION_MODULES)) for of_engine in there)
     having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATION_MODULES)]
@@ -186,14 +185,14 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _simulation_speed(critical_speeds_by_wheelset: CriticalSpeeds, wheelset_name: str) -> float:
+def _travel_speed_of_simulation(critical_speed_table: CriticalSpeeds, wheelset_name: str) -> float:
     """Speed (m/s) of a wheelset's simulation: above its critical speed, or 60 m/s if it has none."""
-    critical = critical_speeds_by_wheelset[wheelset_name]["reference"]
+    critical = critical_speed_table[wheelset_name]["reference"]
     return min(RATIO_TO_CRITICAL_SPEED * critical, 180.0) if critical is not None else 60.0
 
 
 def _simulation_rows(
-    wheelsets: dict[str, Wheelset], critical_speeds_by_wheelset: CriticalSpeeds, cell_count: int
+    wheelsets: dict[str, Wheelset], critical_speed_table: CriticalSpeeds, cell_count: int
 ) -> list[Row]:
     """Rows on simulations of one second by RK4 with FASTSIM: differences between the implementations, and the sign of
     the creep forces' power."""
@@ -201,7 +200,12 @@ def _simulation_rows(
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
-        setup: tuple[Any, ...] = (wheelset, _simulation_speed(critical_speeds_by_wheelset, name), "fastsim", cell_count)
+        setup: tuple[Any, ...] = (
+            wheelset,
+            _travel_speed_of_simulation(critical_speed_table, name),
+            "fastsim",
+            cell_count,
+        )
         step = _time_step_of_wheelset(Equations(*setup))
         for engine in IMPLEMENTATION_MODULES:
             equations = implementation(engine)(*setup)
@@ -238,13 +242,13 @@ def _simulation_rows(
 
 
 def _time_step_of_wheelset(equations: Equations) -> float:
-    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller step that divides DURATION."""
+    """Time step (s) for the wheelset's fastest motion: TIME_STEP, or a smaller step that divides DURATION."""
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
-    return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
+    return DURATION / np.ceil(DURATION / min(TIME_STEP, 1.0 / fastest))
 
 
 def _limit_cycles(
-    wheelsets: dict[str, Wheelset], critical_speeds_by_wheelset: CriticalSpeeds, engine_names: tuple[str, ...]
+    wheelsets: dict[str, Wheelset], critical_speed_table: CriticalSpeeds, engine_names: tuple[str, ...]
 ) -> dict[str, dict[str, Orbit]]:
     """Limit cycles by wheelset and implementation: of the chosen wheelset, and of those whose critical speed is low
     enough for a simulation above this speed.
@@ -253,9 +257,9 @@ def _limit_cycles(
     """
     cycles = {}
     for name, wheelset in wheelsets.items():
-        if name != "chosen" and not 20.0 < (critical_speeds_by_wheelset[name]["reference"] or 0.0) < 160.0:
+        if name != "chosen" and not 20.0 < (critical_speed_table[name]["reference"] or 0.0) < 160.0:
             continue
-        setup: tuple[Any, ...] = (wheelset, _simulation_speed(critical_speeds_by_wheelset, name), "fastsim", 11)
+        setup: tuple[Any, ...] = (wheelset, _travel_speed_of_simulation(critical_speed_table, name), "fastsim", 11)
         first = attained_cycle(Equations(*setup), step=_time_step_of_wheelset(Equations(*setup)))
         if first is not None:
             guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engine_names}
@@ -314,7 +318,7 @@ def _energy_rows() -> list[Row]:
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
         equations = Equations(CHOSEN_WHEELSET, 60.0, law, 11)  # type: ignore[arg-type]
         left = []
-        for step in (STEP, STEP / 2.0, STEP / 4.0):
+        for step in (TIME_STEP, TIME_STEP / 2.0, TIME_STEP / 4.0):
             book = energy_ledger(equations, equations.run(equations.displaced_state(5e-3), 0.1, step))
             left.append(float(np.abs(book.residual).max() / book.creep[-1]))
         rows += [
@@ -336,7 +340,7 @@ def _energy_rows() -> list[Row]:
     return rows
 
 
-def _fault_rows() -> list[Row]:
+def _planted_fault_rows() -> list[Row]:
     """Rows: a small fault planted in one implementation must exceed the tolerances of the other rows."""
     equations, engine = Equations(CHOSEN_WHEELSET, 60.0), implementation("mujoco")(CHOSEN_WHEELSET, 60.0)
     state = equations.displaced_state(3e-3)
