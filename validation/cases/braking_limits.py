@@ -75,6 +75,7 @@ def _random_stops_row(stop_endings: list[str]) -> Row:
 
 
 def _braking_scene(**scene_tables: Any) -> Any:
+    """Scene of the system "braking" with the given tables."""
     return build({"system": "braking", "title": "limit", **scene_tables}, "limit.toml")
 
 

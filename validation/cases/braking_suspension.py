@@ -111,6 +111,7 @@ def _locked_wheel_rows(mu: float) -> list[Row]:
 
 
 def _pitch_and_load_transfer_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
+    """Rows: pitch and load transfer of the braked box, compared with closed forms."""
     exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD_FRICTION else 2e-3
     return [
         Observed(
@@ -125,6 +126,7 @@ def _pitch_and_load_transfer_rows(mu: float, pitch: float, axle_load_gain: float
 
 
 def _mirror_rows(left_turn: BrakingPath, mirrored_turn: BrakingPath) -> list[Row]:
+    """Row: a J-turn of the car compared with its mirror image."""
     apart = np.abs(left_turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored_turn.states[-1, 0, :3]).max()
     return [
         Observed(
@@ -157,6 +159,7 @@ def _engine_rows(wet_tyre_table: TyreTable) -> list[Row]:
 
 
 def _substep_rows(wet_tyre_table: TyreTable) -> list[Row]:
+    """Rows: stopping distance with 1 and with 4 substeps per sample, compared with 16 substeps."""
     distances = [
         braked_vehicle(car(), wet_tyre_table, steer=0.05, substeps=n)
         .run(steady_torques(*HARD_TURN_TORQUES), 10.0)
@@ -261,6 +264,7 @@ def stiff_suspension_distances(tyre_table: TyreTable) -> list[list[float]]:
 
 
 def _stiff_suspension_rows(distances_by_stiffness: list[list[float]]) -> list[Row]:
+    """Row: stiffer springs bring the box's J-turn closer to that of the vehicle in the plane."""
     return [
         Observed(
             "braking_suspension.limit",

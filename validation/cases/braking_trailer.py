@@ -43,6 +43,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _axle_loads_row() -> Row:
+    """Row: axle loads of car and caravan on the suspension, compared with statics."""
     car = whole.towing_car()
     path = braked_vehicle(car, constant_friction(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
     front, rear, axle, _ = static_loads(car.handling)
@@ -57,6 +58,7 @@ def _axle_loads_row() -> Row:
 
 
 def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
+    """Row: accelerations of a train at random states in an engine, compared with plain code."""
     accelerations = whole.accelerations(whole.TRAINS[vehicle_name](), engine_name)
     return Observed(
         f"braking_trailer.accelerations.{vehicle_name.replace(' ', '_')}.{engine_name}",
@@ -70,6 +72,7 @@ def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
 
 
 def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    """Row: course of a stop of a train in an engine, compared with plain code."""
     path = whole.run(whole.TRAINS[vehicle_name](), engine_name, duration)
     return Observed(
         f"braking_trailer.stop.{vehicle_name}.{engine_name}",
@@ -83,6 +86,7 @@ def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
 
 
 def _locked_wheels_row() -> Row:
+    """Row: stopping distance of car and caravan with all wheels locked, compared with the closed form."""
     stopping_way, wanted = train.locked_stop_and_closed_form()
     return Observed(
         "braking_trailer.locked",
@@ -94,6 +98,7 @@ def _locked_wheels_row() -> Row:
 
 
 def _caravan_brakes_rows() -> list[Row]:
+    """Rows: deceleration, axle load and ball force while the caravan brakes alone, compared with the closed form."""
     errors = train.caravan_errors()
     quantities = {
         "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",

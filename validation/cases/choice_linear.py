@@ -106,6 +106,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _kept_tolerance_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
+    """Rows: share of scenes whose tolerance is kept, and scenes for which the choice claims so wrongly."""
     share = float(np.mean([judged.effect_choice.within_tolerance for judged in judged_choices]))
     lies = sum(not judged.is_honest for judged in judged_choices)
     second = [judged for judged in judged_choices if judged.frequency_changes is not None]
@@ -163,6 +164,7 @@ def _predicted_change_row(judged_choices: list[JudgedChoice]) -> Row:
 
 
 def _adjoint_identity_row(judged_choices: list[JudgedChoice]) -> Row:
+    """Row: largest error of the identity of covariance and adjoint over all scenes."""
     return Observed(
         "choice_linear.identity",
         SYSTEM,
@@ -225,6 +227,7 @@ def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
 
 
 def _saving_row(judged_choices: list[JudgedChoice]) -> Row:
+    """Row: median saving of force calls over the scenes with the common tolerance."""
     saved = [judged.force_call_saving for judged in judged_choices if judged.ride.tolerance == COMMON_TOLERANCE]
     return Observed(
         "choice_linear.saving",
@@ -259,6 +262,7 @@ def _solved_equation_count_rows() -> list[Row]:
 
 
 def _half_car_chooser() -> Chooser:
+    """Chooser of effects for the published half car."""
     return Chooser.from_scene(load(HALF_CAR_SCENE))
 
 
@@ -329,6 +333,7 @@ def _energy_activity_rows() -> list[Row]:
 
 
 def _summary_of_choice(judged_choice: JudgedChoice) -> dict[str, Any]:
+    """Numbers of a choice that the report's tables and figure need."""
     choice = judged_choice.effect_choice
     return {
         "tolerance": judged_choice.ride.tolerance,

@@ -97,6 +97,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
 
 
 def _kept_tolerance_rows(judged_choices: list[ChoiceCheckedByRuns]) -> list[Row]:
+    """Rows: share of scenes whose tolerance is kept, and number of choices that claim so wrongly."""
     kept_share = float(
         np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in judged_choices])
     )
@@ -153,6 +154,7 @@ def _predicted_and_confirmed_changes(judged_choices: list[ChoiceCheckedByRuns]) 
 
 
 def _predicted_change_row(judged_choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
+    """Row: share of the predicted changes that are within a factor of 2 of the confirmed ones."""
     ratios = np.divide(*_predicted_and_confirmed_changes(judged_choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
@@ -165,6 +167,7 @@ def _predicted_change_row(judged_choices: list[ChoiceCheckedByRuns], quick: bool
 
 
 def _saving_rows(judged_choices: list[ChoiceCheckedByRuns], system_name: str) -> list[Row]:
+    """Rows: saving of force calls and of computing time in the scenes of one system."""
     of_system = [judged_choice for judged_choice in judged_choices if judged_choice.system == system_name]
     calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
     seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
@@ -201,6 +204,7 @@ def _saving_rows(judged_choices: list[ChoiceCheckedByRuns], system_name: str) ->
 
 
 def _summary_of_choice(judged_choice: ChoiceCheckedByRuns) -> Saved:
+    """Numbers of a choice that the report's tables and figure need."""
     choice = judged_choice.choice
     return {
         "system": judged_choice.system,

@@ -47,6 +47,7 @@ def _relative_period_error(wave_period: float, exact_period: float) -> float:
 
 
 def _closed_form_row(row_name: str, quantity_name: str, relative_error: float, tolerance_reason: str) -> Row:
+    """Row: relative error of a quantity whose exact value has a closed form."""
     return Observed(f"conicity.{row_name}", SYSTEM, quantity_name, relative_error, "").at_most(
         ROUNDING_TOLERANCE, tolerance_reason, "closed form"
     )

@@ -184,6 +184,7 @@ def _drift_off_time(assembly: Assembly, true_run: Result) -> float:
 
 
 def _drift_off_row(drift_off_record: Saved) -> Row:
+    """Row: median measured drift-off time of a scenario divided by the predicted one."""
     key = f"drift_off.{drift_off_record['source']}.{drift_off_record['name']}.{drift_off_record['rate']:g}Hz".replace(
         " ", "-"
     ).replace(",", "")

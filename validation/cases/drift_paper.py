@@ -181,4 +181,5 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def _cell_text(cell_value: float | None, number_format: str) -> str:
+    """Text of a table cell; empty if there is no value."""
     return "" if cell_value is None else format(cell_value, number_format)

@@ -104,6 +104,7 @@ def locked_wheel_error() -> float:
 
 
 def _single_tyre_rows() -> list[Row]:
+    """Rows: cornering stiffness at small slip, and force on locked wheels, compared with closed forms."""
     return [
         Observed(
             "handling.cornering",
@@ -169,6 +170,7 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
 
 
 def _steady_turn_rows() -> list[Row]:
+    """Rows: yaw gain of a steady turn compared with the single-track vehicle, and the understeer gradient."""
     turn = steady_turn(Handling(R19_CAR_WITHOUT_DRAG), 20.0)
     return [
         Observed(
@@ -185,6 +187,7 @@ def _steady_turn_rows() -> list[Row]:
 
 
 def _locked_stop_rows() -> list[Row]:
+    """Rows: braking force and distance of a stop with locked wheels, compared with Coulomb friction."""
     mu, speed = 0.7, 15.0
     handling = Handling(R19_CAR_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEEL_NAMES))
     drive = drive_run("mujoco", handling, speed, 2.0)
@@ -237,6 +240,7 @@ def _load_transfer_rows() -> list[Row]:
 
 
 def _slope_standstill_row() -> Row:
+    """Row: drift of a car that stands on a slope with locked wheels."""
     handling = Handling(R19_CAR, Tyres(fixed=WHEEL_NAMES), slope=SLOPE)
     drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
@@ -247,6 +251,7 @@ def _slope_standstill_row() -> Row:
 
 
 def _energy_rows() -> list[Row]:
+    """Rows: error of the energy balance of a lane change, and its order in the step."""
     gaps = {}
     for name, friction, controls in (
         ("held", 20.0, SMALL_LANE_CHANGE_CONTROLS),
@@ -297,6 +302,7 @@ def _reverse_steer(handling_car: Handling) -> None:
 
 
 def _planted_fault_rows() -> list[Row]:
+    """Rows: small faults planted in tyres, steering and friction are caught by the other checks."""
     soft, rough = Handling(R19_CAR), car_in_lane_change()
     soft.tyre_numbers(0)[at.BRISTLES] *= 1.01
     rough.tyre_numbers(2)[at.GRIP] *= 1.0 + 1e-6
@@ -323,6 +329,7 @@ def _planted_fault_rows() -> list[Row]:
 
 
 def _tyre_cost_row() -> Row:
+    """Row: cost of MuJoCo's step with four tyres beyond the bare step and the tyres' own kernel."""
     steps, (car, bare) = 50, (car_in_lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
     jobs = _timed_march(car, steps), _timed_march(bare, steps), lambda: _repeat_four_tyres(4 * steps)
