@@ -26,7 +26,7 @@ from validation.absence.probes import (
 from validation.cases import absent, effect_prices
 from validation.cases.absent import (
     EFFECT_NAMES,
-    ENGINES,
+    ENGINE_NAMES,
     FORCE_EFFECT,
     component_count_changes,
     declared_count_changes,
@@ -78,7 +78,7 @@ def test_only_the_kernel_of_the_scene_is_compiled(bare, forced):
     assert bare["derivatives"] == forced["derivatives"] == []
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_no_python_and_no_memory_within_a_march(engine, folder):
     """100 times as many steps enter no more Python functions and take no more memory, but for the result.
 
@@ -145,7 +145,7 @@ def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
     assert (assembly.input, assembly.outputs, assembly.vehicle.pitch_springs) == (None, (), ())
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("effect", EFFECT_NAMES)
 def test_an_effect_changes_the_counts_by_what_it_declares(effect, engine, folder):
     assert component_count_changes(effect, engine, folder) == declared_count_changes(effect, engine)

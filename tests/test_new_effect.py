@@ -69,7 +69,7 @@ def test_a_new_effect_of_the_pitch_plane(new_file, tmp_path, capsys):
     assert "A rope that draws the chassis level" in capsys.readouterr().out
     scene = with_effects(absent.scene_with_effects({}, 20, tmp_path), "anchor")
     assert "effect     anchor: one native spring" in describe(scene) and "rope" in describe(scene)
-    runs = {engine: simulate(scene, engine) for engine in absent.ENGINES}
+    runs = {engine: simulate(scene, engine) for engine in absent.ENGINE_NAMES}
     for engine, run in runs.items():
         assert absent.component_count_changes("anchor", engine, tmp_path) == absent.declared_count_changes(
             "anchor", engine

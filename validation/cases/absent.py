@@ -31,7 +31,7 @@ from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_
 
 TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"
-ENGINES = ("reference", "exudyn", "mujoco")
+ENGINE_NAMES = ("reference", "exudyn", "mujoco")
 TIME_STEP = 1e-3
 START_MOTION = {"pitch": 0.1, "z3": -0.1}
 """Initial pitch (rad) and heave displacement (m); the vehicle moves, so that nothing is compared at rest."""
@@ -138,10 +138,12 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         write_input_files(files_folder)
         rows = [
             *_imported_module_rows(),
-            *(row for engine in ENGINES for row in _cost_of_absence_rows(engine, files_folder)),
+            *(row for engine in ENGINE_NAMES for row in _cost_of_absence_rows(engine, files_folder)),
         ]
         rows += [
-            _positive_control_row(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
+            _positive_control_row(
+                effect, files_folder, ENGINE_NAMES[i % len(ENGINE_NAMES) :][:1] if quick else ENGINE_NAMES
+            )
             for i, effect in enumerate(EFFECT_NAMES)
         ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
@@ -210,7 +212,7 @@ def _cost_of_absence_rows(engine_name: str, work_folder: Path) -> list[Row]:
     ]
 
 
-def _positive_control_row(effect_name: str, work_folder: Path, engine_names: Sequence[str] = ENGINES) -> Row:
+def _positive_control_row(effect_name: str, work_folder: Path, engine_names: Sequence[str] = ENGINE_NAMES) -> Row:
     """Row of a positive control: the effect changes the numbers of components in each engine's model exactly as it
     declares."""
     changed = {engine: component_count_changes(effect_name, engine, work_folder) for engine in engine_names}

@@ -38,7 +38,7 @@ JOINT_FAMILIES = (
 QUICK_JOINT_FAMILIES = ("Revolute", "Distance")
 MODEL_FILE_NAMES = {"TranSpring": "TransSpring"}
 """Model file names of the joint families whose file has another name."""
-ENGINES = ("exudyn", "mujoco")
+ENGINE_NAMES = ("exudyn", "mujoco")
 TIME_STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
 """Step (s); number of steps for each row of the output files; lengths (s) of a full and of a quick run."""
 MJCF_STEP_RATIO = 5
@@ -73,7 +73,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         model = None if data is None else data / MODEL_FOLDER / f"{MODEL_FILE_NAMES.get(family, family)}_Case01.adm"
         if model is None or not model.is_file():
             reason = "TWINRIG_DATA names no folder with the other code's models"
-            rows.append(not_run(_row_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
+            rows.append(not_run(_report_row_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
             continue
         output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
         mechanism, notes = _mechanism_of_output(read_mechanism(model), output)
@@ -89,7 +89,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, saved
 
 
-def _row_id(joint_family: str, row_name: str) -> str:
+def _report_row_id(joint_family: str, row_name: str) -> str:
     """Id of a report row of a joint family."""
     return f"adams_joints.{joint_family.lower()}.{row_name}"
 
@@ -148,7 +148,7 @@ def fitted_constant_rows(joint_family: str, spring_constants: dict[str, float]) 
     units = {"stiffness": "N/m or N m/rad", "damping": "N s/m or N m s/rad", "rest": "m or rad"}
     return [
         Observed(
-            _row_id(joint_family, name), SYSTEM, f"{joint_family}: {name} of the spring", value, units[name]
+            _report_row_id(joint_family, name), SYSTEM, f"{joint_family}: {name} of the spring", value, units[name]
         ).beside("-", why)
         for name, value in spring_constants.items()
     ]
@@ -163,13 +163,13 @@ def joint_family_rows(
     motion, reaction = ConstrainedBody(mechanism).run(duration, TIME_STEP, STEPS_PER_ROW)
     runs = {"reference": (motion, reaction)}
     tree = joint_tree(mechanism, motion)
-    runs |= {engine: tree.run(engine, duration, TIME_STEP, STEPS_PER_ROW) for engine in ENGINES}
+    runs |= {engine: tree.run(engine, duration, TIME_STEP, STEPS_PER_ROW) for engine in ENGINE_NAMES}
     rows = [_reaction_on_file_motion_row(joint_family, mechanism, output_file)]
     for name, (path, pushed) in runs.items():
         rows += _rows_against_output_file(joint_family, name, mechanism, output_file, path, pushed)
     if not mechanism.springs and output_file.energy_lost(mechanism) > ENERGY_LOSS_LIMIT:
         rows.append(_restart_row(joint_family, mechanism, output_file, duration))
-    for name in ENGINES:
+    for name in ENGINE_NAMES:
         rows.append(_engine_row(joint_family, name, mechanism, runs[name], runs["reference"]))
     return rows
 
@@ -182,12 +182,14 @@ def mjcf_rows(joint_family: str, mechanism: Mechanism, work_folder: Path, durati
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{joint_family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
     tolerance_reason = "rounding; the bound asked for"
-    alike = Observed(_row_id(joint_family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
+    alike = Observed(
+        _report_row_id(joint_family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest"
+    )
     rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, tolerance_reason, "native")]
     for name, positions in paths.items():
         off = float(np.abs(positions[::every] - motion.position).max())
         quantity = f"{joint_family} in MJCF: position of the centre from the reference with constraints, {name}"
-        observed = Observed(_row_id(joint_family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
+        observed = Observed(_report_row_id(joint_family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
         rows.append(observed.at_most(ENGINE_TOLERANCE, "no code in common but Runge-Kutta's steps of 1 ms", "native"))
     return rows
 
@@ -222,7 +224,7 @@ def _reaction_on_file_motion_row(joint_family: str, mechanism: Mechanism, output
     off = _reaction_difference(mechanism, output_file.reaction_of_motion(mechanism), output_file.reaction())
     why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
     quantity = f"{joint_family}: reaction on the file's own motion, by the largest"
-    return Observed(_row_id(joint_family, "own_motion"), SYSTEM, quantity, off, "").at_most(
+    return Observed(_report_row_id(joint_family, "own_motion"), SYSTEM, quantity, off, "").at_most(
         FORCE_BOUND, why, "published"
     )
 
@@ -257,7 +259,7 @@ def _rows_against_output_file(
     rows = []
     for what, words, off, unit, bound in seen:
         quantity = f"{joint_family}: {words}, beside the other code's digits, {solver_name}"
-        observed = Observed(_row_id(joint_family, f"{what}.{solver_name}"), SYSTEM, quantity, off, unit)
+        observed = Observed(_report_row_id(joint_family, f"{what}.{solver_name}"), SYSTEM, quantity, off, unit)
         if lost <= ENERGY_LOSS_LIMIT:
             rows.append(observed.at_most(bound, "the bound asked for", "published"))
         else:
@@ -292,7 +294,7 @@ def _restart_row(joint_family: str, mechanism: Mechanism, output_file: OutputFil
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{joint_family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
-    return Observed(_row_id(joint_family, "window"), SYSTEM, quantity, left, "m").at_most(
+    return Observed(_report_row_id(joint_family, "window"), SYSTEM, quantity, left, "m").at_most(
         POSITION_BOUND, why, "published"
     )
 
@@ -323,17 +325,17 @@ def _same_pendulum_rows(
         f"above {POSITION_BOUND:g} m from {since:.2f} s on"
     )
     return [
-        Observed(_row_id(joint_family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
+        Observed(_report_row_id(joint_family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
             POSITION_BOUND, why, "published"
         ),
         Observed(
-            _row_id(joint_family, "hinge_force"),
+            _report_row_id(joint_family, "hinge_force"),
             SYSTEM,
             hinged % "force by the largest",
             max(0.0, pushed) / float(np.abs(force).max()),
             "",
         ).at_most(FORCE_BOUND, why, "published"),
-        Observed(_row_id(joint_family, "files"), SYSTEM, both, float(files.max()), "m").beside(
+        Observed(_report_row_id(joint_family, "files"), SYSTEM, both, float(files.max()), "m").beside(
             POSITION_BOUND, "one motion: what is left is the error of the file that loses energy", "published"
         ),
     ]
@@ -353,7 +355,7 @@ def _engine_row(
     off = max(position_error, rotation, _reaction_difference(mechanism, engine_run[1], reference_run[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
     quantity = f"{joint_family}: {engine_name} from the reference: position, rotation, reaction by the largest"
-    return Observed(_row_id(joint_family, f"twin.{engine_name}"), SYSTEM, quantity, off, "m, -").at_most(
+    return Observed(_report_row_id(joint_family, f"twin.{engine_name}"), SYSTEM, quantity, off, "m, -").at_most(
         ENGINE_TOLERANCE, why, "native"
     )
 

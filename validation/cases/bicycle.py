@@ -20,7 +20,7 @@ from validation.common.rows import Observed, Row, System, Table, not_run
 
 TITLE = "A bicycle: benchmark and measured"
 SYSTEM: System = "rolling-vehicle"
-ENGINES = ("exudyn", "mujoco")
+ENGINE_NAMES = ("exudyn", "mujoco")
 TYRE_STIFFNESS_FACTORS = (4.0, 16.0, 64.0, 256.0)
 """Factors by which the tyres are stiffer than usual."""
 EIGENVALUE_SPEED = 5.0
@@ -38,7 +38,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     a second, and omits the predictions with one speed left out."""
     benchmark = load_bicycle("benchmark")
     rows = [*_published_benchmark_rows(benchmark), *_planted_fault_rows(benchmark)]
-    gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINES}
+    gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINE_NAMES}
     rows += [*_stiff_tyre_limit_rows(gaps), *_energy_rows(0.5 if quick else 5.0)]
     measured_rows, data = _measured_bicycle_rows(quick)
     return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
@@ -46,17 +46,17 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
     """Tables of eigenvalues on tyres of rising stiffness, and of the measured bicycle if its recordings exist."""
-    gaps = case_data["gaps"][ENGINES[0]]
+    gaps = case_data["gaps"][ENGINE_NAMES[0]]
     rows_of_tables = [
         Table(
             "Tyres that stiffen tend to ideal rolling",
             f"Largest distance (1/s) of the benchmark's eigenvalues at {EIGENVALUE_SPEED:g} m/s from those of ideal "
             "rolling.",
-            ("stiffness", *ENGINES, "order"),
+            ("stiffness", *ENGINE_NAMES, "order"),
             tuple(
                 (
                     f"{s:g}",
-                    *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES),
+                    *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINE_NAMES),
                     "" if i == 0 else _convergence_order_text(gaps, i),
                 )
                 for i, s in enumerate(TYRE_STIFFNESS_FACTORS)
@@ -154,7 +154,7 @@ def _energy_rows(duration: float) -> list[Row]:
     gravity."""
     table = {"title": "benchmark run", "system": "bicycle", "run": {"duration": duration}}
     scene, rows = build(table), []
-    for engine in ("reference", *ENGINES):
+    for engine in ("reference", *ENGINE_NAMES):
         try:
             gap = run(scene, engine).detail.unaccounted()
         except RunFailed:

@@ -86,7 +86,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     costs = _exchange_times(tables_by_connection, work_folder, 5 if quick else 40)
     rows += [
         Observed(
-            f"braking_port.cost.{_row_id(name)}",
+            f"braking_port.cost.{_name_in_row_id(name)}",
             SYSTEM,
             f"time of an exchange with a controller, {name}, 95 % interval {low:.1f} to {high:.1f}",
             cost,
@@ -158,7 +158,7 @@ def _equal_bits_rows(
     rows = []
     for name, table in {**port_tables_by_connection, "replay": {"replay": "port.log"}}.items():
         key, what = (
-            f"braking_port.bits.{_row_id(name)}",
+            f"braking_port.bits.{_name_in_row_id(name)}",
             f"a run through the {name} has the bits of the callable, {len(first.times) - 1} samples",
         )
         if isinstance(table, str):
@@ -324,7 +324,7 @@ def _controller_fault_rows(fault_outcome: dict[str, Any]) -> list[Row]:
         if is_complete
         else f"{fault_outcome['name']} at {fault_outcome['number']}, {fault_outcome['kept']} samples kept"
     )
-    key = f"braking_port.fault.{_row_id(fault_outcome['kind'])}"
+    key = f"braking_port.fault.{_name_in_row_id(fault_outcome['kind'])}"
     return [
         behaviour_row(
             key,
@@ -344,7 +344,7 @@ def _controller_fault_rows(fault_outcome: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _row_id(connection_or_fault: str) -> str:
+def _name_in_row_id(connection_or_fault: str) -> str:
     """Part of a row id for a kind of connection or a fault."""
     return connection_or_fault.replace(": ", ".").replace(" ", "-")
 

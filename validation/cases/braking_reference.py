@@ -13,7 +13,7 @@ from validation.common.rows import Observed, Row, System
 
 TITLE = "Braking beside the independent reference"
 SYSTEM: System = "anti-lock"
-ENGINES = ("mujoco", "exudyn")
+ENGINE_NAMES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """Duration (s) of a stop, in the quick and in the full run."""
 FORCE_LAW_COMPARISONS = {
@@ -47,7 +47,7 @@ ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the force laws, accelerations, steady circles and stops. A quick run has the car in one engine and a
     short stop; a full run has all vehicles in Exudyn and MuJoCo."""
-    vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)
+    vehicles, engines = (("car",), ENGINE_NAMES[:1]) if quick else (tuple(whole.VEHICLES), ENGINE_NAMES)
     rows = [_force_law_row(name) for name in FORCE_LAW_COMPARISONS]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
     rows += [_relaxing_turn_row(), *(_steady_circle_row(vehicle) for vehicle in vehicles)]

@@ -15,7 +15,7 @@ from validation.common.rows import Observed, Row, System
 
 TITLE = "Relaxing tyres on the suspension"
 SYSTEM: System = "anti-lock"
-ENGINES = ("mujoco", "exudyn")
+ENGINE_NAMES = ("mujoco", "exudyn")
 SLIPPERY_FRICTION_FACTOR = 1e-6
 """Friction of the slippery road divided by that of a wet road: so low that steered wheels do not turn the car."""
 STEER_STEP_SPEED, STEER_STEP_ANGLE = 20.0, 0.02
@@ -27,7 +27,7 @@ BRAKE_TORQUES = (200.0, 200.0, 100.0, 100.0)
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of relaxing tyres. A quick run has the car in Exudyn only, whose steps need no compiling; a full run also
     has MuJoCo and the limit of a stiff suspension."""
-    engines = ENGINES[1:] if quick else ENGINES
+    engines = ENGINE_NAMES[1:] if quick else ENGINE_NAMES
     vehicles = ("car",) if quick else tuple(whole.VEHICLES)
     rows = [_slip_rise_row(engine) for engine in engines] + [_short_relaxation_row("exudyn")]
     rows += [

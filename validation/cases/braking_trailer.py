@@ -17,7 +17,7 @@ from validation.spatial.towing import give_towed_wheels_car_heading, static_load
 
 TITLE = "Braking with a trailer on the suspension"
 SYSTEM: System = "anti-lock"
-ENGINES = ("mujoco", "exudyn")
+ENGINE_NAMES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """Duration (s) of a stop, in the quick and in the full run."""
 STATICS_TOLERANCE = 1e-3
@@ -29,7 +29,7 @@ ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of axle loads, and of accelerations and stops. A quick run has one engine; a full run also has locked
     wheels, slip control, planted faults, and more vehicles in Exudyn and MuJoCo."""
-    vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)
+    vehicles, engines = (("caravan",), ENGINE_NAMES[:1]) if quick else (tuple(whole.TRAINS), ENGINE_NAMES)
     rows = [_axle_loads_row()]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
     rows += [

@@ -17,9 +17,9 @@ from validation.ride.drawn_rides import COPIES, NonlinearRide, random_nonlinear_
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
-SCENE_COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
+SCENE_COUNT_BY_SYSTEM = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
 """Number of random scenes of each system."""
-ENGINES = {
+ENGINES_BY_SYSTEM = {
     "pitch-plane": ("reference", "mujoco"),
     "wheelset": ("reference", "mujoco", "exudyn"),
     "braking": ("mujoco", "reference", "reference"),
@@ -44,14 +44,16 @@ def judge_choice_for_scene(system_name: str, seed: int) -> ChoiceCheckedByRuns:
     if system_name == "ride":
         return judge_choice_for_ride(random_nonlinear_ride(seed))
     return choice_checked_by_runs(
-        draw_scene(system_name, seed), system_name, ENGINES[system_name][seed % len(ENGINES[system_name])]
+        draw_scene(system_name, seed),
+        system_name,
+        ENGINES_BY_SYSTEM[system_name][seed % len(ENGINES_BY_SYSTEM[system_name])],
     )
 
 
 def judge_choice_for_ride(nonlinear_ride: NonlinearRide) -> ChoiceCheckedByRuns:
     """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
     that the choice did not use."""
-    engine = ENGINES["ride"][0]
+    engine = ENGINES_BY_SYSTEM["ride"][0]
     choice = Chooser(
         nonlinear_ride.prepared_in_time(), engine, list(nonlinear_ride.quantities), nonlinear_ride.tolerance
     ).choose()
@@ -84,7 +86,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     seeds = (
         {"pitch-plane": QUICK_SCENE_SEEDS}
         if quick
-        else {system: range(count) for system, count in SCENE_COUNTS.items()}
+        else {system: range(count) for system, count in SCENE_COUNT_BY_SYSTEM.items()}
     )
     choices = [judge_choice_for_scene(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
@@ -125,7 +127,7 @@ def _refused_choice_row() -> Row:
     asked, outcome = random_nonlinear_ride(UNDERSAMPLED_SEED), "a choice"
     try:
         Chooser(
-            asked.prepared_in_time(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE
+            asked.prepared_in_time(FEWEST_COPIES), ENGINES_BY_SYSTEM["ride"][0], list(asked.quantities), FINE_TOLERANCE
         ).choose()
     except InputError as error:
         outcome = "refused" if "samples would tell" in error.allowed else error.allowed

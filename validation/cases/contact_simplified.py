@@ -52,10 +52,12 @@ MESHES_PER_SIDE = (5, 7, 9, 11, 15, 19, 25)
 """Meshes per side of the coarse net of the normal problem."""
 CURVATURE_RATIOS = (0.05, 0.2, 1.0, 5.0, 20.0)
 """Ratios of curvatures B/A of the ellipses for which Hertz's closed form is exact."""
-APPROACH_TOLERANCE, JUMP_TOLERANCE = 0.02, 1e-6
+APPROACH_TOLERANCE, LOAD_JUMP_TOLERANCE = 0.02, 1e-6
 """Relative tolerance of the approach, and largest jump (N) of the load as a function of depth."""
 APPROACH_REASON = "the figure set for the theory"
-NO_CLAIM_REASON = "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
+NO_ACCURACY_CLAIM_REASON = (
+    "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
+)
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -68,7 +70,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
     jump = largest_load_jump(separate(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
-    rows = [*_hertz_rows(hertz), _jump_row(jump)]
+    rows = [*_hertz_rows(hertz), _load_jump_row(jump)]
     if quick:
         return rows, data
     data["shapes"] = {shape.name: _errors_of_variants(shape) for shape in shapes_by_formula() + profile_shapes()}
@@ -228,12 +230,12 @@ def _hertz_rows(errors_by_ratio: dict[str, dict[str, float]]) -> list[Row]:
     return rows
 
 
-def _jump_row(load_jump: float) -> Row:
+def _load_jump_row(load_jump: float) -> Row:
     """Row: largest jump of the load as a function of depth."""
     return Observed(
         "contact_simplified.continuity", SYSTEM, "largest jump of the load N(a3) of a lopsided contact", load_jump, "N"
     ).at_most(
-        JUMP_TOLERANCE,
+        LOAD_JUMP_TOLERANCE,
         "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory",
         "none",
     )
@@ -253,14 +255,14 @@ def _contact_shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]
         for key, what in (("area", "area"), ("peak", "peak pressure")):
             rows.append(
                 Observed(f"{row_name}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
-                    0.0, NO_CLAIM_REASON, "native"
+                    0.0, NO_ACCURACY_CLAIM_REASON, "native"
                 )
             )
         asked = f"{case['rolling']} of {case['asked']} creepages"
         rows.append(
             Observed(
                 f"{row_name}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
-            ).beside(0.0, NO_CLAIM_REASON, "native")
+            ).beside(0.0, NO_ACCURACY_CLAIM_REASON, "native")
         )
     return rows
 

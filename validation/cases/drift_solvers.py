@@ -169,7 +169,7 @@ def _treatment_record(
         ) ** 2
     spread, law = (
         np.sqrt(spread / NOISE_PATH_COUNT),
-        _pitch_deviation_law(_low_pass(forces.values, cutoff_frequency), noise_free_assembly),
+        _pitch_deviation_law(_low_passed_forces(forces.values, cutoff_frequency), noise_free_assembly),
     )
     growth, expected = (
         float(np.log(record_of_run[1] / record_of_run[0]) / np.diff(GROWTH_WINDOW)[0])
@@ -193,11 +193,11 @@ def _noisy_states(
 ) -> np.ndarray:
     """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff_frequency``
     (Hz) is given."""
-    forces = Sampled(_low_pass(force_samples, cutoff_frequency), 1 / NOISE_SAMPLING_RATE, held=False)
+    forces = Sampled(_low_passed_forces(force_samples, cutoff_frequency), 1 / NOISE_SAMPLING_RATE, held=False)
     return build(engine_name, replace(assembly, input=forces), solver_settings).run().states
 
 
-def _low_pass(force_samples: np.ndarray, cutoff_frequency: float | None) -> np.ndarray:
+def _low_passed_forces(force_samples: np.ndarray, cutoff_frequency: float | None) -> np.ndarray:
     """Samples filtered by a Butterworth low-pass of order 4, which runs forward and backward and so causes no delay;
     unchanged without a cut-off."""
     if cutoff_frequency is None:

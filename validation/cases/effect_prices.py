@@ -20,7 +20,7 @@ from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import (
     EFFECT_NAMES,
-    ENGINES,
+    ENGINE_NAMES,
     TIME_STEP,
     changes_text,
     component_count_changes,
@@ -77,8 +77,8 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         price = [
             _price_of_effect(effect, engine, files_folder, PRICE_ROUNDS[quick])
             for i, effect in enumerate(EFFECT_NAMES)
-            for j, engine in enumerate(ENGINES)
-            if not quick or i % len(ENGINES) == j
+            for j, engine in enumerate(ENGINE_NAMES)
+            if not quick or i % len(ENGINE_NAMES) == j
         ]
     rows = [
         row for engine, ratio in ratios.items() for row in _hand_built_rows(engine, ratio, TIMED_STEP_COUNTS[quick])
@@ -312,7 +312,7 @@ def _price_of_effect(effect_name: str, engine_name: str, work_folder: Path, roun
     components that the effect changes."""
     seconds = interleave(
         [
-            _timed_run(bare, engine_name)
+            _simulation_to_time(bare, engine_name)
             for bare in scenes_without_and_with_effect(effect_name, EFFECT_STEP_COUNT, work_folder)
         ],
         round_count,
@@ -329,7 +329,7 @@ def _price_of_effect(effect_name: str, engine_name: str, work_folder: Path, roun
     }
 
 
-def _timed_run(simulated_scene: Scene, engine_name: str) -> Any:
+def _simulation_to_time(simulated_scene: Scene, engine_name: str) -> Any:
     """Function that runs a scene and computes its output channels; the model is built beforehand, outside the timed
     call."""
     assembly = assembly_of_scene(simulated_scene)

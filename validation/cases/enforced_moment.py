@@ -84,7 +84,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         rows = _manoeuvre_rows(
             work, VEHICLE_SETS[-1:] if quick else VEHICLE_SETS, QUICK_DURATION if quick else DURATION
         )
-        ringing, paths = _ringing_rows(work)
+        ringing, paths = _multiplier_ringing_rows(work)
         rough, table = ([], []) if quick else _study_road_rows(work, (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
     return rows + ringing + rough, {"table": table, "ringing": paths}
 
@@ -99,7 +99,7 @@ def _manoeuvre_rows(work_folder: Path, parameter_set_names: tuple[str, ...], dur
         )
         true = exact_moment(scene)
         if parameter_set_name == parameter_set_names[0]:
-            rows.append(_uncertainty_row(scene, true))
+            rows.append(_moment_uncertainty_row(scene, true))
         for engine, settings in BEST_SOLVER_SETTINGS.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
@@ -120,7 +120,7 @@ def _manoeuvre_rows(work_folder: Path, parameter_set_names: tuple[str, ...], dur
     return rows
 
 
-def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
+def _moment_uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
     """Row: uncertainty of the true moment, measured by its difference from an adaptive solver of another family at a
     tolerance of 1e-11."""
     by_other_solver = enforced_moment(scene, "reference", Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-11))
@@ -133,7 +133,7 @@ def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
     ).at_most(MOMENT_TOLERANCE / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
-def _ringing_rows(work_folder: Path) -> CaseAnswer:
+def _multiplier_ringing_rows(work_folder: Path) -> CaseAnswer:
     """Rows and data on an abrupt start: error of Exudyn's multiplier over the first 0.1 s, with and without consistent
     initial accelerations."""
     write_manoeuvre(work_folder, "itwm_drift", starts_abruptly=True)

@@ -57,7 +57,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
         rows = [_single_run_row(forces, duration, paths), *_large_ensemble_rows(large)]
         with process_pool(2) as pool:
             again, half = pool.submit(run_paths, job, RECOMPUTED_PATH_COUNT), pool.submit(_half_step_row, forces)
-            killed = _killed_row(job, paths, forces / "killed")
+            killed = _killed_run_row(job, paths, forces / "killed")
             rows += [
                 _equal_bits_row(
                     "workers",
@@ -71,7 +71,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
             engines, prices = _engine_rows_and_times(scene, truth, times, paths, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
         rows += [*engines, halved, *_wall_time_rows(prices)]
-        return rows, _saved_data(measured.states, times, paths, large, prices)
+        return rows, _data_for_tables_and_figure(measured.states, times, paths, large, prices)
 
 
 def _noisy_scene(force_folder: Path, duration: float, noise_path: int = 0, time_step: float = TIME_STEP) -> Scene:
@@ -89,7 +89,7 @@ def _quick_rows(force_folder: Path, scene: Scene, ensemble_job: NoisePaths, outp
     return [
         _single_run_row(force_folder, 1.0, paths),
         _equal_bits_row("workers", "12 paths have the same bits with 1 worker and with 2", paths, two),
-        _interrupted_row(ensemble_job, paths, force_folder / "stopped"),
+        _interrupted_run_row(ensemble_job, paths, force_folder / "stopped"),
         *engines,
     ]
 
@@ -125,15 +125,15 @@ def _equal_bits_row(row_name: str, title: str, simulated_paths: Arrays, other_si
     )
 
 
-def _interrupted_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_folder: Path) -> Row:
+def _interrupted_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_folder: Path) -> Row:
     """Row: an interrupted run that is continued gives the same ensemble."""
 
-    def stop(run_progress: Any) -> None:
+    def interrupt_half_way(run_progress: Any) -> None:
         if run_progress.done >= 6:
             raise KeyboardInterrupt
 
     try:
-        run_paths(ensemble_job, 12, block_folder, blocks=Blocks(3), progress=stop)
+        run_paths(ensemble_job, 12, block_folder, blocks=Blocks(3), progress=interrupt_half_way)
     except KeyboardInterrupt:
         again = run_paths(ensemble_job, 12, block_folder, blocks=Blocks(3))
         return _equal_bits_row(
@@ -145,7 +145,7 @@ def _interrupted_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_fo
     raise AssertionError("the interrupt was lost")
 
 
-def _killed_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_folder: Path) -> Row:
+def _killed_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_folder: Path) -> Row:
     """Row: a run is killed after two of its blocks, then resumed, and must give the same ensemble."""
     child = get_context("spawn").Process(target=_run_slow_job, args=(ensemble_job, block_folder))
     child.start()
@@ -351,7 +351,7 @@ def _half_step_row(force_folder: Path) -> Row:
     ).at_most(1e-4, "the samples are the same, so only the integrator's error differs", "shared kernel")
 
 
-def _saved_data(
+def _data_for_tables_and_figure(
     true_pitch: np.ndarray,
     output_times: np.ndarray,
     simulated_paths: Arrays,

@@ -70,7 +70,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     rows, data = _discretisation_rows()
     rows += _invariant_rows(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
-    rows += _creepage_limit_rows() + _spin_moment_rows() + _derivative_rows() + _random_contact_rows()
+    rows += _creepage_limit_rows() + _spin_moment_rows() + _force_derivative_rows() + _random_contact_rows()
     if quick:
         return rows, data
     answers, data["model"] = _model_error_rows()
@@ -257,7 +257,7 @@ def _spin_moment_rows() -> list[Row]:
     return rows
 
 
-def _derivative_rows() -> list[Row]:
+def _force_derivative_rows() -> list[Row]:
     """Row: difference of the forces' analytic derivatives from central differences."""
     columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": NORMAL_LOAD}

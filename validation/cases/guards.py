@@ -97,7 +97,7 @@ def nan_force_endings(engine_name: str) -> dict[str, str]:
     return endings
 
 
-def constrained_endings(engine_name: str) -> dict[str, str]:
+def prescribed_pitch_endings(engine_name: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
     wrong = [name for name in integrator_names(engine_name) if not CATALOGUE[engine_name][name].constraints]
     return {
@@ -106,7 +106,7 @@ def constrained_endings(engine_name: str) -> dict[str, str]:
     }
 
 
-def unchecked_constrained_endings() -> dict[str, str]:
+def unchecked_prescribed_pitch_endings() -> dict[str, str]:
     """How runs with a prescribed pitch end in Exudyn's explicit integrators if the check before the run is bypassed.
     The guard after the run compares the multiplier with the balance of moments."""
     names = [
@@ -130,9 +130,12 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     rows: list[Row] = []
     endings: Saved = {}
     for engine in CATALOGUE:
-        rows += _unstable_rows(engine, endings, quick)
+        rows += _unstable_step_rows(engine, endings, quick)
         rows += _wrong_input_rows(engine)
-    for name, endings_of in (("refused", constrained_endings("exudyn")), ("raised", unchecked_constrained_endings())):
+    for name, endings_of in (
+        ("refused", prescribed_pitch_endings("exudyn")),
+        ("raised", unchecked_prescribed_pitch_endings()),
+    ):
         how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
             behaviour_row(
@@ -186,7 +189,7 @@ def _full_disk_row(work_folder: Path) -> Row:
     ).at_most(0.0, "files are written whole or not at all", "none")
 
 
-def _unstable_rows(engine_name: str, run_endings: Saved, quick: bool) -> list[Row]:
+def _unstable_step_rows(engine_name: str, run_endings: Saved, quick: bool) -> list[Row]:
     """Rows: no run at an unstable step gives a silent wrong result; if the check before the run is bypassed, the guard
     after the run raises an error."""
     checked = unstable_run_counts(engine_name, setups.run, quick)

@@ -52,7 +52,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ]
     if quick:
         return rows, {}
-    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduction_rows(car), *_noise_growth_rows(car)]
+    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduced_motion_rows(car), *_noise_growth_rows(car)]
     scenes = {frame: _hub_force_study_scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
@@ -189,17 +189,17 @@ def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
     ).at_most(1e-9, "same tableau, same step", "shared kernel")
 
 
-def _road_input(vehicle: CutVehicle, duration: float) -> HubInputs:
+def _hub_inputs_on_road(vehicle: CutVehicle, duration: float) -> HubInputs:
     """Input of the vehicle on a class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
     return two_tracks(vehicle, left, right, 20.0, TIME_STEP, round(duration / TIME_STEP))
 
 
-def _reproduction_rows(vehicle: CutVehicle) -> list[Row]:
+def _reproduced_motion_rows(vehicle: CutVehicle) -> list[Row]:
     """Rows: hub forces recorded on a road without noise reproduce the motion, up to interpolation errors between the
     samples."""
     duration = 2.0
-    true = true_run("mujoco", vehicle, _road_input(vehicle, duration), "hub", TIME_STEP, duration)
+    true = true_run("mujoco", vehicle, _hub_inputs_on_road(vehicle, duration), "hub", TIME_STEP, duration)
     off = {}
     readings: tuple[Interpolation, ...] = ("linear", "smooth")
     for interpolation in readings:
@@ -341,7 +341,7 @@ def _planted_fault_rows(study_scene: HubScene) -> list[Row]:
     contradiction.
     """
     vehicle, duration = r19(), 5.0
-    hub_inputs = _road_input(vehicle, duration)
+    hub_inputs = _hub_inputs_on_road(vehicle, duration)
     clean, angles = recorded_measurement(true_run("mujoco", vehicle, hub_inputs, "hub", TIME_STEP, duration), "hub", 2)
     in_space, _ = recorded_measurement(
         true_run("mujoco", vehicle, hub_inputs, "inertial", TIME_STEP, duration), "inertial", 2

@@ -82,13 +82,13 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     prescribed pitch. A quick run has short runs."""
     with TemporaryDirectory() as name:
         drive = _measured_drive(Path(name), 0.2 if quick else 4.0)
-        gaps, laws = _pitch_gaps(drive), _gap_laws(drive)
+        gaps, laws = _pitch_gaps(drive), _pitch_gap_laws(drive)
         walked = _pitch_errors(
             drive.prescribed_assembly("gyro.csv", bandwidth=PITCH_BANDWIDTH), drive
         )  # from a start on the constraint
         loose = _unguided_pitch_errors(_measured_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
-        *_gap_rows(gaps, laws, drive.duration),
+        *_pitch_gap_rows(gaps, laws, drive.duration),
         *_noise_drift_rows(walked, loose),
         *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in MISSING_FORMULATIONS),
     ]
@@ -156,7 +156,7 @@ def _unguided_pitch_errors(measured_drive: MeasuredPitchDrive) -> dict[str, np.n
     }
 
 
-def _gap_laws(measured_drive: MeasuredPitchDrive) -> dict[str, tuple[np.ndarray, str]]:
+def _pitch_gap_laws(measured_drive: MeasuredPitchDrive) -> dict[str, tuple[np.ndarray, str]]:
     """For each formulation, the closed form of the pitch error (n,) in rad after the wrong start, and the reason for
     this form."""
     times = TIME_STEP * np.arange(len(measured_drive.true_pitch))
@@ -171,21 +171,22 @@ def _gap_laws(measured_drive: MeasuredPitchDrive) -> dict[str, tuple[np.ndarray,
         ),
         "index 2": (
             np.append(
-                START_ERROR, START_ERROR + TIME_STEP / 2 * START_RATE_ERROR + _quadrature_error(measured_drive)[1:]
+                START_ERROR,
+                START_ERROR + TIME_STEP / 2 * START_RATE_ERROR + _prescribed_pitch_quadrature_error(measured_drive)[1:],
             ),
             "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate",
         ),
     }
 
 
-def _gap_rows(
+def _pitch_gap_rows(
     pitch_gaps: dict[str, np.ndarray], gap_laws: dict[str, tuple[np.ndarray, str]], duration: float
 ) -> list[Row]:
     """Rows: difference of each formulation's pitch gap from its closed law."""
     start = f"from a start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s"
     rows = [
         Observed(
-            f"index_reduction.law.{_row_id(name)}",
+            f"index_reduction.law.{_formulation_in_row_id(name)}",
             SYSTEM,
             f"{name}: difference of the gap {start} from its law",
             float(np.abs(pitch_gaps[name] - law).max() / START_ERROR),
@@ -201,7 +202,7 @@ def _gap_rows(
     }
     rows += [
         Observed(
-            f"index_reduction.none.{_row_id(name)}",
+            f"index_reduction.none.{_formulation_in_row_id(name)}",
             SYSTEM,
             f"{name}: gap after the first step {start}",
             float(np.abs(pitch_gaps[name][1:]).max()),
@@ -218,10 +219,10 @@ def _gap_rows(
             "",
         ).beside(1 + START_RATE_ERROR / START_ERROR * duration, "it never stops", "none")
     )
-    return [*rows, _index_two_row()]
+    return [*rows, _exudyn_index_two_row()]
 
 
-def _quadrature_error(measured_drive: MeasuredPitchDrive) -> np.ndarray:
+def _prescribed_pitch_quadrature_error(measured_drive: MeasuredPitchDrive) -> np.ndarray:
     """Error (n,) in rad of the prescribed pitch if its rate is integrated by the trapezoidal rule."""
     signal = measured_drive.prescribed_assembly().input
     assert signal is not None
@@ -230,7 +231,7 @@ def _quadrature_error(measured_drive: MeasuredPitchDrive) -> np.ndarray:
     return summed - (angle - angle[0])
 
 
-def _index_two_row() -> Row:
+def _exudyn_index_two_row() -> Row:
     """Row: outcome of Exudyn's generalised-alpha solver with its flag for index 2."""
     import exudyn as exu
 
@@ -282,7 +283,7 @@ def _noise_drift_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dic
     return rows
 
 
-def _row_id(formulation_name: str) -> str:
+def _formulation_in_row_id(formulation_name: str) -> str:
     """Part of a row id for a constraint formulation."""
     return formulation_name.replace(", ", ".").replace(" ", "_")
 

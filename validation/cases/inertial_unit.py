@@ -65,12 +65,12 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     paths = 200 if quick else 4000
     rows = [
         *_exact_rate_rows(),
-        *_one_axis_rows(paths),
-        *_three_axes_rows(paths),
+        *_one_axis_noise_rows(paths),
+        *_three_axis_noise_rows(paths),
         *_quaternion_norm_rows(paths),
         *_gyro_bias_rows(paths),
     ]
-    example, data = _ten_minute_rows(0 if quick else 60)
+    example, data = _ten_minute_drive_rows(0 if quick else 60)
     recorded, seen = _real_car_recording_rows(paths)
     return [*rows, *example, *recorded, *([] if quick else _section_force_rows())], {
         "ten minutes": data,
@@ -112,7 +112,7 @@ def _closed_form_row(
     )
 
 
-def _one_axis_rows(noise_path_count: int) -> list[Row]:
+def _one_axis_noise_rows(noise_path_count: int) -> list[Row]:
     """Rows on eqs (27) to (30): with noise on one gyro axis and no rotation, the angle about this axis is a Brownian
     motion."""
     rows = []
@@ -144,7 +144,7 @@ def _one_axis_rows(noise_path_count: int) -> list[Row]:
     return rows
 
 
-def _mean_row(
+def _mean_value_row(
     row_name: str, quantity_name: str, simulated_values: np.ndarray, expected_mean: float, tolerance_reason: str
 ) -> Row:
     """Row for a mean that must lie within STANDARD_ERRORS_OF_BAND standard errors of its theoretical value."""
@@ -159,7 +159,7 @@ def _mean_row(
     )
 
 
-def _three_axes_rows(noise_path_count: int) -> list[Row]:
+def _three_axis_noise_rows(noise_path_count: int) -> list[Row]:
     """Rows on noise about three axes. Equal noise: mean trace of the error matrix; unequal noise on a turning body:
     mean error matrix and mean quaternion."""
     count = round(RUN_SECONDS / SAMPLE_PERIOD)
@@ -174,21 +174,21 @@ def _three_axes_rows(noise_path_count: int) -> list[Row]:
     all_equal = np.full(3, EQUAL_ANGLE_WALK)
     same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
-        _mean_row(
+        _mean_value_row(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
             mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
-        _mean_row(
+        _mean_value_row(
             "scalar",
             "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
             mean_scalar(all_equal, RUN_SECONDS),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
-        _mean_row(
+        _mean_value_row(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
@@ -263,7 +263,7 @@ def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
             ),
         )
         rows += [
-            *(_mean_row(f"{id}.{axes}", *figures) for id, *figures in means),
+            *(_mean_value_row(f"{id}.{axes}", *figures) for id, *figures in means),
             Observed(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
@@ -277,7 +277,7 @@ def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
     return rows
 
 
-def _ten_minute_rows(noise_path_count: int) -> CaseAnswer:
+def _ten_minute_drive_rows(noise_path_count: int) -> CaseAnswer:
     """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
     gyro sample."""
     walk = angle_random_walk_of(RATE_DEVIATION, SAMPLING_RATE)

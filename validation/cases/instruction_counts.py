@@ -112,7 +112,7 @@ def _instruction_counts(work_folder: Path) -> np.ndarray:
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PROCESS_TIMEOUT)
     marches = len(METHODS_OF_ENGINES) * len(COUNTED_STEP_COUNTS)
     counts = [
-        [_count_of_dump(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
+        [_instructions_in_dump_file(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
         for path in work_folder.glob("count.*")
         if path.with_name(f"{path.name}.{marches + 1}").exists()
     ]
@@ -120,9 +120,9 @@ def _instruction_counts(work_folder: Path) -> np.ndarray:
     return np.array(counts, float).reshape(2, -1, len(COUNTED_STEP_COUNTS))
 
 
-def _count_of_dump(dump_file: Path) -> int:
+def _instructions_in_dump_file(dump_path: Path) -> int:
     """Number of instructions in one dump file of the profiler."""
-    matched = re.search(r"^totals: (\d+)", dump_file.read_text(errors="replace"), re.MULTILINE)
+    matched = re.search(r"^totals: (\d+)", dump_path.read_text(errors="replace"), re.MULTILINE)
     assert matched is not None
     return int(matched[1])
 

@@ -33,10 +33,10 @@ SEED = 2000
 """Seed of the first run; the filter's settings were chosen on seeds 101 to 103."""
 BAND_PROBABILITY = 0.999
 """Probability with which a correct filter lies inside each chi-square band."""
-ENGINES = ("reference", "exudyn", "mujoco")
+ENGINE_NAMES = ("reference", "exudyn", "mujoco")
 SAMPLE_COUNT, DURATION = 20, 30.0
 """Number of noise samples and length (s) of the runs that are judged by damage."""
-LOOP_RUN_COUNT, LOOP_SECONDS = 6, 60.0
+CLOSED_LOOP_RUN_COUNT, CLOSED_LOOP_SECONDS = 6, 60.0
 OUTAGE_TIMES, LOST_SAMPLE_SHARE = (20.0, 25.0), 0.3
 """Start and end (s) of an outage without any measurement, and share of all other samples that are lost."""
 VARIANCE_FACTORS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
@@ -63,9 +63,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     rows += _missing_sample_rows(run_folder, 40.0, OUTAGE_TIMES, tuple(SENSOR_CHANNELS))
     loop_rows, deviations = _closed_loop_rows(run_folder)
     gyro = gyro_only_pitch_error(run_folder, 600.0, SEED)
-    damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLE_COUNT)]
+    damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINE_NAMES) for i in range(SAMPLE_COUNT)]
     right = [
-        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES[:1], perturbed=False)["reference"]
+        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINE_NAMES[:1], perturbed=False)["reference"]
         for i in range(2)
     ]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)
@@ -195,7 +195,7 @@ def _missing_sample_rows(
 
 def _short_run_rows(work_folder: Path) -> list[Row]:
     """Row: largest pitch error of a short stabilised run."""
-    error = scores_of_stabilised(work_folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
+    error = scores_of_stabilised(work_folder, 3.0, SEED, ENGINE_NAMES[:1])["reference"]["pitch"]
     what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
     return [Observed("kalman.short", SYSTEM, what, error, "rad").at_most(5e-3, why, "none")]
@@ -206,7 +206,7 @@ def _closed_loop_rows(work_folder: Path) -> tuple[list[Row], list[list[float]]]:
     Lyapunov equation."""
     force = deviation_at_period(35.0, COARSE_PERIOD)
     step, covariance = closed_loop_covariance(work_folder, force)
-    errors = [loop_errors(work_folder, force, LOOP_SECONDS, SEED + i) for i in range(LOOP_RUN_COUNT)]
+    errors = [loop_errors(work_folder, force, CLOSED_LOOP_SECONDS, SEED + i) for i in range(CLOSED_LOOP_RUN_COUNT)]
     squares = np.mean([np.mean(error_series**2, axis=0) for error_series in errors], axis=0)
     spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))
     names = ("z1 - z3", "z2 - z3", "pitch", "z1' - z3'", "z2' - z3'", "pitch rate")
@@ -214,7 +214,8 @@ def _closed_loop_rows(work_folder: Path) -> tuple[list[Row], list[list[float]]]:
     for i in range(12):
         who, what = ("estimate", "run")[i // 6], names[i % 6]
         why = (
-            f"{LOOP_RUN_COUNT} runs of {LOOP_SECONDS:g} s; spread {spread[i]:.1%} from the loop's own autocorrelation, "
+            f"{CLOSED_LOOP_RUN_COUNT} runs of {CLOSED_LOOP_SECONDS:g} s; spread {spread[i]:.1%} from the loop's own "
+            "autocorrelation, "
             "times 3.29"
         )
         rows.append(
@@ -266,12 +267,12 @@ def _gyro_rows(gyro_record: dict[str, float]) -> list[Row]:
     ]
 
 
-def _damage_rows(damage_by_run: list[dict[str, dict[str, float]]]) -> list[Row]:
+def _damage_rows(damage_ratios_by_run: list[dict[str, dict[str, float]]]) -> list[Row]:
     """Rows: damage ratio of every section force in every engine, over all noise samples."""
     rows = []
-    for engine in ENGINES:
+    for engine in ENGINE_NAMES:
         for name in SECTION_FORCE_CHANNELS:
-            ratios = np.array([run_damage[engine][name] for run_damage in damage_by_run])
+            ratios = np.array([run_damage[engine][name] for run_damage in damage_ratios_by_run])
             why = (
                 f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
                 f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}"
@@ -290,11 +291,11 @@ INERTIA_QUANTITY = "mean share by which the estimated 1/I is above the model's"
 
 
 def _moment_rows(
-    damage_by_run: list[dict[str, dict[str, float]]], moments_of_right_model: list[dict[str, float]]
+    results_by_run: list[dict[str, dict[str, float]]], moments_of_right_model: list[dict[str, float]]
 ) -> list[Row]:
     """Rows: ratio of the filter's artificial moments to the inertia moment I beta''. With a wrong model, only moments
     that the error of the inertia does not explain are judged."""
-    reference = [run_damage["reference"] for run_damage in damage_by_run]
+    reference = [run_damage["reference"] for run_damage in results_by_run]
     rows = []
     for name, words, some, key in (
         ("right", "artificial moment, right model", moments_of_right_model, "all"),
@@ -342,7 +343,7 @@ def tables(case_data: Saved) -> list[Table]:
                 for key in keys
             ),
         )
-        for engine in ENGINES
+        for engine in ENGINE_NAMES
     )
     note = (
         f"Mean and standard deviation over {len(case_data['damage'])} noise samples of {DURATION:g} s: damage / true "

@@ -33,8 +33,8 @@ from validation.common.scenes import STUDY_ROAD, VEHICLE_SETS, largest_differenc
 
 TITLE = "Tyres that only push"
 SYSTEM: System = "pitch-plane"
-ENGINES = ("exudyn", "mujoco")
-IMPLEMENTATIONS = ("reference", *ENGINES)
+ENGINE_NAMES = ("exudyn", "mujoco")
+IMPLEMENTATIONS = ("reference", *ENGINE_NAMES)
 STATE_UNITS = "m, rad, m/s, rad/s"
 START_MOTION = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
 """Initial displacements (m) and pitch (rad): both wheels are in the air, one higher than the other."""
@@ -89,7 +89,7 @@ def _acceleration_rows(parameter_set_name: str) -> list[Row]:
     for geometry in ("exact", "linear"):
         lifting = lift_off_scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
         assembly = assembly_of_scene(lifting)
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
@@ -119,7 +119,7 @@ def _study_road_rows(parameter_set_name: str, duration: float) -> list[Row]:
             largest_difference(runs[engine], runs["reference"]),
             STATE_UNITS,
         ).at_most(1e-11, f"{ROUNDING_REASON}; each landing makes the difference some times as large", "native")
-        for engine in ENGINES
+        for engine in ENGINE_NAMES
     ]
     least = min(_tyre_forces_of_run(run).min() for run in runs.values())
     return [
@@ -277,10 +277,10 @@ def _ride_vehicle_rows(quick: bool) -> list[Row]:
             "effects": {"lift_off": {}},
         }
     )
-    car, random, worst = vehicle_of(ride), np.random.default_rng(SEED), dict.fromkeys(ENGINES, 0.0)
+    car, random, worst = vehicle_of(ride), np.random.default_rng(SEED), dict.fromkeys(ENGINE_NAMES, 0.0)
     damped = replace(car, tyres=tuple(replace(tyre, damping=300.0 + i) for i, tyre in enumerate(car.tyres)))
     written, n, w = SpatialReference(damped), len(car.coordinates()), len(car.tyres)
-    models = {engine: build_in_space(engine, damped) for engine in ENGINES}
+    models = {engine: build_in_space(engine, damped) for engine in ENGINE_NAMES}
     for _ in range(30 if quick else 100):
         q, v = random.uniform(-0.08, 0.08, n), random.uniform(-3.0, 3.0, n)
         road = np.concatenate([random.uniform(-0.1, 0.1, w), random.uniform(-3.0, 3.0, w)])
@@ -290,7 +290,7 @@ def _ride_vehicle_rows(quick: bool) -> list[Row]:
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
     first, two = (
-        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINES
+        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINE_NAMES
     )
     apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [
@@ -303,7 +303,7 @@ def _ride_vehicle_rows(quick: bool) -> list[Row]:
                 worst[engine],
                 "of the largest",
             ).at_most(1e-12, "each has the law in its code", "native")
-            for engine in ENGINES
+            for engine in ENGINE_NAMES
         ),
         Observed(
             "lift_off.ride",
@@ -322,7 +322,7 @@ def _hub_force_rows() -> list[Row]:
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
     runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in IMPLEMENTATIONS}
-    apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
+    apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINE_NAMES)
     loads = runs["reference"].wrenches[:, :, 2]
     return [
         Observed(

@@ -165,7 +165,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             *_three_faults_at_once_rows(virtual, work_folder),
             _mean_delay_row(virtual, work_folder),
         ]
-        size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, work_folder), "drift")
+        size = 1e6 * _stated_fault_size(drifting_findings(virtual, 5e-4, work_folder), "drift")
         rows += [
             _stated_size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
             *_moving_car_check_rows(work_folder),
@@ -173,9 +173,9 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"said": finding_texts}
 
 
-def _stated_size(findings: Sequence[Finding], check_name: str, finding_place: str = "") -> float:
+def _stated_fault_size(findings: Sequence[Finding], check_name: str, finding_location: str = "") -> float:
     """Size that the first finding of a check states at a place; NaN if there is no such finding."""
-    sizes = [finding.size for finding in findings if finding.check == check_name and finding_place in finding.place]
+    sizes = [finding.size for finding in findings if finding.check == check_name and finding_location in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
@@ -212,7 +212,7 @@ def _planted_fault_rows(planted_fault: PlantedMeasurementFault, findings: tuple[
         )
     ]
     if planted_fault.check != "swapped":
-        size = _stated_size(findings, planted_fault.check, planted_fault.place)
+        size = _stated_fault_size(findings, planted_fault.check, planted_fault.place)
         rows.append(
             _stated_size_row(
                 f"{key}.size", f"{planted_fault.name}: its size", size, planted_fault.unit, planted_fault.size
@@ -264,7 +264,7 @@ def _wrong_vehicle_rows(work_folder: Path) -> list[Row]:
         if finding.weight == "error"
     ]
     what = "80 kg more on board than in the file: excess of weight"
-    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _stated_size(findings_by_car["loaded"], "weight")
+    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _stated_fault_size(findings_by_car["loaded"], "weight")
     id, why = "measured_checks.loaded", "what was loaded, 20 %"
     quantity = (
         "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
@@ -288,7 +288,11 @@ def _three_faults_at_once_rows(virtual_measurement: VirtualMeasurement, work_fol
     return [
         behaviour_row(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
         _stated_size_row(
-            "together.size", "size of the delay among several faults", _stated_size(last, "shift"), "s", PLANTED_DELAY
+            "together.size",
+            "size of the delay among several faults",
+            _stated_fault_size(last, "shift"),
+            "s",
+            PLANTED_DELAY,
         ),
     ]
 
@@ -301,7 +305,7 @@ def _mean_delay_row(virtual_measurement: VirtualMeasurement, work_folder: Path) 
         for seed in range(NOISE_SAMPLE_COUNT)
     ]
     late = 1e3 * float(
-        np.mean([_stated_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
+        np.mean([_stated_fault_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
     )
     what = f"3 ms late, one force: mean over {NOISE_SAMPLE_COUNT} samples of noise"
     why = "5 %: the response is linear, the vehicle is not"
@@ -358,7 +362,7 @@ def _moving_car_check_rows(work_folder: Path) -> list[Row]:
             "measured_checks.car.ratio",
             SYSTEM,
             "ratio of the gyro's pitch rate to that of the camera's pose, moving car",
-            _stated_size(findings["clean"], "turning", "pitch"),
+            _stated_fault_size(findings["clean"], "turning", "pitch"),
             "1",
         ).beside(1.0, "a telephone beside a camera at 20 Hz"),
     ]

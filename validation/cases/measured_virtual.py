@@ -89,10 +89,12 @@ def write_user_vehicle(work_folder: Path) -> str:
     name."""
     text, number = (SHIPPED_FOLDER / "r19_free.toml").read_text(encoding="utf-8"), count()
 
-    def scaled(number_match: re.Match[str]) -> str:
+    def scaled_entry(number_match: re.Match[str]) -> str:
         return f"{number_match[1]} = {float(number_match[2]) * (1.0 + 0.02 * (next(number) % 11 - 5))!r}"
 
-    (work_folder / "own.toml").write_text(re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", scaled, text, flags=re.M))
+    (work_folder / "own.toml").write_text(
+        re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", scaled_entry, text, flags=re.M)
+    )
     return "own.toml"
 
 

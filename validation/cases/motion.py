@@ -222,8 +222,8 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = fit_quality(sensor_array(p.positions()), readings)
     return [
-        *_recovery_rows("accelerometers", engine_name, array, felt, run.states, None),
-        *_recovery_rows("gyro", engine_name, array, felt, run.states, turning),
+        *_recovered_motion_rows("accelerometers", engine_name, array, felt, run.states, None),
+        *_recovered_motion_rows("gyro", engine_name, array, felt, run.states, turning),
         Observed(
             f"motion.pitch_acceleration.{engine_name}",
             SYSTEM,
@@ -256,7 +256,7 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
     ]
 
 
-def _recovery_rows(
+def _recovered_motion_rows(
     integration_rule: str,
     engine_name: str,
     sensor_arrangement: SensorArray,

@@ -79,13 +79,13 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     rounds = TIMING_ROUNDS[quick]
     if quick:
         priced, (beside, data) = (
-            [_problem_rows(True, rounds, make) for make in COST_PROBLEMS],
+            [_cost_problem_rows(True, rounds, make) for make in COST_PROBLEMS],
             _further_costs(True, rounds),
         )
     else:
         priced, (beside, data) = _costs_in_processes(rounds)
     rows = [row for problem_rows, _ in priced for row in problem_rows]
-    return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
+    return rows + _coinciding_curve_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
 def _further_costs(quick: bool, round_count: int) -> CaseAnswer:
@@ -103,10 +103,10 @@ def _further_costs(quick: bool, round_count: int) -> CaseAnswer:
     settings = dict.fromkeys(
         _setting_at_1_ms(setting) for setting in road_excited.settings(quick) if setting.method != "DVERK6"
     )
-    return rows + split.rows(data["split"]) + _force_call_rows([*settings], road) + _speed_rows(data), data
+    return rows + split.rows(data["split"]) + _force_call_rows([*settings], road) + _target_speed_rows(data), data
 
 
-def _problem_rows(quick: bool, round_count: int, make_problem: MakeCostProblem) -> CaseAnswer:
+def _cost_problem_rows(quick: bool, round_count: int, make_problem: MakeCostProblem) -> CaseAnswer:
     """Rows and saved data of one cost problem, which is a model with a range of integrators and settings."""
     problem = make_problem(quick)
     measured = runner.measure(problem, quick, round_count, SHORTEST_TIMED_RUN[quick])
@@ -118,16 +118,16 @@ def _costs_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
         first, *other_problems = COST_PROBLEMS + FURTHER_COST_PROBLEMS
         road, beside = (
-            pool.submit(_problem_rows, False, round_count, first),
+            pool.submit(_cost_problem_rows, False, round_count, first),
             pool.submit(_further_costs, False, round_count),
         )
-        priced = [*pool.map(partial(_problem_rows, False, round_count), other_problems[::-1])][::-1]
+        priced = [*pool.map(partial(_cost_problem_rows, False, round_count), other_problems[::-1])][::-1]
         return [road.result(), *priced], beside.result()
 
 
-def _road_rows(saved_rows: Saved) -> list[Row]:
+def _coinciding_curve_rows(saved_road_problem: Saved) -> list[Row]:
     """Rows: work-precision curves that must coincide on the road, and methods that Exudyn names but does not have."""
-    road = runner.of_saved(saved_rows)
+    road = runner.of_saved(saved_road_problem)
     groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
         behaviour_row(
@@ -193,7 +193,7 @@ def _force_call_rows(solver_settings: list[Setting], assembly: Assembly) -> list
     return rows
 
 
-def _speed_rows(case_data: Saved) -> list[Row]:
+def _target_speed_rows(case_data: Saved) -> list[Row]:
     """Rows on target speeds, reported with their intervals and without a verdict."""
     rows = [
         Observed(

@@ -59,7 +59,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if data is None or not (data / RACE_CAR_FILE).is_file():
         return [*rows, *_rows_not_run(f"needs {RACE_CAR_FILE} in the folder that TWINRIG_DATA names")], {}
     chosen = _identified_race_car(data / RACE_CAR_FILE, work_folder)
-    return [*rows, *_race_car_rows(chosen), _sensor_consistency_row(work_folder / "race.csv")], _saved_data(chosen)
+    return [*rows, *_race_car_rows(chosen), _sensor_consistency_row(work_folder / "race.csv")], _data_for_report(chosen)
 
 
 def _car_scene(work_folder: Path, parameter_values: dict[str, float]) -> SingleTrackScene:
@@ -220,7 +220,7 @@ def _rows_not_run(reason: str) -> list[Row]:
     ]
 
 
-def _saved_data(identified_car: IdentifiedVehicle) -> dict[str, Any]:
+def _data_for_report(identified_car: IdentifiedVehicle) -> dict[str, Any]:
     """Estimates, standard errors and prediction errors, as saved data."""
     known = identified_car.uncertainty
     return {

@@ -30,7 +30,7 @@ QUICK_ENGINE = "mujoco"
 """Engine of a quick run; a full run has all engines."""
 REDRAW_STRIDE = 1000
 """Difference between the number of a scene and of the scene that replaces it."""
-LEAST_MET_SHARE, ERROR_FACTOR = 0.95, 3.0
+LEAST_KEPT_TOLERANCE_SHARE, LARGEST_ERROR_FACTOR = 0.95, 3.0
 """Least share of scenes whose every recommended setting keeps its tolerance; and bound of the factor between predicted
 and true error."""
 
@@ -101,14 +101,14 @@ def _promise_rows(verdicts: list[list[Verdict]], refusal_reasons: list[str]) -> 
             f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
             kept_scenes / len(verdicts),
             "",
-        ).within(1.0, 1.0 - LEAST_MET_SHARE, why, "closed form"),
+        ).within(1.0, 1.0 - LEAST_KEPT_TOLERANCE_SHARE, why, "closed form"),
         Observed(
             "recommendation.predicted",
             SYSTEM,
             "largest factor between the predicted and the true error",
             max(factors, default=float("inf")),
             "times",
-        ).at_most(ERROR_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
+        ).at_most(LARGEST_ERROR_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
         Observed(
             "recommendation.refused",
             SYSTEM,
@@ -116,7 +116,7 @@ def _promise_rows(verdicts: list[list[Verdict]], refusal_reasons: list[str]) -> 
             len(refusal_reasons),
             "scenes",
         ).at_most(
-            (1.0 - LEAST_MET_SHARE) * len(verdicts),
+            (1.0 - LEAST_KEPT_TOLERANCE_SHARE) * len(verdicts),
             "; ".join(refusal_reasons) or "none was: every one got a recommendation",
             "none",
         ),
@@ -199,12 +199,12 @@ def draw(case_data: Saved) -> Drawn:
     ax.plot(span, span, color=DARK, linewidth=0.8)
     ax.fill_between(
         span,
-        span / ERROR_FACTOR,
-        span * ERROR_FACTOR,
+        span / LARGEST_ERROR_FACTOR,
+        span * LARGEST_ERROR_FACTOR,
         color="#bbbbbb",
         alpha=0.4,
         linewidth=0,
-        label=f"within a factor {ERROR_FACTOR:g}",
+        label=f"within a factor {LARGEST_ERROR_FACTOR:g}",
     )
     ax.axvline(1.0, color=REJECTED_COLOUR, linewidth=1.0, label="tolerance")
     ax.set(

@@ -45,7 +45,7 @@ SHIPPED_VEHICLES = ("r19_ride", "r19_free", "seven_freedoms", "three_axle_truck"
 VARIED_VEHICLES = ("r19_ride", "r19_free", "three_axle_truck")
 WEIGHTED_OUTPUTS = {"left occupant": "Wk", "right occupant": "Wk", "body centre": "Wk"}
 SWEPT_SPEEDS = np.linspace(5.0, 50.0, 60)
-SYMMETRY_ZERO = 1e-20
+SYMMETRY_ZERO_SHARE = 1e-20
 """Variances below this share of the largest variance count as zero by symmetry."""
 
 
@@ -125,7 +125,7 @@ def _covariance_difference(
         stationary_covariance(vehicle_with_road(vehicle, road_excitation, speed)),
         variances_by_quadrature(analytic_vehicle, road_excitation, speed),
     )
-    is_finite = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
+    is_finite = covariance.variance > SYMMETRY_ZERO_SHARE * covariance.variance.max()
     worst = largest_relative_error(covariance.deviation[is_finite], np.sqrt(integrals.variance[is_finite]))
     return worst, covariance.error[is_finite].max(), integrals.error[is_finite].max(), int(is_finite.sum())
 
@@ -266,7 +266,7 @@ def _speed_sweep_rows(speeds: np.ndarray, engine_name: str) -> tuple[list[Row], 
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
     slow = variance_sweep(linear, roads, speeds[some], WEIGHTED_OUTPUTS, fast=False)
-    is_finite = slow.variance > SYMMETRY_ZERO * slow.variance.max()
+    is_finite = slow.variance > SYMMETRY_ZERO_SHARE * slow.variance.max()
     rows = [
         Observed(
             "ride_covariance.fast.equal",

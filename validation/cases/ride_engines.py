@@ -22,7 +22,7 @@ from validation.spatial import spatial_twin
 
 TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"
 SYSTEM: System = "ride"
-ENGINES = ("exudyn", "mujoco")
+ENGINE_NAMES = ("exudyn", "mujoco")
 TRAVEL_SPEED, GRAVITY = 20.0, 9.81
 SEED = 20261121
 STATE_COUNT, TIME_STEP = 100, 1e-3
@@ -52,7 +52,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             shipped_vehicle_or_twin(name, GRAVITY), name, "loaded", MATRIX_TOLERANCES
         ) + _acceleration_rows(name)
     bent = with_nonlinear_springs(shipped_vehicle_or_twin("r19_ride", GRAVITY))
-    rows += _matrix_rows(bent, "r19_ride", "loaded and curved", dict.fromkeys(ENGINES, 1e-9))
+    rows += _matrix_rows(bent, "r19_ride", "loaded and curved", dict.fromkeys(ENGINE_NAMES, 1e-9))
     path, price = _simulation_rows()
     return rows + path + _rest_position_rows() + _eigenvalue_shift_rows() + _curve_count_row(), {"price": price}
 
@@ -115,7 +115,7 @@ def _matrix_rows(
             matrix_difference(build(engine, vehicle, speed=TRAVEL_SPEED).linearise(), expected),
             "relative",
         ).at_most(tolerance_of_engine[engine], DIFFERENCES_REASON, "native")
-        for engine in ENGINES
+        for engine in ENGINE_NAMES
     ]
 
 
@@ -132,7 +132,7 @@ def _frequency_rows() -> list[Row]:
             ),
             "relative",
         ).at_most(1e-5, "six decimals of the expected ones are known", "published")
-        for engine in ENGINES
+        for engine in ENGINE_NAMES
     ]
 
 
@@ -144,7 +144,7 @@ def _acceleration_rows(vehicle_name: str) -> list[Row]:
         if vehicle_name != "quarter_car"
         else shipped_vehicle_or_twin(vehicle_name, GRAVITY)
     )
-    built = (build(engine, vehicle, speed=TRAVEL_SPEED) for engine in ENGINES)
+    built = (build(engine, vehicle, speed=TRAVEL_SPEED) for engine in ENGINE_NAMES)
     models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, TRAVEL_SPEED)]
     worst = np.zeros(3)
     for path in range(STATE_COUNT):
@@ -164,7 +164,7 @@ def _acceleration_rows(vehicle_name: str) -> list[Row]:
     ]
 
 
-def _settings(engine_name: str, duration: float = 1.0) -> Settings:
+def _integrator_settings(engine_name: str, duration: float = 1.0) -> Settings:
     """Settings of an engine's usual integrator."""
     return Settings(INTEGRATORS[engine_name], TIME_STEP, duration)
 
@@ -178,8 +178,8 @@ def _simulation_rows() -> tuple[list[Row], list[list[str]]]:
         vehicle = with_nonlinear_springs(vehicle) if what == "curved" else vehicle
         road = 1e-4 * np.cumsum(normal_samples(SEED, 0, 2 * round(1.0 / TIME_STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
         runs = {}
-        for engine in ENGINES:
-            model = build(engine, vehicle, _settings(engine), None, road)
+        for engine in ENGINE_NAMES:
+            model = build(engine, vehicle, _integrator_settings(engine), None, road)
             start = time.process_time()
             runs[engine] = model.run(*random_state(vehicle, STATE_COUNT)[:2])
             price.append([engine, what, f"{1e3 * (time.process_time() - start):.0f}", str(model.plan()["callbacks"])])
@@ -204,8 +204,8 @@ def _rest_position_rows() -> list[Row]:
     rows = []
     vehicle = with_nonlinear_springs(shipped_vehicle_or_twin("r19_ride", GRAVITY))
     zero = np.zeros(len(vehicle.coordinates()))
-    for engine in ENGINES:
-        model = build(engine, vehicle, _settings(engine))
+    for engine in ENGINE_NAMES:
+        model = build(engine, vehicle, _integrator_settings(engine))
         rows.append(
             Observed(
                 f"ride_engines.rest.{engine}",
@@ -236,7 +236,7 @@ def _eigenvalue_shift_rows() -> list[Row]:
         analytic = eigenvalue_shifts(
             *(linearise(shipped_vehicle_or_twin(name, gravity), TRAVEL_SPEED) for gravity in (0.0, GRAVITY))
         )
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             shifted = eigenvalue_shifts(
                 *(
                     build(engine, shipped_vehicle_or_twin(name, gravity), speed=TRAVEL_SPEED).linearise()

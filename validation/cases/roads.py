@@ -18,7 +18,7 @@ from validation.common.scenes import COURSE_FILE, data_folder, largest_differenc
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
-ROAD_LENGTH, INCREMENT = 60.0, 0.05
+ROAD_LENGTH, STATION_INCREMENT = 60.0, 0.05
 ROAD_SEED = 3
 """Seed of the class C road's random phases."""
 
@@ -35,10 +35,10 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _round_trip_rows(work_folder: Path) -> list[Row]:
     """Rows: the study road is written to OpenCRG and CSV files and read back unchanged."""
     road = study_road()
-    write_opencrg(road, work_folder / "study.crg", ROAD_LENGTH, INCREMENT)
+    write_opencrg(road, work_folder / "study.crg", ROAD_LENGTH, STATION_INCREMENT)
     _write_csv(road, work_folder / "study.csv")
     back = {"OpenCRG": read_opencrg(work_folder / "study.crg"), "CSV": read_csv_road(work_folder / "study.csv")}
-    station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
+    station = STATION_INCREMENT * np.arange(round(ROAD_LENGTH / STATION_INCREMENT) + 1)
     true = road.height_and_slope(station)[0]
     rows = [
         Observed(
@@ -75,7 +75,7 @@ def _round_trip_rows(work_folder: Path) -> list[Row]:
 
 def _write_csv(road: RoadProfile, csv_path: Path) -> None:
     """Write road heights to a CSV file as a surveyor would: upward, in mm."""
-    station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
+    station = STATION_INCREMENT * np.arange(round(ROAD_LENGTH / STATION_INCREMENT) + 1)
     up = -1e3 * road.height_and_slope(station)[0]
     np.savetxt(
         csv_path,

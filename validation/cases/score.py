@@ -117,7 +117,7 @@ def _heave_drift_rows(engine_names: tuple[str, ...], duration: float) -> list[Ro
     with TemporaryDirectory() as name:
         folder = Path(name)
         virtual_drive(folder, duration)
-        sunk = {engine: _sinking_errors(engine, folder, duration) for engine in engine_names}
+        sunk = {engine: _errors_of_sinking_run(engine, folder, duration) for engine in engine_names}
     rows = []
     for engine, (drift, worst) in sunk.items():
         rows += [
@@ -144,7 +144,7 @@ def _heave_drift_rows(engine_names: tuple[str, ...], duration: float) -> list[Ro
     return rows
 
 
-def _sinking_errors(engine_name: str, work_folder: Path, duration: float) -> tuple[float, float]:
+def _errors_of_sinking_run(engine_name: str, work_folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) of the sinking run, and largest deviation of its damage ratios from 1."""
     scene = force_scene(work_folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING_SPEED)})
@@ -198,11 +198,14 @@ def _verdict_rows(study_results: list[Saved]) -> list[Row]:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         run_text = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD_STABILISERS or name in BAD_STABILISERS:
-            id, wanted = f"score.verdict.{_row_id(row)}", "accepted" if name in GOOD_STABILISERS else "rejected"
+            id, wanted = (
+                f"score.verdict.{_row_id_of_stabiliser(row)}",
+                "accepted" if name in GOOD_STABILISERS else "rejected",
+            )
             rows.append(behaviour_row(id, SYSTEM, f"{run_text}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD_STABILISERS:
             id, what, why = (
-                f"score.without-truth.{_row_id(row)}",
+                f"score.without-truth.{_row_id_of_stabiliser(row)}",
                 f"{run_text}, without the truth",
                 row["reason without truth"],
             )
@@ -210,7 +213,7 @@ def _verdict_rows(study_results: list[Saved]) -> list[Row]:
             rows.append(behaviour_row(id, SYSTEM, what, verdict_text, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
             id, what = (
-                f"score.unseen.{_row_id(row)}",
+                f"score.unseen.{_row_id_of_stabiliser(row)}",
                 f"{run_text}, damage ratio of f3x where the run itself shows nothing",
             )
             why = "what an engineer without the truth cannot know"
@@ -223,7 +226,7 @@ def _stabiliser_in_row_id(stabiliser_name: str) -> str:
     return stabiliser_name.replace(" ", "-").replace("/", "-")
 
 
-def _row_id(study_result: Saved) -> str:
+def _row_id_of_stabiliser(study_result: Saved) -> str:
     """Part of a row id for a stabiliser, road and engine."""
     return ".".join((_stabiliser_in_row_id(study_result["method"]), study_result["road"], study_result["engine"]))
 

@@ -38,7 +38,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     rows: list[Row] = []
     steps = TIME_STEPS[-1:] if quick else TIME_STEPS
     for parameter_set_name in VEHICLE_SETS[-1:] if quick else VEHICLE_SETS:
-        rows += _engine_rows(
+        rows += _path_difference_rows(
             f"study road, {parameter_set_name}", [road_scene(parameter_set_name, step) for step in steps]
         )
         measured = simulate(road_scene(parameter_set_name, TIME_STEPS[-1], 2.1), "reference")
@@ -57,7 +57,9 @@ def _wheel_force_rows(
         rows = []
         for interpolation in ("held", "linear"):
             scenes = [force_scene(Path(name), parameter_set_name, step, 2.0, interpolation) for step in time_steps]
-            rows += _engine_rows(f"{interpolation} wheel forces of the {road_name}, {parameter_set_name}", scenes)
+            rows += _path_difference_rows(
+                f"{interpolation} wheel forces of the {road_name}, {parameter_set_name}", scenes
+            )
         return rows
 
 
@@ -86,18 +88,18 @@ def _measured_course_rows(parameter_set_name: str, time_steps: tuple[float, ...]
             time=measured.data.time[:-SAMPLE_COUNT_TO_ROUGH_ROAD]
         )
     )
-    rows = _engine_rows(f"measured course, {parameter_set_name}", scenes) + _wheel_force_rows(
+    rows = _path_difference_rows(f"measured course, {parameter_set_name}", scenes) + _wheel_force_rows(
         parameter_set_name, "measured course", rough, time_steps
     )
     for name, speed, rule in FURTHER_MEASURED_ROADS:
         road = {"source": "opencrg", "file": name, "speed": speed, "beyond_end": rule, "track": "left"}
-        rows += _engine_rows(
+        rows += _path_difference_rows(
             f"{name}, left track, {rule}, {parameter_set_name}", [road_scene(parameter_set_name, 1e-3, 4.0, road, data)]
         )
     return rows
 
 
-def _engine_rows(title: str, scenes: list[Scene]) -> list[Row]:
+def _path_difference_rows(title: str, scenes: list[Scene]) -> list[Row]:
     """Rows for Exudyn and MuJoCo: largest difference of the states from the reference equations over all scenes."""
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)

@@ -38,7 +38,7 @@ RANDOM_STATE_DEVIATIONS = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0,
 saturate."""
 RATIO_TO_CRITICAL_SPEED = 1.1
 """Speed of simulations and limit cycles divided by the critical speed."""
-ENGINES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
+ENGINE_NAMES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -114,9 +114,7 @@ def _wavelength_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
 def _critical_speed_rows(critical_speed_table: CriticalSpeeds) -> list[Row]:
     """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
     wheelsets have one."""
-    there = [
-        [speed for speed in of_engine.values() if speed is not None] for of_engine in critical_speed_table.values()
-    ]
+    there = [[speed for speed in speeds.values() if speed is not None] for speeds in critical_speed_table.values()]
     agreed = all(len(of_engine) in (0, len(IMPLEMENTATION_MODULES)) for of_engine in there)
     having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATION_MODULES)]
     why = (
@@ -164,7 +162,7 @@ def _no_critical_speed_row(wheelset_name: str, wheelset: Wheelset, expected_outc
 def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     """Rows: state derivatives of each engine at random states, compared with the reference equations."""
     draw, rows = np.random.default_rng(SEED), []
-    for engine in ENGINES:
+    for engine in ENGINE_NAMES:
         worst = 0.0
         for wheelset in wheelsets.values():
             written, built = (implementation(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
@@ -196,7 +194,7 @@ def _simulation_rows(
 ) -> list[Row]:
     """Rows on simulations of one second by RK4 with FASTSIM: differences between the implementations, and the sign of
     the creep forces' power."""
-    pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
+    pairs = {("reference", engine): 0.0 for engine in ENGINE_NAMES} | {ENGINE_NAMES: 0.0}
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
@@ -226,10 +224,14 @@ def _simulation_rows(
                 pairs["reference", engine],
                 "",
             ).at_most(1e-10, why, "shared kernel")
-            for engine in ENGINES
+            for engine in ENGINE_NAMES
         ),
         Observed(
-            "wheelset.path.between", SYSTEM, f"{of}: largest difference between the two engines", pairs[ENGINES], ""
+            "wheelset.path.between",
+            SYSTEM,
+            f"{of}: largest difference between the two engines",
+            pairs[ENGINE_NAMES],
+            "",
         ).at_most(1e-10, why, "shared kernel"),
         Observed(
             "wheelset.power",

@@ -22,7 +22,7 @@ from validation.spatial.written_equations import (
 
 TITLE = "Cars by plain equations that share no force with the engines"
 SYSTEM: System = "rolling-vehicle"
-ENGINES = ("mujoco", "exudyn")
+ENGINE_NAMES = ("mujoco", "exudyn")
 STATE_COUNT, QUICK_STATE_COUNT = 100, 12
 ACCELERATION_TOLERANCE, PATH_TOLERANCE, LAW_TOLERANCE = 1e-12, 1e-10, 1e-12
 INDEPENDENCE_NOTE = (
@@ -81,7 +81,7 @@ def _hub_force_car_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on vehicles that are cut at their wheels and driven by hub forces."""
     rows = []
     for name, car in cut_cars().items():
-        for engine in ("reference", *ENGINES):
+        for engine in ("reference", *ENGINE_NAMES):
             what = (
                 f"largest difference of {name}'s accelerations on hub forces and on a road "
                 f"in {engine}, {state_count} random states"
@@ -119,7 +119,7 @@ def _rolling_car_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on cars on rolling tyres: accelerations, tyre reports, and simulations."""
     rows = []
     for name, car in rolling_cars().items():
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             what = f"largest difference of {name}'s accelerations on tyres in {engine}, {state_count} random states"
             gap = rolling_acceleration_difference(car, engine, state_count)
             rows.append(
