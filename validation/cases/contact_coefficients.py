@@ -95,7 +95,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ratios, nus = (QUICK_AXIS_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), POISSON_RATIOS)
     nodes = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio in ratios for nu in nus]
     data: dict[str, Any] = {"nodes": nodes}
-    rows = [*_node_rows(np.array(nodes)), _misprint_row(np.array(nodes))]
+    rows = [*_table_node_rows(np.array(nodes)), _misprint_row(np.array(nodes))]
     if not quick:
         middle = [(float(ratio), 0.25) for ratio in np.sqrt(RATIOS[1:] * RATIOS[:-1])]  # of every two ratios
         middle += [(ratio, nu) for ratio in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
@@ -114,7 +114,7 @@ def deviations_from_exact(exact_coefficient_rows: Array) -> Array:
     return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / exact_coefficient_rows[:, 2:] - 1.0
 
 
-def _node_rows(table_nodes: Array) -> list[Row]:
+def _table_node_rows(table_nodes: Array) -> list[Row]:
     """Rows: largest deviation of each published coefficient at the nodes of the table."""
     off = np.abs(deviations_from_exact(table_nodes))
     middle = (table_nodes[:, 0] > 0.19) & (table_nodes[:, 0] < 5.1)

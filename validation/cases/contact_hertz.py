@@ -192,7 +192,7 @@ def _refusal_rows() -> list[Row]:
             f"contact_hertz.refused.{name.replace(' ', '_')}",
             SYSTEM,
             f"a contact is refused: {name}",
-            _refused_or_accepted(ask),
+            _outcome_of_computation(ask),
             "refused",
             why,
         )
@@ -211,7 +211,7 @@ def _refusal_rows() -> list[Row]:
     ]
 
 
-def _refused_or_accepted(compute_contact: Callable[[], object]) -> str:
+def _outcome_of_computation(compute_contact: Callable[[], object]) -> str:
     """ "refused" if a computation raises InputError, else "accepted"."""
     try:
         compute_contact()

@@ -154,9 +154,9 @@ def _growth_rates(
     }
 
 
-def _deviation_rows(deviation_record: Saved) -> list[Row]:
+def _deviation_rows(standard_deviations: Saved) -> list[Row]:
     """Rows: standard deviations of pitch and heave under noise, compared with their closed laws."""
-    seen = "pitch" if "pitch" in deviation_record else "covariance"
+    seen = "pitch" if "pitch" in standard_deviations else "covariance"
     by = f"Monte Carlo of {NOISE_PATH_COUNT} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
@@ -168,23 +168,23 @@ def _deviation_rows(deviation_record: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, why, "closed form")
         for t, spread_then, expected in zip(
-            deviation_record["time"], deviation_record[seen], deviation_record["law, run"], strict=True
+            standard_deviations["time"], standard_deviations[seen], standard_deviations["law, run"], strict=True
         )
     ]
-    miss = deviation_record[seen][-1] / deviation_record["t^1.5"][-1]
+    miss = standard_deviations[seen][-1] / standard_deviations["t^1.5"][-1]
     rows.append(
         Observed(
             "growth.spread.linear",
             SYSTEM,
-            f"ratio of the pitch's standard deviation at {deviation_record['time'][-1]} s to t^1.5, the law without "
+            f"ratio of the pitch's standard deviation at {standard_deviations['time'][-1]} s to t^1.5, the law without "
             "growth",
             miss,
             "",
         ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
     )
     heave = (
-        np.array(deviation_record["heave" if "heave" in deviation_record else "heave covariance"])
-        / deviation_record["heave law"]
+        np.array(standard_deviations["heave" if "heave" in standard_deviations else "heave covariance"])
+        / standard_deviations["heave law"]
     )
     rows.append(
         Observed(
@@ -195,7 +195,7 @@ def _deviation_rows(deviation_record: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
     )
-    alone = np.array(deviation_record["covariance"]) / deviation_record["law, forces"]
+    alone = np.array(standard_deviations["covariance"]) / standard_deviations["law, forces"]
     return [
         *rows,
         Observed(

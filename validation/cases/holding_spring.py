@@ -91,7 +91,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
             (str(setting), _smallest_stiffness(setting, measured)) for setting in (*JUDGED_SETTINGS, *REPORTED_SETTINGS)
         ]
         rows += [
-            _stiffness_row(i, name, stiffness, measured.predicted_stiffness)
+            _smallest_stiffness_row(i, name, stiffness, measured.predicted_stiffness)
             for i, (name, stiffness) in enumerate(smallest)
         ]
     return rows, {"law": measured.predicted_stiffness, "found": smallest}
@@ -176,7 +176,7 @@ def _smallest_stiffness(spring_setting: SpringSetting, runs_without_spring: Runs
     return high
 
 
-def _stiffness_row(setting_index: int, setting_name: str, stiffness: float, predicted_stiffness: float) -> Row:
+def _smallest_stiffness_row(setting_index: int, setting_name: str, stiffness: float, predicted_stiffness: float) -> Row:
     """Row: ratio of the predicted stiffness to the smallest that holds the pitch."""
     key, what = (
         f"holding_spring.found.{setting_index + 1}",

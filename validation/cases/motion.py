@@ -59,7 +59,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of clean motions in space, noise, each engine's simulated readings, and drift; a quick run has few paths and
     runs of 1 s."""
     rows = [row for name in SENSOR_ARRANGEMENTS for row in _clean_reading_rows(name)]
-    rows += [_printed_formula_row(), _convergence_order_row(), _tilt_error_row()]
+    rows += [_formula_as_printed_row(), _convergence_order_row(), _tilt_error_row()]
     gains, gain_rows = _noise_gain_rows(4000 if quick else 40_000)
     rows += gain_rows
     for engine in IMPLEMENTATIONS:
@@ -93,7 +93,7 @@ def _clean_reading_rows(arrangement_name: str) -> list[Row]:
     ]
 
 
-def _printed_formula_row() -> Row:
+def _formula_as_printed_row() -> Row:
     """Row: angular acceleration by eq. (18) exactly as printed, which is wrong if all sensors lie in a plane."""
     floor = np.array(list(SENSOR_ARRANGEMENTS["5 in a plane"].values()))
     relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
