@@ -108,8 +108,8 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def deviations_from_exact(exact_coefficient_rows: Array) -> Array:
-    """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_rows (n, 6): axis ratio,
-    Poisson's ratio, and the four exact coefficients."""
+    """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_coefficient_rows (n, 6): axis
+    ratio, Poisson's ratio, and the four exact coefficients."""
     c = coefficients(exact_coefficient_rows[:, 0], exact_coefficient_rows[:, 1])
     return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / exact_coefficient_rows[:, 2:] - 1.0
 

@@ -124,8 +124,8 @@ def _hertz_rows() -> list[Row]:
 
 
 def carter_traction(x: Array, half_length: float, creepage_share: float) -> Array:
-    """Carter's traction (divided by mu p0) on a strip -a < x < a that rolls in the direction +x. share: creepage
-    divided by the creepage of full sliding.
+    """Carter's traction (divided by mu p0) on a strip -a < x < a, with the half-length a, that rolls in the direction
+    +x. creepage_share: creepage divided by the creepage of full sliding.
 
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
     zone that sticks, a (1 - share) wide each way, at the leading edge.
@@ -137,7 +137,7 @@ def carter_traction(x: Array, half_length: float, creepage_share: float) -> Arra
 
 def _strip_traction(cell_count: int, creepage_share: float) -> tuple[list[float], list[float], float]:
     """Middle line of a slender ellipse: x / a, traction divided by mu p0, and error of the integrated traction divided
-    by that of full sliding. share: creepage divided by the creepage of full sliding."""
+    by that of full sliding. creepage_share: creepage divided by the creepage of full sliding."""
     b = CONTACT_SIZE / STRIP_AXIS_RATIO**0.5
     a = STRIP_AXIS_RATIO * b
     pressed = hertzian(a, b, NORMAL_LOAD, cell_count + 1)  # odd: one strip of cells lies in the middle

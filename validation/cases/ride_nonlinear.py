@@ -102,7 +102,7 @@ def _equivalent_gain_rows() -> list[Row]:
 
 
 def normal_expectation(force_law: Any, law_corners: Any) -> float:
-    """Expected value of law(x) for a standard normal x, integrated piece by piece between the law's corners
+    """Expected value of force_law(x) for a standard normal x, integrated piece by piece between the law's corners
     ``law_corners``."""
     edges = np.unique(np.clip([-12.0, *law_corners, 12.0], -12.0, 12.0))
     integrals = [
