@@ -128,7 +128,7 @@ def carter_traction(x: Array, half_length: float, creepage_share: float) -> Arra
     +x. creepage_share: creepage divided by the creepage of full sliding.
 
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
-    zone that sticks, a (1 - share) wide each way, at the leading edge.
+    zone that sticks, a (1 - creepage_share) wide each way, at the leading edge.
     """
     full_traction = np.sqrt(np.maximum(1 - (x / half_length) ** 2, 0.0))
     half = half_length * (1 - creepage_share)
