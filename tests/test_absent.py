@@ -25,16 +25,16 @@ from validation.absence.probes import (
 )
 from validation.cases import absent, effect_prices
 from validation.cases.absent import (
-    EFFECTS,
-    ENGINES,
+    EFFECT_NAMES,
+    ENGINE_NAMES,
     FORCE_EFFECT,
-    count_changes,
-    declared_changes,
-    model,
+    component_count_changes,
+    declared_count_changes,
+    engine_model,
     required_effects,
-    scene,
+    scene_with_effects,
 )
-from validation.cases.effect_prices import hand_built
+from validation.cases.effect_prices import hand_built_run
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCE_EFFECT}
@@ -46,7 +46,7 @@ EFFECT_FILES = "systems/pitch_plane/effects"
 def folder(tmp_path_factory):
     """A folder with wheel forces and a pitch."""
     folder = tmp_path_factory.mktemp("files")
-    absent.write_files(folder)
+    absent.write_input_files(folder)
     return folder
 
 
@@ -78,16 +78,17 @@ def test_only_the_kernel_of_the_scene_is_compiled(bare, forced):
     assert bare["derivatives"] == forced["derivatives"] == []
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_no_python_and_no_memory_within_a_march(engine, folder):
     """100 times as many steps enter no more Python functions and take no more memory, but for the result.
 
     2,000 bytes over 1,980 steps: less than one byte a step is a wrapper's own doing, not the loop's.
     """
     for _ in range(2):  # wrappers cache on their first calls
-        counted_march(engine, model(scene({}, 20, folder), engine))
+        counted_march(engine, engine_model(scene_with_effects({}, 20, folder), engine))
     short, long = (
-        march_with_least_memory(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000)
+        march_with_least_memory(engine, partial(engine_model, scene_with_effects({}, steps, folder), engine))
+        for steps in (20, 2000)
     )
     assert long.frames == short.frames <= 50
     assert abs(long.peak_bytes - short.peak_bytes) < 2000
@@ -97,28 +98,28 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
 def test_the_watch_sees_callbacks_where_there_are_some(folder):
     """Positive control: four Python callbacks at each of RK44's four stages, and one compiled one in MuJoCo."""
     road = {"road": ROAD}
-    assert counted_march("exudyn", model(scene(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
-    assert counted_march("mujoco", model(scene(road, 50, folder), "mujoco")).callbacks == 1
+    assert counted_march("exudyn", engine_model(scene_with_effects(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
+    assert counted_march("mujoco", engine_model(scene_with_effects(road, 50, folder), "mujoco")).callbacks == 1
     assert installed_callbacks() == 0
 
 
 def test_no_callback_before_during_and_after(folder):
     assert installed_callbacks() == 0
-    assert counted_march("mujoco", model(scene({}, 50, folder), "mujoco")).callbacks == 0
+    assert counted_march("mujoco", engine_model(scene_with_effects({}, 50, folder), "mujoco")).callbacks == 0
     assert installed_callbacks() == 0
-    assert user_functions(model(scene({}, 50, folder), "exudyn")) == 0
+    assert user_functions(engine_model(scene_with_effects({}, 50, folder), "exudyn")) == 0
 
 
 def test_user_functions_are_counted(folder):
     """Positive control, over Exudyn's own items: two loads per wheel on a road; two offsets of the constraint."""
-    assert user_functions(model(scene({"road": ROAD}, 50, folder), "exudyn")) == 4
+    assert user_functions(engine_model(scene_with_effects({"road": ROAD}, 50, folder), "exudyn")) == 4
     guided = {
         **required_effects("prescribed_pitch"),
         "prescribed_pitch": module_of(DEFAULT_SYSTEM, "prescribed_pitch").EXAMPLE,
     }
-    built = model(scene(guided, 50, folder, prescribed=True), "exudyn")
+    built = engine_model(scene_with_effects(guided, 50, folder, has_prescribed_pitch=True), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 4
-    built = model(scene(FORCE_EFFECT, 50, folder), "exudyn")
+    built = engine_model(scene_with_effects(FORCE_EFFECT, 50, folder), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 3  # the step's own among them
 
 
@@ -126,15 +127,15 @@ def test_user_functions_are_counted(folder):
 def test_callbacks_are_seen_while_a_run_lasts(engine, most, folder):
     """Positive control of the rows of other systems: those of a road, however the run comes about."""
     with registered_callbacks(engine) as callbacks:
-        model(scene({}, 20, folder), engine).run()
+        engine_model(scene_with_effects({}, 20, folder), engine).run()
         assert max(callbacks, default=0) == 0
-        model(scene({"road": ROAD}, 20, folder), engine).run()
+        engine_model(scene_with_effects({"road": ROAD}, 20, folder), engine).run()
     assert max(callbacks) == most and installed_callbacks() == 0
 
 
 def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
-    own = scene({}, 20, folder)
-    ours, found = model(own, "exudyn"), model(own, "mujoco").model
+    own = scene_with_effects({}, 20, folder)
+    ours, found = engine_model(own, "exudyn"), engine_model(own, "mujoco").model
     system = ours.built.mbs.systemData
     assert (found.nq, found.nv, found.na, found.nuserdata, found.nsensor, found.neq) == (4, 4, 0, 0, 0, 0)
     assert (found.nnumeric, found.nu) == (0, 2)  # no input table; the two struts of the suspension
@@ -144,10 +145,10 @@ def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
     assert (assembly.input, assembly.outputs, assembly.vehicle.pitch_springs) == (None, (), ())
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize("effect", EFFECT_NAMES)
 def test_an_effect_changes_the_counts_by_what_it_declares(effect, engine, folder):
-    assert count_changes(effect, engine, folder) == declared_changes(effect, engine)
+    assert component_count_changes(effect, engine, folder) == declared_count_changes(effect, engine)
 
 
 @pytest.mark.parametrize("kept", [(), ("wheel_forces",)], ids=["bare", "forced"])
@@ -179,16 +180,16 @@ def test_the_copy_is_what_runs_without_the_files(folder, tmp_path):
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_the_machinery_adds_nothing_to_a_hand_built_model(engine, folder):
     """The same items in the same order give the same bits; what it costs is measured by the validation."""
-    own = scene({}, 500, folder)
-    ours, theirs = model(own, engine).run().states, hand_built(engine, own)()
+    own = scene_with_effects({}, 500, folder)
+    ours, theirs = engine_model(own, engine).run().states, hand_built_run(engine, own)()
     assert np.array_equal(ours, theirs)
     assert abs(ours[-1] - ours[0]).max() > 0.01
 
 
 def test_mujoco_compiles_the_same_model_from_the_description_and_by_hand(folder):
     """Every array of bodies, joints, sites and actuators: places, masses, inertias, frames, what is left out."""
-    own = scene({}, 20, folder)
-    ours, theirs = model(own, "mujoco").model, mujoco_model(own.vehicle_parameters(), absent.STEP)
+    own = scene_with_effects({}, 20, folder)
+    ours, theirs = engine_model(own, "mujoco").model, mujoco_model(own.vehicle_parameters(), absent.TIME_STEP)
     kinds = ("body_", "dof_", "jnt_", "site_", "actuator_", "tendon_", "eq_", "geom_", "qpos")
     fields = [name for name in dir(ours) if name.startswith(kinds) and isinstance(getattr(ours, name), np.ndarray)]
     assert len(fields) > 100

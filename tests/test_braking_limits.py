@@ -60,7 +60,13 @@ def test_random_stops_are_the_same_for_the_same_numbers_and_are_built():
 
 
 def test_rows_of_limits_hold():
-    found = [rows._jackknife_row(), *rows._roll_rows(), rows._slow_apply_row(), rows._cycle_row(), rows._yaw_row(1.0)]
+    found = [
+        rows._jackknife_row(),
+        *rows._rollover_rows(),
+        rows._slow_pressure_rise_row(),
+        rows._limit_cycle_row(),
+        rows._split_friction_yaw_row(1.0),
+    ]
     assert [row.id for row in found if row.status != "passed"] == []
 
 

@@ -25,10 +25,10 @@ from validation.braking.sprung_box import box, car
 from validation.cases import braking_reference as case
 
 
-@pytest.mark.parametrize("name", case.LAW_COMPARISONS)
+@pytest.mark.parametrize("name", case.FORCE_LAW_COMPARISONS)
 @pytest.mark.grounds("plain counterpart")
 def test_a_law_is_the_same_by_compiled_and_by_plain_code(name):
-    both, bound, _ = case.LAW_COMPARISONS[name]
+    both, bound, _ = case.FORCE_LAW_COMPARISONS[name]
     assert laws.largest_difference(*both(60, seed=5)) < bound
 
 

@@ -55,9 +55,9 @@ def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
         turning=np.array([20.0, 9.0, 0.0, 0.0]),
         locked=np.zeros(4),
     )
-    assert case.broken_rules(QuarterStop(path, 2), 0.5, True) == []
+    assert case.broken_plausibility_rules(QuarterStop(path, 2), 0.5, True) == []
     getattr(path, part)[row] = value
-    assert said in case.broken_rules(QuarterStop(path, 2), 0.5, True)
+    assert said in case.broken_plausibility_rules(QuarterStop(path, 2), 0.5, True)
 
 
 def test_a_torque_that_drives_is_refused():

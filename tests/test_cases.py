@@ -34,8 +34,8 @@ FEWER = {
     "effect_prices": {"RATIO_ROUNDS": {True: 7, False: 20}},
     "ensemble": {"LARGE_ENSEMBLE_PATHS": 2000},
     "kalman": {"SAMPLE_COUNT": 8},
-    "stated_errors": {"LEAST_SAMPLE_COUNT": 36},
-    "recommendation": {"SCENE_COUNTS": {"pitch-plane": 44, "braking": 4, "wheelset": 2, "handling": 1}},
+    "stated_errors": {"LEAST_ERROR_SAMPLE_COUNT": 36},
+    "recommendation": {"SCENE_COUNTS_BY_SYSTEM": {"pitch-plane": 44, "braking": 4, "wheelset": 2, "handling": 1}},
     "braking_limits": {"STOP_COUNTS": {True: 3, False: 100}},
     "choice_linear": {"SCENE_COUNT": 24},
 }

@@ -17,7 +17,7 @@ from models.engines.contact_bridge_mujoco import empty_law, model, python_law
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed
-from validation.cases.contact_bridges import library_law
+from validation.cases.contact_bridges import contact_law_of_library
 
 STEP, STEPS = 1e-4, 60
 
@@ -59,14 +59,14 @@ def test_every_bridge_gives_one_path():
     wheels = Wheels(2, cells=11)
     start, built = np.concatenate(wheels.state())[None], model(wheels, STEP, "RK4")
     expected = native(wheels, start)[0, -1]
-    for law, close in ((add_forces, 0.0), (library_law(wheels), 1e-12)):
+    for law, close in ((add_forces, 0.0), (contact_law_of_library(wheels), 1e-12)):
         mujoco.set_mjcb_passive(python_law(law))
         try:
             found = Marcher(built).run(start, STEPS)[0, -1]
         finally:
             mujoco.set_mjcb_passive(None)
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=close)
-    for of, route in ((Forces(wheels).of, "loads"), (Forces(wheels, library_law(wheels)).of, ROUTES[0])):
+    for of, route in ((Forces(wheels).of, "loads"), (Forces(wheels, contact_law_of_library(wheels)).of, ROUTES[0])):
         np.testing.assert_allclose(exudyn(wheels, of, route), expected, rtol=0.0, atol=1e-12)
     held = exudyn(wheels, Forces(wheels).of, "before each step", "ExplicitEuler")
     # explicit Euler sees the start of a step only, so that holding its forces is no error

@@ -440,9 +440,9 @@ def test_what_cannot_be_resumed_is_refused(twinrig, args, said, tmp_path, capsys
     ],
 )
 def test_a_slow_machine_misses_aims_and_fails_no_row(seconds, busy, said):
-    from validation.cases.ensemble import _scale_rows
+    from validation.cases.ensemble import _large_ensemble_rows
 
     found = {"path-steps": 6e8, "failed": 0, "seconds": seconds, "busy": busy, "kept": 64.0 * 61 + 16, "bytes": 7e9}
-    rows = {row.id: row.status for row in _scale_rows(found)}
+    rows = {row.id: row.status for row in _large_ensemble_rows(found)}
     assert (rows["ensemble.scale.seconds"], rows["ensemble.scale.processor"]) == said
     assert rows["ensemble.scale.memory"] == "missed" and "failed" not in rows.values()

@@ -134,12 +134,12 @@ def test_past_the_check_short_runs_are_silent(rows):
 
 def test_a_missing_check_fails_the_row(monkeypatch):
     monkeypatch.setattr(protocol, "check_step", lambda *_: None)
-    assert guards._unstable_rows("exudyn", {}, quick=True)[0].status == "failed"
+    assert guards._unstable_step_rows("exudyn", {}, quick=True)[0].status == "failed"
 
 
 def test_a_missing_balance_fails_the_row(monkeypatch):
     monkeypatch.setattr(exudyn_engine, "check_balance", lambda *_: None)
-    assert set(guards.unchecked_constrained_endings().values()) == {"answered"}
+    assert set(guards.unchecked_prescribed_pitch_endings().values()) == {"answered"}
 
 
 @pytest.mark.parametrize(

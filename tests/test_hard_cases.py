@@ -34,7 +34,7 @@ from validation.hard_cases import (
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
 
 ALL = tuple(case for _, case in cases_by_family())
-QUICK = {case.name for _, case in hard_cases.quick_cases(cases_by_family())}
+QUICK = {case.name for _, case in hard_cases.cases_of_quick_run(cases_by_family())}
 JUDGED = [
     pytest.param(case, name, id=f"{case.name}-{name}") for case in ALL if case.name in QUICK for name in case.judged()
 ]
@@ -192,9 +192,9 @@ def test_every_file_of_the_folder_is_a_family_in_the_table():
 
 def test_the_quick_share_has_cases_of_every_family():
     known = cases_by_family()
-    own = hard_cases.quick_cases(known)
+    own = hard_cases.cases_of_quick_run(known)
     assert {family for family, _ in own} == set(FAMILIES) and all(pair in known for pair in own)
-    assert len(own) <= len(FAMILIES) + len(known) / hard_cases.QUICK_SPACING
+    assert len(own) <= len(FAMILIES) + len(known) / hard_cases.QUICK_CASE_SPACING
 
 
 def test_every_number_of_the_catalogue_has_its_cases():
@@ -205,7 +205,10 @@ def test_every_number_of_the_catalogue_has_its_cases():
 
 
 def test_there_are_eighty_cases_without_the_measurement_files():
-    assert sum(family not in hard_cases.FILE_FAMILIES for family, _ in cases_by_family()) >= hard_cases.FEWEST_CASES
+    assert (
+        sum(family not in hard_cases.FAMILIES_OF_FILES for family, _ in cases_by_family())
+        >= hard_cases.FEWEST_CASE_COUNT
+    )
 
 
 def test_a_refusal_that_is_wanted_passes_its_row_also_where_no_implementation_has_a_part():

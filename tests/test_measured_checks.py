@@ -84,11 +84,13 @@ def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_pat
     assert seconds < 2.0 or any(one.check in ("swapped", "shift", "sign") for one in said)
 
 
-@pytest.mark.parametrize("fault", case.QUICK_FAULTS, ids=lambda fault: fault.name)
+@pytest.mark.parametrize("fault", case.FAULTS_OF_QUICK_RUN, ids=lambda fault: fault.name)
 def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
     assert all(
         row.status == "passed"
-        for row in case._fault_rows(fault, bench.planted_findings(ridden, tmp_path, fault.spoil, **fault.faults))
+        for row in case._planted_fault_rows(
+            fault, bench.planted_findings(ridden, tmp_path, fault.spoil, **fault.faults)
+        )
     )
 
 

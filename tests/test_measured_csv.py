@@ -135,13 +135,15 @@ def test_a_form_is_read_or_refused_as_it_should(tmp_path, odd: OddFile):
 def test_the_case_sees_a_form_that_is_read_wrong(tmp_path, monkeypatch):
     monkeypatch.setattr(csv_layout, "TIME_UNITS", dict.fromkeys(csv_layout.TIME_UNITS, 1.0))
     monkeypatch.setattr("models.measured.formats.csv.TIME_UNITS", dict.fromkeys(csv_layout.TIME_UNITS, 1.0))
-    assert [row.id for row in case.form_rows(tmp_path) if row.status == "failed"] == ["measured_formats.forms.values"]
+    assert [row.id for row in case.file_form_rows(tmp_path) if row.status == "failed"] == [
+        "measured_formats.forms.values"
+    ]
 
 
 def test_the_case_sees_a_form_that_is_read_without_a_word(tmp_path, monkeypatch):
     monkeypatch.setattr(csv_layout, "decimal_sign", lambda path, line, separator, cells: ",")
     monkeypatch.setattr(csv_rows, "_without_quotes", lambda path, layout, text, line: text.replace(b'"', b""))
-    assert any(row.status == "failed" for row in case.form_rows(tmp_path))
+    assert any(row.status == "failed" for row in case.file_form_rows(tmp_path))
 
 
 def test_stamps_keep_their_zone_and_their_day(tmp_path):

@@ -67,11 +67,13 @@ def test_a_new_effect_of_the_pitch_plane(new_file, tmp_path, capsys):
     assert "anchor" in names_of(DEFAULT_SYSTEM)
     list_scenes()
     assert "A rope that draws the chassis level" in capsys.readouterr().out
-    scene = with_effects(absent.scene({}, 20, tmp_path), "anchor")
+    scene = with_effects(absent.scene_with_effects({}, 20, tmp_path), "anchor")
     assert "effect     anchor: one native spring" in describe(scene) and "rope" in describe(scene)
-    runs = {engine: simulate(scene, engine) for engine in absent.ENGINES}
+    runs = {engine: simulate(scene, engine) for engine in absent.ENGINE_NAMES}
     for engine, run in runs.items():
-        assert absent.count_changes("anchor", engine, tmp_path) == absent.declared_changes("anchor", engine)
+        assert absent.component_count_changes("anchor", engine, tmp_path) == absent.declared_count_changes(
+            "anchor", engine
+        )
         assert np.abs(run.states - runs["reference"].states).max() < 1e-12  # one tableau in three engines
     assert np.abs(runs["reference"]["rope"]).max() > 1e3  # 2e4 N m/rad at 0.1 rad
 

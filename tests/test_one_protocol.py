@@ -17,7 +17,7 @@ from models.systems.handling.run import build as on_tyres
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence import bare_cars
-from validation.cases.ride_engines import vehicle_of_name
+from validation.cases.ride_engines import shipped_vehicle_or_twin
 from validation.hard_cases import setups
 from validation.spatial.cars import static_forces
 
@@ -33,7 +33,7 @@ def plane(engine: str) -> tuple[Model, Trajectory]:
 
 
 def ride(engine: str) -> tuple[Model, Trajectory]:
-    vehicle = vehicle_of_name("quarter_car")
+    vehicle = shipped_vehicle_or_twin("quarter_car")
     model = in_space(engine, vehicle, Settings(INTEGRATORS[engine], STEP, STEPS * STEP))
     return model, model.run(np.array([1e-3, 2e-3]), np.zeros(2))
 

@@ -42,7 +42,7 @@ def test_there_are_enough_and_each_has_a_name_of_its_own():
     assert len({fault.name for fault in FAULTS}) == len(FAULTS)
 
 
-@pytest.mark.parametrize("own", planted_faults.CAMPAIGNS, ids=lambda own: own.id)
+@pytest.mark.parametrize("own", planted_faults.FAULT_CAMPAIGNS, ids=lambda own: own.id)
 def test_what_a_fault_changes_is_there(own):
     """What it is planted in has not been renamed since; the full campaigns run it."""
     for each in own.faults:
@@ -50,13 +50,13 @@ def test_what_a_fault_changes_is_there(own):
             pass
 
 
-@pytest.mark.parametrize("own", planted_faults.CAMPAIGNS, ids=lambda own: own.id)
+@pytest.mark.parametrize("own", planted_faults.FAULT_CAMPAIGNS, ids=lambda own: own.id)
 def test_a_campaign_has_several_faults_with_names_of_their_own(own):
     assert len({(fault.planted_in, fault.name) for fault in own.faults}) == len(own.faults) >= 6
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("id", ["planted", *(own.id for own in planted_faults.CAMPAIGNS)])
+@pytest.mark.parametrize("id", ["planted", *(own.id for own in planted_faults.FAULT_CAMPAIGNS)])
 def test_every_fault_is_caught_and_nothing_else(id, full_case):
     """planted : rows of the pitch plane and of all systems together; the others are those of a campaign."""
     statuses = {row: (status, reason) for row, status, reason in full_case[0] if row.rpartition(".")[0] == id}
@@ -80,8 +80,8 @@ def test_one_table_has_the_faults_of_all_systems(full_case):
 def test_the_quick_share_plants_in_every_system_and_says_of_how_many(tmp_path):
     rows, data = planted_faults.measure(True, tmp_path)
     assert [row.reason for row in rows if row.status in ("failed", "not run")] == []
-    assert set(data) == {"pitch-plane", *(own.id for own in planted_faults.CAMPAIGNS)}
-    assert all(len(data[own.id]) > 1 for own in planted_faults.CAMPAIGNS)
+    assert set(data) == {"pitch-plane", *(own.id for own in planted_faults.FAULT_CAMPAIGNS)}
+    assert all(len(data[own.id]) > 1 for own in planted_faults.FAULT_CAMPAIGNS)
     assert "2 of 47 were planted" in next(row.why for row in rows if row.id == "planted.caught")
 
 

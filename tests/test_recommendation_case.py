@@ -65,14 +65,14 @@ def refusing(monkeypatch):
 
 
 def test_a_refused_scene_is_drawn_anew_and_told(refusing, tmp_path):
-    found, refused = case.scene_verdicts("pitch-plane", 5, tmp_path)
+    found, refused = case.verdicts_on_scene("pitch-plane", 5, tmp_path)
     assert found == [GOOD] and refusing == [5, 1005, 2005]
     assert [one.split(":")[0] for one in refused] == ["pitch-plane 5", "pitch-plane 1005"]
 
 
 def test_one_that_is_refused_again_and_again_is_not_held(refusing, tmp_path, monkeypatch):
-    monkeypatch.setattr(case, "REDRAWS", 1)
-    found, refused = case.scene_verdicts("pitch-plane", 5, tmp_path)
+    monkeypatch.setattr(case, "REDRAW_COUNT", 1)
+    found, refused = case.verdicts_on_scene("pitch-plane", 5, tmp_path)
     rows = {row.id: row for row in case._promise_rows([found, *[[GOOD]] * 9], refused)}
     assert found == [] and rows["recommendation.met"].value == 0.9
     assert rows["recommendation.met"].status == rows["recommendation.refused"].status == "failed"  # 2 of 10

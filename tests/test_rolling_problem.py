@@ -11,7 +11,7 @@ from models.contact.normal_problem import PressureGrid, centres, hertzian, solve
 from models.contact.rolling_operator import SlipOperator
 from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
 from models.core.errors import InputError, RunFailed
-from validation.cases.contact_exact import CASES, carter, measure, rolling_forces
+from validation.cases.contact_exact import CREEPAGE_CASES, carter_traction, measure, rolling_forces
 
 PAIR, LOAD, A, B, MU = MaterialPair(), 8e4, 6e-3, 4e-3, 0.3
 PRESSED = hertzian(A, B, LOAD, 16)
@@ -50,12 +50,12 @@ def test_every_condition_holds_by_a_plain_sum():
     assert found.residual <= TOLERANCE
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", CREEPAGE_CASES)
 def test_laws_of_every_mixture(name):
     """On few cells: at most mu N, power taken from the motion, the opposite of it reversed."""
     force = rolling_forces(name, 12)
     assert np.hypot(force[0], force[1]) <= 1 + 1e-12
-    assert force @ CASES[name][1:] < 0
+    assert force @ CREEPAGE_CASES[name][1:] < 0
     assert rolling_forces(name, 12, -1.0) == pytest.approx(-force, abs=1e-7)
 
 
@@ -163,8 +163,8 @@ def test_a_shift_keeps_its_distance():
 
 def test_carter_s_own_limits():
     x = np.linspace(-1, 1, 4001)
-    assert np.trapezoid(carter(x, 1.0, 0.3), x) == pytest.approx(np.pi / 2 * (1 - 0.7**2), rel=1e-3)
-    assert carter(x, 1.0, 1 - 1e-9) == pytest.approx(np.sqrt(1 - x * x), abs=1e-8)
+    assert np.trapezoid(carter_traction(x, 1.0, 0.3), x) == pytest.approx(np.pi / 2 * (1 - 0.7**2), rel=1e-3)
+    assert carter_traction(x, 1.0, 1 - 1e-9) == pytest.approx(np.sqrt(1 - x * x), abs=1e-8)
 
 
 @pytest.mark.parametrize(

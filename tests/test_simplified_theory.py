@@ -20,7 +20,7 @@ from models.contact.simplified_kernels import (
 from models.contact.simplified_theory import PAPER, SimplifiedOptions, press, roll
 from models.contact.undeformed_distance import Distance, from_arrays, from_function, quadratic
 from models.core.errors import InputError
-from validation.cases.contact_simplified import largest_jump
+from validation.cases.contact_simplified import largest_load_jump
 from validation.contact.contact_shapes import Shape, exact_normal
 
 PAIR = MaterialPair()
@@ -88,7 +88,7 @@ def test_small_loads_keep_the_scaling(load):
 @pytest.mark.parametrize("height", [lopsided, grooves])
 def test_load_is_a_continuous_function_of_the_depth(height):
     patch = separate(from_function(height, (-0.02, 0.02), (-0.02, 0.02)))[0]
-    assert largest_jump(patch, 15) < 1e-6  # bisected to neighbouring numbers; 5e-10 N seen
+    assert largest_load_jump(patch, 15) < 1e-6  # bisected to neighbouring numbers; 5e-10 N seen
 
 
 def test_load_stays_continuous_where_two_patches_grow_together():

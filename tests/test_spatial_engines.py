@@ -15,11 +15,11 @@ from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDam
 from models.vehicles.spatial_linear import linearise
 from validation.cases.ride_engines import (
     GRAVITY,
-    SPEED,
+    TRAVEL_SPEED,
     matrix_difference,
     random_state,
     relative_difference,
-    vehicle_of_name,
+    shipped_vehicle_or_twin,
     with_nonlinear_springs,
 )
 
@@ -34,16 +34,16 @@ def settings(engine, duration=0.02, step=1e-3):
 @pytest.mark.parametrize(("name", "gravity"), [("r19_ride", 0.0), ("spatial twin", GRAVITY)])
 def test_linear_vehicle_is_the_analytic_one(engine, name, gravity):
     """1e-11: a factor of 7 above what MuJoCo's differences leave of a force of 1 N beside preloads of 5 kN."""
-    vehicle = vehicle_of_name(name, gravity)
-    found = build(engine, vehicle, speed=SPEED).linearise()
-    assert matrix_difference(found, linearise(vehicle, SPEED)) < 1e-11
+    vehicle = shipped_vehicle_or_twin(name, gravity)
+    found = build(engine, vehicle, speed=TRAVEL_SPEED).linearise()
+    assert matrix_difference(found, linearise(vehicle, TRAVEL_SPEED)) < 1e-11
     assert found.source == f"{engine}, " + ("loaded" if gravity else "unloaded")
 
 
 @pytest.mark.parametrize("speed", [0.5, 30.0, 70.0])
 def test_three_linearisations_give_every_speed(speed):
     """Within and beyond the three speeds; 1e-11 of the largest damping as above."""
-    vehicle = vehicle_of_name("r19_free")
+    vehicle = shipped_vehicle_or_twin("r19_free")
     at = linear_vehicle_at_speeds("mujoco", vehicle)
     assert matrix_difference(at(speed), linearise(vehicle, speed)) < 1e-11
     with pytest.raises(InputError, match="above 0"):
@@ -52,17 +52,17 @@ def test_three_linearisations_give_every_speed(speed):
 
 def test_curves_are_linearised_by_their_mean_slope_at_rest():
     """Short steps keep 1e-11; a one-sided slope would miss by (1786 - 700 / 0.1) / max D, over 1e-2."""
-    vehicle = with_nonlinear_springs(vehicle_of_name("quarter_car", GRAVITY))
+    vehicle = with_nonlinear_springs(shipped_vehicle_or_twin("quarter_car", GRAVITY))
     for engine in ENGINES:
         assert matrix_difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
 
 
 def test_accelerations_agree_with_the_equations_by_hand():
     """Large random motion of the vehicle that no symmetry helps, curves, gravity, road: rounding only."""
-    vehicle = with_nonlinear_springs(vehicle_of_name("spatial twin", GRAVITY))
+    vehicle = with_nonlinear_springs(shipped_vehicle_or_twin("spatial twin", GRAVITY))
     exudyn, mujoco_, reference = (
-        *(build(engine, vehicle, speed=SPEED) for engine in ENGINES),
-        SpatialReference(vehicle, SPEED),
+        *(build(engine, vehicle, speed=TRAVEL_SPEED) for engine in ENGINES),
+        SpatialReference(vehicle, TRAVEL_SPEED),
     )
     for path in range(5):
         state = random_state(vehicle, path)
@@ -94,7 +94,7 @@ def test_equations_by_hand_keep_energy():
 
     The power is measured along the motion itself, d/dt (T + U) by differences of order six: 1e-9 of its parts.
     """
-    plain = vehicle_of_name("spatial twin", GRAVITY)
+    plain = shipped_vehicle_or_twin("spatial twin", GRAVITY)
     vehicle = replace(
         plain,
         side_forces=(),
@@ -129,7 +129,7 @@ def test_equations_by_hand_keep_energy():
 
 def test_paths_agree():
     """R19-ride with curves under gravity on a random road from a random start: 20 steps of the same tableau."""
-    vehicle = with_nonlinear_springs(vehicle_of_name("r19_ride", GRAVITY))
+    vehicle = with_nonlinear_springs(shipped_vehicle_or_twin("r19_ride", GRAVITY))
     road = 1e-4 * np.cumsum(np.ones((41, 8)), axis=0)
     exudyn, other = (
         build(engine, vehicle, settings(engine), None, road).run(*random_state(vehicle, 1)[:2]) for engine in ENGINES
@@ -166,13 +166,13 @@ def test_road_is_read_at_half_steps(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_design_position_is_an_equilibrium(engine):
-    vehicle = vehicle_of_name("spatial twin", GRAVITY)
+    vehicle = shipped_vehicle_or_twin("spatial twin", GRAVITY)
     zero = np.zeros(len(vehicle.coordinates()))
-    assert np.abs(build(engine, vehicle, speed=SPEED).acceleration(0.0, zero, zero)).max() < 1e-10
+    assert np.abs(build(engine, vehicle, speed=TRAVEL_SPEED).acceleration(0.0, zero, zero)).max() < 1e-10
 
 
 def test_no_curve_code_without_curves():
-    plain, bent = vehicle_of_name("r19_ride"), with_nonlinear_springs(vehicle_of_name("r19_ride"))
+    plain, bent = shipped_vehicle_or_twin("r19_ride"), with_nonlinear_springs(shipped_vehicle_or_twin("r19_ride"))
     of_plain, of_bent = (build("exudyn", vehicle).plan() for vehicle in (plain, bent))
     assert of_plain["curves"] == 0
     # four springs with two curves and a friction each, one function for each spring
@@ -182,7 +182,7 @@ def test_no_curve_code_without_curves():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_would_be_wrong_is_refused(engine):
-    vehicle = vehicle_of_name("quarter_car")
+    vehicle = shipped_vehicle_or_twin("quarter_car")
     with pytest.raises(Refused, match="lets a mode of the vehicle grow; use at most"):
         build(engine, vehicle, settings(engine, 2.0, 0.1))
     with pytest.raises(Refused, match="does not divide"):
@@ -196,13 +196,13 @@ def test_what_would_be_wrong_is_refused(engine):
     with pytest.raises(Refused, match="needs settings"):
         build(engine, vehicle, None, None, np.zeros((41, 2)))
     with pytest.raises(InputError, match="needs a speed above 0"):
-        build(engine, vehicle_of_name("r19_free"))
+        build(engine, shipped_vehicle_or_twin("r19_free"))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_method_is_of_its_order(engine):
     """A quarter car let go: halving the step divides the error beside RK4 at 0.25 ms by about 2^order."""
-    vehicle, start, rates = vehicle_of_name("quarter_car"), np.array([0.02, 0.0]), np.array([0.0, 0.3])
+    vehicle, start, rates = shipped_vehicle_or_twin("quarter_car"), np.array([0.02, 0.0]), np.array([0.0, 0.3])
 
     def end(method, step):
         return build(engine, vehicle, Settings(method, step, 0.2)).run(start, rates).positions[-1]
@@ -215,17 +215,17 @@ def test_every_method_is_of_its_order(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_failed_runs_raise(engine):
-    model, n = build(engine, vehicle_of_name("quarter_car"), settings(engine)), 2
+    model, n = build(engine, shipped_vehicle_or_twin("quarter_car"), settings(engine)), 2
     for start in (1e6, np.nan):
         with pytest.raises(RunFailed):
             model.run(np.full(n, start), np.zeros(n))
     model.run(np.zeros(n), np.zeros(n))  # and leave no trace
     with pytest.raises(RunFailed, match="without settings"):
-        build(engine, vehicle_of_name("quarter_car")).run(np.zeros(n), np.zeros(n))
+        build(engine, shipped_vehicle_or_twin("quarter_car")).run(np.zeros(n), np.zeros(n))
 
 
 def test_other_callback_is_not_overruled():
-    model = build("mujoco", vehicle_of_name("quarter_car"))
+    model = build("mujoco", shipped_vehicle_or_twin("quarter_car"))
     mujoco.set_mjcb_passive(lambda model, data: None)
     try:
         with pytest.raises(RunFailed, match="another callback"):
@@ -237,7 +237,7 @@ def test_other_callback_is_not_overruled():
 @pytest.mark.parametrize("engine", ENGINES)
 def test_answers_do_not_depend_on_what_was_asked_before(engine):
     """A linearisation and a state on a road in between leave a run what it was, to the bit."""
-    vehicle = vehicle_of_name("quarter_car", GRAVITY)
+    vehicle = shipped_vehicle_or_twin("quarter_car", GRAVITY)
     road = 0.01 * np.ones((41, 2))
     model = build(engine, vehicle, settings(engine), None, road)
     start = random_state(vehicle, 2)

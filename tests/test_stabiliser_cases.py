@@ -59,7 +59,7 @@ def test_the_balance_sees_a_force_without_its_sign(monkeypatch):
 
 
 def test_a_missing_projection_fails_its_row(monkeypatch, tmp_path):
-    monkeypatch.setattr(index_case.IndexOne, "_projection", lambda self, y, u: y)
+    monkeypatch.setattr(index_case.IndexOneVehicle, "_projection", lambda self, y, u: y)
     assert failed(index_case, tmp_path) == {"index_reduction.none.index_1.projection"}
 
 
@@ -72,7 +72,7 @@ def test_a_wrong_multiplier_column_fails_every_law_at_index_1(monkeypatch, tmp_p
 def test_the_gap_law_is_the_damped_one():
     """Against its own differential equation by differences: g'' + 2 alpha g' + alpha^2 g = 0."""
     t = np.linspace(0, 1, 100_001)
-    g = index_case.gap_law(t, 1e-3, 2e-3, 7.0)
+    g = index_case.pitch_gap_law(t, 1e-3, 2e-3, 7.0)
     rate, step = np.gradient(g, t), t[1]
     second = np.diff(g, 2) / step**2
     assert np.abs(second + 14.0 * rate[1:-1] + 49.0 * g[1:-1]).max() < 1e-6  # differences of 1e-5: rounding 1e-8

@@ -249,7 +249,7 @@ def sample(ratio, share=1e-3, cost=0.5, told=True):
 
 
 def rows_of(*drawn):
-    found = [stated_errors._sample_as_table("ride", one) for one in drawn]
+    found = [stated_errors._error_sample_as_table("ride", one) for one in drawn]
     return {row.id.removeprefix("stated_errors."): row for row in stated_errors._common_rows(found, False)}
 
 
@@ -270,7 +270,7 @@ def test_all_systems_that_have_samples_are_found_and_shown(monkeypatch, tmp_path
     modules = {"ride": "validation.stated_errors.systems.ride"}
     fake = type("Fake", (), {"samples": staticmethod(lambda count, seed: drawn[modules["ride"]][:count])})
     monkeypatch.setattr(stated_errors, "import_module", lambda name: fake)
-    monkeypatch.setattr(stated_errors, "SAMPLE_MODULES", modules)
+    monkeypatch.setattr(stated_errors, "SAMPLING_MODULES", modules)
     monkeypatch.setattr(stated_errors, "QUICK_SAMPLE_COUNTS", {"ride": 3})
     rows, data = stated_errors.measure(True, tmp_path)
     assert {row.id for row in rows} >= {"stated_errors.silent", "stated_errors.ride.near", "stated_errors.cost"}

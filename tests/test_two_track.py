@@ -25,7 +25,7 @@ from models.road.two_track import (
     wheels_on_track,
 )
 from models.vehicles.linear_vehicle import WheelPosition
-from validation.cases.ride_road import WHEELS, heights_covariance, measure
+from validation.cases.ride_road import ASYMMETRIC_WHEEL_POSITIONS, measure, wheel_heights_covariance
 
 ROAD = TwoTrackRoad(ShapeFilter(0.3, 5e-5), ShapeFilter(1.5, 8e-5))
 
@@ -37,17 +37,17 @@ def test_every_row_of_the_case_passes(tmp_path):
 
 @pytest.mark.grounds("closed form")
 def test_a_positive_roll_lifts_the_left_wheels_and_each_has_its_own_arm():
-    road = road_excitation(ROAD, WHEELS)
+    road = road_excitation(ROAD, ASYMMETRIC_WHEEL_POSITIONS)
     heights = sum(road.heights) @ np.array([0.0, 1.0])  # z_M = 0, theta = 1 rad: about x forward, left goes up
-    assert heights.tolist() == [wheel.y for wheel in WHEELS]
+    assert heights.tolist() == [wheel.y for wheel in ASYMMETRIC_WHEEL_POSITIONS]
     assert road.lengths == pytest.approx((0.0, 2.6, 3.9))
     for axle, rows in enumerate(road.heights):
-        assert [bool(row.any()) for row in rows] == [wheel.axle == axle for wheel in WHEELS]
+        assert [bool(row.any()) for row in rows] == [wheel.axle == axle for wheel in ASYMMETRIC_WHEEL_POSITIONS]
 
 
 def test_equal_tracks_are_those_of_the_left():
-    heights = sum(road_excitation(ROAD, WHEELS, "equal").heights) @ np.array([0.0, 1.0])
-    assert heights.tolist() == [abs(wheel.y) for wheel in WHEELS]
+    heights = sum(road_excitation(ROAD, ASYMMETRIC_WHEEL_POSITIONS, "equal").heights) @ np.array([0.0, 1.0])
+    assert heights.tolist() == [abs(wheel.y) for wheel in ASYMMETRIC_WHEEL_POSITIONS]
 
 
 @pytest.mark.parametrize("case", list(itertools.product(TRACK_CORRELATIONS, FRONT_REAR)))
@@ -56,15 +56,18 @@ def test_delayed_noise_gives_the_delayed_output(case):
     by_noise, by_output = (
         f(*x)
         for f, x in (
-            (heights_covariance, (road_excitation(ROAD, WHEELS, *case),)),
-            (input_covariance, (ROAD, WHEELS, *case)),
+            (wheel_heights_covariance, (road_excitation(ROAD, ASYMMETRIC_WHEEL_POSITIONS, *case),)),
+            (input_covariance, (ROAD, ASYMMETRIC_WHEEL_POSITIONS, *case)),
         )
     )
     assert np.abs(by_noise - by_output).max() < 1e-13 * np.abs(by_output).max()  # rounding
 
 
 def test_cases_differ_only_where_they_should():
-    case = {number: input_covariance(ROAD, WHEELS, *words) for number, words in CORRELATION_CASES.items()}
+    case = {
+        number: input_covariance(ROAD, ASYMMETRIC_WHEEL_POSITIONS, *words)
+        for number, words in CORRELATION_CASES.items()
+    }
     assert all(np.diag(P) == pytest.approx(np.diag(case[3]), rel=1e-15) for P in case.values())
     assert case[1][0, 2] == 0 and case[4][0, 1] == 0 and case[4][0, 2] == case[3][0, 2] == case[5][0, 2]
     assert case[3][0, 1] == pytest.approx(5e-5 / 0.6 - 0.7 * 0.6 * 8e-5 / 3.0, rel=1e-14)  # q1/2O1 - b1 b2 q2/2O2
@@ -141,18 +144,21 @@ def test_what_a_road_cannot_tell_is_said():
 
 
 WRONG = {
-    "word": (lambda: road_excitation(ROAD, WHEELS, "modeled"), "did you mean 'modelled'"),
+    "word": (lambda: road_excitation(ROAD, ASYMMETRIC_WHEEL_POSITIONS, "modeled"), "did you mean 'modelled'"),
     "order": (
-        lambda: road_excitation(ROAD, (WHEELS[0], WheelPosition("r", 2.0, 0.7, 1))),
+        lambda: road_excitation(ROAD, (ASYMMETRIC_WHEEL_POSITIONS[0], WheelPosition("r", 2.0, 0.7, 1))),
         "must not lie before axle 0",
     ),
     "one axle, two places": (
-        lambda: road_excitation(ROAD, (WHEELS[0], WheelPosition("r", 1.0, -0.7, 0))),
+        lambda: road_excitation(ROAD, (ASYMMETRIC_WHEEL_POSITIONS[0], WheelPosition("r", 1.0, -0.7, 0))),
         "must stand at one x",
     ),
-    "gap": (lambda: road_excitation(ROAD, (WHEELS[0], WHEELS[4])), "must be numbered 0, 1"),
+    "gap": (
+        lambda: road_excitation(ROAD, (ASYMMETRIC_WHEEL_POSITIONS[0], ASYMMETRIC_WHEEL_POSITIONS[4])),
+        "must be numbered 0, 1",
+    ),
     "neither side": (
-        lambda: road_excitation(ROAD, (*WHEELS, WheelPosition("m", -2.7, 0.0, 2)), "uncorrelated"),
+        lambda: road_excitation(ROAD, (*ASYMMETRIC_WHEEL_POSITIONS, WheelPosition("m", -2.7, 0.0, 2)), "uncorrelated"),
         "neither left",
     ),
     "cutoff": (lambda: ShapeFilter(0.3, 1e-5, 0.2), "above the corner"),

@@ -13,7 +13,7 @@ from models.ride.varying_speed import quasi_stationary, varying_speed
 from models.road.two_track import CORRELATION_CASES, half_track, road_excitation, road_of_level
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.cases.ride_varying_speed import STOP_AND_GO, by_adjoint, vehicle_and_road
+from validation.cases.ride_varying_speed import STOP_AND_GO_PROFILE, deviation_by_adjoint, vehicle_and_road
 
 STOPS = SpeedProfile((0.0, 0.2, 1.2, 2.2, 8.0), (0.0, 0.0, 20.0, 0.0, 0.0))
 
@@ -44,9 +44,9 @@ def test_at_an_even_speed_every_instant_is_stationary(case):
 @pytest.mark.parametrize("damping", [0.0, 500.0])
 def test_a_stop_between_the_axles_agrees_with_the_adjoint(damping):
     vehicle, road = vehicle_and_road("half_car", damping)
-    found = varying_speed(vehicle, road, STOP_AND_GO).of("body rear")[-1]
+    found = varying_speed(vehicle, road, STOP_AND_GO_PROFILE).of("body rear")[-1]
     # 1e-8: the adjoint's solver at 1e-10; without its stop the drive would give another 10 %
-    assert found == pytest.approx(by_adjoint(vehicle, road, STOP_AND_GO, "body rear"), rel=1e-8)
+    assert found == pytest.approx(deviation_by_adjoint(vehicle, road, STOP_AND_GO_PROFILE, "body rear"), rel=1e-8)
 
 
 def test_three_axles_at_distances_without_a_common_measure_agree_with_the_adjoint():
@@ -54,7 +54,7 @@ def test_three_axles_at_distances_without_a_common_measure_agree_with_the_adjoin
     odd = replace(road, lengths=(0.0, 0.5, 0.5 * 2.0**0.5))
     brake = SpeedProfile((0.0, 0.4), (9.0, 5.0))
     found = varying_speed(vehicle, odd, brake).of("travel second rear left")[-1]
-    assert found == pytest.approx(by_adjoint(vehicle, odd, brake, "travel second rear left"), rel=1e-8)
+    assert found == pytest.approx(deviation_by_adjoint(vehicle, odd, brake, "travel second rear left"), rel=1e-8)
 
 
 def test_the_road_keeps_its_variance_and_the_vehicle_comes_to_rest():
@@ -83,8 +83,10 @@ def test_the_road_is_cut_where_an_axle_passes_the_place_of_a_stop():
 
 def test_a_road_of_second_order_shows_its_rate_to_the_tyre():
     vehicle, road = vehicle_and_road("half_car", 500.0, 10.0)
-    found = varying_speed(vehicle, road, STOP_AND_GO).of("tyre force rear left")[-1]
-    assert found == pytest.approx(by_adjoint(vehicle, road, STOP_AND_GO, "tyre force rear left"), rel=1e-8)
+    found = varying_speed(vehicle, road, STOP_AND_GO_PROFILE).of("tyre force rear left")[-1]
+    assert found == pytest.approx(
+        deviation_by_adjoint(vehicle, road, STOP_AND_GO_PROFILE, "tyre force rear left"), rel=1e-8
+    )
 
 
 def test_white_noise_is_off_at_standstill():

@@ -187,7 +187,7 @@ def _checks_on_engine(name: str, folder: Path) -> Iterator[Check]:
 
 def _audit_assembly(vehicle: str, geometry: str) -> Assembly:
     audit = import_module("validation.cases.audit")
-    return assembly_of_scene(audit.scene(vehicle, geometry))
+    return assembly_of_scene(audit.study_road_scene(vehicle, geometry))
 
 
 def _is_adaptive(name: str) -> bool:

@@ -38,8 +38,8 @@ JOINT_FAMILIES = (
 QUICK_JOINT_FAMILIES = ("Revolute", "Distance")
 MODEL_FILE_NAMES = {"TranSpring": "TransSpring"}
 """Model file names of the joint families whose file has another name."""
-ENGINES = ("exudyn", "mujoco")
-STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
+ENGINE_NAMES = ("exudyn", "mujoco")
+TIME_STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
 """Step (s); number of steps for each row of the output files; lengths (s) of a full and of a quick run."""
 MJCF_STEP_RATIO = 5
 """Number of steps of the joints in MJCF for each step of the other runs. The spring of the free body has no length at
@@ -54,17 +54,17 @@ leave 3e-7 of both."""
 ENERGY_LOSS_LIMIT = 1e-4
 """Energy that a motion without friction may lose in the other code's output file, divided by its largest kinetic
 energy."""
-WINDOW_ROWS = 10
+WINDOW_ROW_COUNT = 10
 """Rows of an output file, 0.1 s, over which a simulation that starts from a state in the file is compared with the
 file."""
-REVOLUTE_ANGLES = {"Spherical": 0.0, "Universal": 90.0}
+ANGLES_FROM_REVOLUTE = {"Spherical": 0.0, "Universal": 90.0}
 """Joint families whose output file holds the same pendulum as the Revolute file, each with the angle (degrees) about z
 by which its pendulum is turned from the Revolute one."""
-FIT_SECONDS = 1.0
+SPRING_FIT_SECONDS = 1.0
 """First part (s) of an output file to which spring constants are fitted if the model file describes another case."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of every joint family; a quick run takes two families and one second."""
     data = data_folder()
     rows: list[Row] = []
@@ -73,14 +73,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         model = None if data is None else data / MODEL_FOLDER / f"{MODEL_FILE_NAMES.get(family, family)}_Case01.adm"
         if model is None or not model.is_file():
             reason = "TWINRIG_DATA names no folder with the other code's models"
-            rows.append(not_run(_row_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
+            rows.append(not_run(_report_row_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
             continue
         output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
         mechanism, notes = _mechanism_of_output(read_mechanism(model), output)
-        rows += [*fitted_constant_rows(family, notes), *family_rows(family, mechanism, output, quick)]
+        rows += [*fitted_constant_rows(family, notes), *joint_family_rows(family, mechanism, output, quick)]
         if mechanism.kind != "distance":
-            rows += mjcf_rows(family, mechanism, folder, 1.0 if quick else DURATION)
-        if family in REVOLUTE_ANGLES:
+            rows += mjcf_rows(family, mechanism, work_folder, 1.0 if quick else DURATION)
+        if family in ANGLES_FROM_REVOLUTE:
             rows += _same_pendulum_rows(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
         saved[family] = {
             "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
@@ -89,98 +89,107 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, saved
 
 
-def _row_id(family: str, row_name: str) -> str:
-    return f"adams_joints.{family.lower()}.{row_name}"
+def _report_row_id(joint_family: str, row_name: str) -> str:
+    """Id of a report row of a joint family."""
+    return f"adams_joints.{joint_family.lower()}.{row_name}"
 
 
-def _mechanism_of_output(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[str, float]]:
+def _mechanism_of_output(mechanism: Mechanism, output_file: OutputFile) -> tuple[Mechanism, dict[str, float]]:
     """The mechanism that fits an output file, and the spring constants that were fitted. If the file has another start
     or another spring than the model, the mechanism takes the file's start and constants fitted to the file."""
     if not mechanism.springs:
         return mechanism, {}
-    shift = output.columns["Pos"][0] - mechanism.centre
-    moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.displaced(shift)
+    shift = output_file.columns["Pos"][0] - mechanism.centre
+    moved = mechanism if starts_with_mechanism(mechanism, output_file) else mechanism.displaced(shift)
     (spring,) = moved.springs
-    travel, rate, law = _spring_motion(moved, output)
+    travel, rate, law = _spring_motion(moved, output_file)
     law_force = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
     if moved is mechanism and np.abs(law_force - law).max() <= FORCE_BOUND * np.abs(law).max():
         return mechanism, {}
-    early = output.times <= FIT_SECONDS
+    early = output_file.times <= SPRING_FIT_SECONDS
     parts = np.column_stack([travel, rate, np.ones(len(travel))])[early]
     stiffness, damping, preload = np.linalg.lstsq(parts, law[early], rcond=None)[0].tolist()
     constants = {"stiffness": stiffness, "damping": damping, "rest": -preload / stiffness}
     return moved.with_spring(stiffness=stiffness, damping=damping, free_length=constants["rest"]), constants
 
 
-def _spring_motion(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _spring_motion(mechanism: Mechanism, output_file: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Deflection, rate and force (each (m,)) of the mechanism's only spring during the motion in the output file. The
     force is read from the file and positive in extension."""
-    (spring,), motion = mechanism.springs, output.motion(mechanism)
+    (spring,), motion = mechanism.springs, output_file.motion(mechanism)
     if spring.is_rotational:
         axis = mechanism.ground.axes[:, 2]
         return (
-            np.unwrap(np.arctan2(*_sine_and_cosine(motion, axis))),
+            np.unwrap(np.arctan2(*_sine_and_cosine_of_rotation(motion, axis))),
             motion.angular_velocity @ axis,
-            output.columns["Rtorque"] @ axis,
+            output_file.columns["Rtorque"] @ axis,
         )
     arm = motion.rotation @ (spring.body_point - mechanism.centre)
     apart, speed = motion.position + arm - spring.ground_point, motion.velocity + np.cross(motion.angular_velocity, arm)
     travel = np.linalg.norm(apart, axis=1)
     unit = apart / np.maximum(travel, 1e-30)[:, None]
-    return travel, (speed * unit).sum(axis=1), (output.columns["Rforce"] * unit).sum(axis=1)
+    return travel, (speed * unit).sum(axis=1), (output_file.columns["Rforce"] * unit).sum(axis=1)
 
 
-def _sine_and_cosine(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sine_and_cosine_of_rotation(body_motion: BodyMotion, unit_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sine and cosine (m,) of the body's rotation about a unit axis."""
-    side = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(axis, side) / np.linalg.norm(np.cross(axis, side))
-    turned = motion.rotation @ first
-    return turned @ np.cross(axis, first), turned @ first
+    side = np.eye(3)[np.argmin(np.abs(unit_axis))]
+    first = np.cross(unit_axis, side) / np.linalg.norm(np.cross(unit_axis, side))
+    turned = body_motion.rotation @ first
+    return turned @ np.cross(unit_axis, first), turned @ first
 
 
-def fitted_constant_rows(family: str, constants: dict[str, float]) -> list[Row]:
+def fitted_constant_rows(joint_family: str, spring_constants: dict[str, float]) -> list[Row]:
     """Rows with the spring constants that were fitted to an output file because its model file describes another
     case."""
-    why = f"read off the first {FIT_SECONDS:g} s of the output: the model file describes another case; calibrated"
+    why = (
+        f"read off the first {SPRING_FIT_SECONDS:g} s of the output: the model file describes another case; calibrated"
+    )
     units = {"stiffness": "N/m or N m/rad", "damping": "N s/m or N m s/rad", "rest": "m or rad"}
     return [
-        Observed(_row_id(family, name), SYSTEM, f"{family}: {name} of the spring", value, units[name]).beside("-", why)
-        for name, value in constants.items()
+        Observed(
+            _report_row_id(joint_family, name), SYSTEM, f"{joint_family}: {name} of the spring", value, units[name]
+        ).beside("-", why)
+        for name, value in spring_constants.items()
     ]
 
 
-def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bool = False) -> list[Row]:
+def joint_family_rows(
+    joint_family: str, mechanism: Mechanism, output_file: OutputFile, quick: bool = False
+) -> list[Row]:
     """Rows for one joint family: positions and reactions of all engines compared with the output file, reactions on the
     motion in the file, and the engines compared with the reference equations."""
-    duration = min(QUICK_DURATION if quick else DURATION, float(output.times[-1]))
-    motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, STEPS_PER_ROW)
+    duration = min(QUICK_DURATION if quick else DURATION, float(output_file.times[-1]))
+    motion, reaction = ConstrainedBody(mechanism).run(duration, TIME_STEP, STEPS_PER_ROW)
     runs = {"reference": (motion, reaction)}
     tree = joint_tree(mechanism, motion)
-    runs |= {engine: tree.run(engine, duration, STEP, STEPS_PER_ROW) for engine in ENGINES}
-    rows = [_file_motion_row(family, mechanism, output)]
+    runs |= {engine: tree.run(engine, duration, TIME_STEP, STEPS_PER_ROW) for engine in ENGINE_NAMES}
+    rows = [_reaction_on_file_motion_row(joint_family, mechanism, output_file)]
     for name, (path, pushed) in runs.items():
-        rows += _file_rows(family, name, mechanism, output, path, pushed)
-    if not mechanism.springs and output.energy_lost(mechanism) > ENERGY_LOSS_LIMIT:
-        rows.append(_window_row(family, mechanism, output, duration))
-    for name in ENGINES:
-        rows.append(_engine_row(family, name, mechanism, runs[name], runs["reference"]))
+        rows += _rows_against_output_file(joint_family, name, mechanism, output_file, path, pushed)
+    if not mechanism.springs and output_file.energy_lost(mechanism) > ENERGY_LOSS_LIMIT:
+        rows.append(_restart_row(joint_family, mechanism, output_file, duration))
+    for name in ENGINE_NAMES:
+        rows.append(_engine_row(joint_family, name, mechanism, runs[name], runs["reference"]))
     return rows
 
 
-def mjcf_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) -> list[Row]:
+def mjcf_rows(joint_family: str, mechanism: Mechanism, work_folder: Path, duration: float) -> list[Row]:
     """Rows for the joint as an MJCF model: the certificate of ``twinrig twin``, and positions compared with those by
     constraint equations."""
-    step, every = STEP / MJCF_STEP_RATIO, MJCF_STEP_RATIO * STEPS_PER_ROW
-    accelerations, paths = build_differences(mechanism, folder, round(duration / step), step)
+    step, every = TIME_STEP / MJCF_STEP_RATIO, MJCF_STEP_RATIO * STEPS_PER_ROW
+    accelerations, paths = build_differences(mechanism, work_folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
-    quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
+    quantity = f"{joint_family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
     tolerance_reason = "rounding; the bound asked for"
-    alike = Observed(_row_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
+    alike = Observed(
+        _report_row_id(joint_family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest"
+    )
     rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, tolerance_reason, "native")]
     for name, positions in paths.items():
         off = float(np.abs(positions[::every] - motion.position).max())
-        quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"
-        observed = Observed(_row_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
+        quantity = f"{joint_family} in MJCF: position of the centre from the reference with constraints, {name}"
+        observed = Observed(_report_row_id(joint_family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
         rows.append(observed.at_most(ENGINE_TOLERANCE, "no code in common but Runge-Kutta's steps of 1 ms", "native"))
     return rows
 
@@ -209,39 +218,48 @@ def _reaction_difference(
     return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
 
 
-def _file_motion_row(family: str, mechanism: Mechanism, output: OutputFile) -> Row:
+def _reaction_on_file_motion_row(joint_family: str, mechanism: Mechanism, output_file: OutputFile) -> Row:
     """Row: difference of the file's reactions from those that Newton's and Euler's equations give for the file's
     motion; no integration is involved."""
-    off = _reaction_difference(mechanism, output.reaction_of_motion(mechanism), output.reaction())
+    off = _reaction_difference(mechanism, output_file.reaction_of_motion(mechanism), output_file.reaction())
     why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
-    quantity = f"{family}: reaction on the file's own motion, by the largest"
-    return Observed(_row_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE_BOUND, why, "published")
+    quantity = f"{joint_family}: reaction on the file's own motion, by the largest"
+    return Observed(_report_row_id(joint_family, "own_motion"), SYSTEM, quantity, off, "").at_most(
+        FORCE_BOUND, why, "published"
+    )
 
 
-def _file_rows(
-    family: str, solver: str, mechanism: Mechanism, output: OutputFile, motion: BodyMotion, reaction: Reaction
+def _rows_against_output_file(
+    joint_family: str,
+    solver_name: str,
+    mechanism: Mechanism,
+    output_file: OutputFile,
+    computed_motion: BodyMotion,
+    computed_reaction: Reaction,
 ) -> list[Row]:
     """Rows: positions and reactions of one simulation compared with the output file. Where the motion in the file loses
     energy although nothing damps, the bound is only an aim."""
-    m = len(motion.times)
-    position_error = np.abs(motion.position - output.columns["Pos"][:m]) - output.rounding_error("Pos")[:m]
-    digits = output.rounding_error("Rforce")[:m], output.rounding_error("Rtorque")[:m]
-    theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
+    m = len(computed_motion.times)
+    position_error = (
+        np.abs(computed_motion.position - output_file.columns["Pos"][:m]) - output_file.rounding_error("Pos")[:m]
+    )
+    digits = output_file.rounding_error("Rforce")[:m], output_file.rounding_error("Rtorque")[:m]
+    theirs = Reaction(output_file.columns["Rforce"][:m], output_file.columns["Rtorque"][:m])
     seen = (
         ("position", "position of the centre", max(0.0, float(position_error.max())), "m", POSITION_BOUND),
         (
             "reaction",
             "reaction by the largest",
-            _reaction_difference(mechanism, reaction, theirs, digits),
+            _reaction_difference(mechanism, computed_reaction, theirs, digits),
             "",
             FORCE_BOUND,
         ),
     )
-    lost = 0.0 if mechanism.springs else output.energy_lost(mechanism)
+    lost = 0.0 if mechanism.springs else output_file.energy_lost(mechanism)
     rows = []
     for what, words, off, unit, bound in seen:
-        quantity = f"{family}: {words}, beside the other code's digits, {solver}"
-        observed = Observed(_row_id(family, f"{what}.{solver}"), SYSTEM, quantity, off, unit)
+        quantity = f"{joint_family}: {words}, beside the other code's digits, {solver_name}"
+        observed = Observed(_report_row_id(joint_family, f"{what}.{solver_name}"), SYSTEM, quantity, off, unit)
         if lost <= ENERGY_LOSS_LIMIT:
             rows.append(observed.at_most(bound, "the bound asked for", "published"))
         else:
@@ -250,74 +268,82 @@ def _file_rows(
     return rows
 
 
-def _window_row(family: str, mechanism: Mechanism, output: OutputFile, duration: float) -> Row:
+def _restart_row(joint_family: str, mechanism: Mechanism, output_file: OutputFile, duration: float) -> Row:
     """Row: position error 0.1 s after each state of the output file at which a simulation is started anew. In this time
     the file's integration error cannot grow.
 
     The energy dE that the file's motion loses in this time changes the speed by dE / (m v). The resulting change of
     position is subtracted.
     """
-    body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
-    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW_ROWS, WINDOW_ROWS)
+    body, theirs = ConstrainedBody(mechanism), output_file.motion(mechanism)
+    starts = np.arange(0, round(duration / TIME_STEP / STEPS_PER_ROW) - WINDOW_ROW_COUNT, WINDOW_ROW_COUNT)
     ends = [
-        body.state_after(body.state_at_row(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()
+        body.state_after(body.state_at_row(theirs, k), WINDOW_ROW_COUNT * STEPS_PER_ROW, TIME_STEP)[:3]
+        for k in starts.tolist()
     ]
-    digits = output.rounding_error("Pos")[starts] + output.rounding_error("Pos")[starts + WINDOW_ROWS]
-    off = (np.abs(np.array(ends) - theirs.position[starts + WINDOW_ROWS]) - digits).max(axis=1)
-    _, total_energy = output.energies(mechanism)
+    digits = output_file.rounding_error("Pos")[starts] + output_file.rounding_error("Pos")[starts + WINDOW_ROW_COUNT]
+    off = (np.abs(np.array(ends) - theirs.position[starts + WINDOW_ROW_COUNT]) - digits).max(axis=1)
+    _, total_energy = output_file.energies(mechanism)
     speed = np.linalg.norm(theirs.velocity, axis=1)
-    fastest = np.maximum(speed[starts], speed[starts + WINDOW_ROWS])
+    fastest = np.maximum(speed[starts], speed[starts + WINDOW_ROW_COUNT])
     lost = (
-        np.abs(total_energy[starts + WINDOW_ROWS] - total_energy[starts])
+        np.abs(total_energy[starts + WINDOW_ROW_COUNT] - total_energy[starts])
         / (mechanism.mass * fastest)
-        * (WINDOW_ROWS * STEPS_PER_ROW * STEP)
+        * (WINDOW_ROW_COUNT * STEPS_PER_ROW * TIME_STEP)
     )
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
-    quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
+    quantity = f"{joint_family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
-    return Observed(_row_id(family, "window"), SYSTEM, quantity, left, "m").at_most(POSITION_BOUND, why, "published")
+    return Observed(_report_row_id(joint_family, "window"), SYSTEM, quantity, left, "m").at_most(
+        POSITION_BOUND, why, "published"
+    )
 
 
-def _same_pendulum_rows(family: str, mechanism: Mechanism, output: OutputFile, revolute_file: Path) -> list[Row]:
+def _same_pendulum_rows(
+    joint_family: str, mechanism: Mechanism, output_file: OutputFile, revolute_path: Path
+) -> list[Row]:
     """Rows: the joint compared with the other code's output file of the same pendulum on a hinge, in which the energy
     is conserved.
 
     A body that starts at rest on a ball joint or a universal joint swings in a plane. Mass, arm and moment of inertia
     are those of the Revolute case: the other code's files of one motion must agree with one another, too.
     """
-    hinge, back = read_output(revolute_file), Rotation.from_euler("z", -REVOLUTE_ANGLES[family], degrees=True)
-    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
+    hinge, back = (
+        read_output(revolute_path),
+        Rotation.from_euler("z", -ANGLES_FROM_REVOLUTE[joint_family], degrees=True),
+    )
+    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), TIME_STEP, STEPS_PER_ROW)
     file_position, force = hinge.columns["Pos"], hinge.columns["Rforce"]
     off = float((np.abs(back.apply(motion.position) - file_position) - hinge.rounding_error("Pos")).max())
     pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding_error("Rforce")).max())
-    files = np.abs(back.apply(output.columns["Pos"]) - file_position).max(axis=1)
-    since = output.times[np.argmax(files > POSITION_BOUND)]
+    files = np.abs(back.apply(output_file.columns["Pos"]) - file_position).max(axis=1)
+    since = output_file.times[np.argmax(files > POSITION_BOUND)]
     why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
-    hinged = f"{family}: %s beside the other code's file of the same pendulum on a hinge, reference"
+    hinged = f"{joint_family}: %s beside the other code's file of the same pendulum on a hinge, reference"
     both = (
-        f"{family}: largest distance of the other code's files of one pendulum, "
+        f"{joint_family}: largest distance of the other code's files of one pendulum, "
         f"above {POSITION_BOUND:g} m from {since:.2f} s on"
     )
     return [
-        Observed(_row_id(family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
+        Observed(_report_row_id(joint_family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
             POSITION_BOUND, why, "published"
         ),
         Observed(
-            _row_id(family, "hinge_force"),
+            _report_row_id(joint_family, "hinge_force"),
             SYSTEM,
             hinged % "force by the largest",
             max(0.0, pushed) / float(np.abs(force).max()),
             "",
         ).at_most(FORCE_BOUND, why, "published"),
-        Observed(_row_id(family, "files"), SYSTEM, both, float(files.max()), "m").beside(
+        Observed(_report_row_id(joint_family, "files"), SYSTEM, both, float(files.max()), "m").beside(
             POSITION_BOUND, "one motion: what is left is the error of the file that loses energy", "published"
         ),
     ]
 
 
 def _engine_row(
-    family: str,
-    engine: str,
+    joint_family: str,
+    engine_name: str,
     mechanism: Mechanism,
     engine_run: tuple[BodyMotion, Reaction],
     reference_run: tuple[BodyMotion, Reaction],
@@ -328,8 +354,8 @@ def _engine_row(
     rotation = float(np.abs(engine_run[0].rotation - reference_run[0].rotation).max())
     off = max(position_error, rotation, _reaction_difference(mechanism, engine_run[1], reference_run[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
-    quantity = f"{family}: {engine} from the reference: position, rotation, reaction by the largest"
-    return Observed(_row_id(family, f"twin.{engine}"), SYSTEM, quantity, off, "m, -").at_most(
+    quantity = f"{joint_family}: {engine_name} from the reference: position, rotation, reaction by the largest"
+    return Observed(_report_row_id(joint_family, f"twin.{engine_name}"), SYSTEM, quantity, off, "m, -").at_most(
         ENGINE_TOLERANCE, why, "native"
     )
 

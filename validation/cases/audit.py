@@ -14,28 +14,28 @@ SYSTEM: System = "pitch-plane"
 STATE_COUNT = 100
 
 
-def scene(parameter_set_name: str, geometry: str = "exact"):
+def study_road_scene(parameter_set_name: str, geometry_name: str = "exact"):
     """Scene of a vehicle on the study road; the road makes its heights enter the comparison."""
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameter_set_name, "geometry": geometry},
+            "vehicle": {"parameters": parameter_set_name, "geometry": geometry_name},
             "run": {"duration": 2.0, "step": 1e-3},
             "effects": {"road": {"source": "study", "speed": 20.0}},
         }
     )
 
 
-def acceleration_difference(engine: str, parameter_set_name: str, geometry: str = "exact") -> float:
+def acceleration_difference(engine_name: str, parameter_set_name: str, geometry_name: str = "exact") -> float:
     """Largest difference of an engine's accelerations from the reference's over all random states, divided by the
     largest acceleration."""
-    audited = scene(parameter_set_name, geometry)
+    audited = study_road_scene(parameter_set_name, geometry_name)
     return acceleration_gap(
-        checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATE_COUNT
+        checks.engine(engine_name), assembly_of_scene(audited), settings_of(audited, engine_name), STATE_COUNT
     )
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for each engine, vehicle and geometry; a quick run is the same."""
     rows = [
         Observed(

@@ -20,43 +20,44 @@ from validation.common.rows import Observed, Row, System, Table, not_run
 
 TITLE = "A bicycle: benchmark and measured"
 SYSTEM: System = "rolling-vehicle"
-ENGINES = ("exudyn", "mujoco")
+ENGINE_NAMES = ("exudyn", "mujoco")
 TYRE_STIFFNESS_FACTORS = (4.0, 16.0, 64.0, 256.0)
 """Factors by which the tyres are stiffer than usual."""
-SPEED = 5.0
+EIGENVALUE_SPEED = 5.0
 """Speed (m/s) at which eigenvalues of the bicycle on tyres are compared."""
 MEASURED_FEEDBACK = Control(gain=2.0)
 """Feedback control of the measured bicycle."""
 LOWEST_JUDGED_SPEED = 2.0
 """Lowest speed (m/s) at which the predicted weave damping, with nothing fitted, must meet the measured one."""
-TRAIL_FACTOR = 1.001
+PLANTED_TRAIL_FACTOR = 1.001
 """Factor on the trail in the planted fault."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: published figures, the limit of ideal rolling, energy, and the measured bicycle. A quick run simulates half
     a second, and omits the predictions with one speed left out."""
     benchmark = load_bicycle("benchmark")
-    rows = [*_published_rows(benchmark), *_fault_rows(benchmark)]
-    gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINES}
-    rows += [*_limit_rows(gaps), *_energy_rows(0.5 if quick else 5.0)]
-    measured_rows, data = _measured_rows(quick)
+    rows = [*_published_benchmark_rows(benchmark), *_planted_fault_rows(benchmark)]
+    gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINE_NAMES}
+    rows += [*_stiff_tyre_limit_rows(gaps), *_energy_rows(0.5 if quick else 5.0)]
+    measured_rows, data = _measured_bicycle_rows(quick)
     return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
     """Tables of eigenvalues on tyres of rising stiffness, and of the measured bicycle if its recordings exist."""
-    gaps = case_data["gaps"][ENGINES[0]]
+    gaps = case_data["gaps"][ENGINE_NAMES[0]]
     rows_of_tables = [
         Table(
             "Tyres that stiffen tend to ideal rolling",
-            f"Largest distance (1/s) of the benchmark's eigenvalues at {SPEED:g} m/s from those of ideal rolling.",
-            ("stiffness", *ENGINES, "order"),
+            f"Largest distance (1/s) of the benchmark's eigenvalues at {EIGENVALUE_SPEED:g} m/s from those of ideal "
+            "rolling.",
+            ("stiffness", *ENGINE_NAMES, "order"),
             tuple(
                 (
                     f"{s:g}",
-                    *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES),
-                    "" if i == 0 else _observed_order(gaps, i),
+                    *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINE_NAMES),
+                    "" if i == 0 else _convergence_order_text(gaps, i),
                 )
                 for i, s in enumerate(TYRE_STIFFNESS_FACTORS)
             ),
@@ -75,13 +76,14 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     return rows_of_tables
 
 
-def _observed_order(eigenvalue_gaps: list[float], i: int) -> str:
+def _convergence_order_text(eigenvalue_gaps: list[float], stiffness_index: int) -> str:
     """Text of the order at which the eigenvalue differences fall from stiffness i - 1 to stiffness i."""
-    stiffer = TYRE_STIFFNESS_FACTORS[i] / TYRE_STIFFNESS_FACTORS[i - 1]
-    return f"{np.log(eigenvalue_gaps[i - 1] / eigenvalue_gaps[i]) / np.log(stiffer):.3f}"
+    stiffer = TYRE_STIFFNESS_FACTORS[stiffness_index] / TYRE_STIFFNESS_FACTORS[stiffness_index - 1]
+    return f"{np.log(eigenvalue_gaps[stiffness_index - 1] / eigenvalue_gaps[stiffness_index]) / np.log(stiffer):.3f}"
 
 
-def _published_rows(bicycle: Whipple) -> list[Row]:
+def _published_benchmark_rows(bicycle: Whipple) -> list[Row]:
+    """Rows: matrices, eigenvalues and critical speeds of the benchmark bicycle compared with the published ones."""
     M, C1, K0, K2 = bicycle.linear
     matrices = zip((M, C1, bicycle.gravity * K0, K2), PUBLISHED_MATRICES.values(), strict=True)
     off = max(float(np.abs(here - there).max()) for here, there in matrices)
@@ -99,11 +101,11 @@ def _published_rows(bicycle: Whipple) -> list[Row]:
     ]
 
 
-def _fault_rows(bicycle: Whipple) -> list[Row]:
+def _planted_fault_rows(bicycle: Whipple) -> list[Row]:
     """Row: a trail that is 0.1 % longer must change an eigenvalue by far more than the tolerance of the published
     figures."""
-    wrong = bicycle.changed(trail=TRAIL_FACTOR * bicycle.trail)
-    caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED_EIGENVALUES[SPEED]).max())
+    wrong = bicycle.changed(trail=PLANTED_TRAIL_FACTOR * bicycle.trail)
+    caught = float(np.abs(wrong.eigenvalues(EIGENVALUE_SPEED) - PUBLISHED_EIGENVALUES[EIGENVALUE_SPEED]).max())
     quantity = (
         "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
     )
@@ -111,14 +113,16 @@ def _fault_rows(bicycle: Whipple) -> list[Row]:
     return [seen.within(1e6, 1e-3, "a planted fault must be seen by far; counted up to a million", "closed form")]
 
 
-def _eigenvalue_differences(bicycle: Whipple, engine: str) -> np.ndarray:
+def _eigenvalue_differences(bicycle: Whipple, engine_name: str) -> np.ndarray:
     """Largest difference (1/s) between the eigenvalues on tyres and those of ideal rolling, for each tyre stiffness."""
-    wanted = bicycle.eigenvalues(SPEED)
+    wanted = bicycle.eigenvalues(EIGENVALUE_SPEED)
     stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in TYRE_STIFFNESS_FACTORS]
-    return np.array([np.abs(engine_eigenvalues(engine, rolling, SPEED) - wanted).max() for rolling in stiff])
+    return np.array(
+        [np.abs(engine_eigenvalues(engine_name, rolling, EIGENVALUE_SPEED) - wanted).max() for rolling in stiff]
+    )
 
 
-def _limit_rows(eigenvalue_gaps: dict[str, np.ndarray]) -> list[Row]:
+def _stiff_tyre_limit_rows(eigenvalue_gaps: dict[str, np.ndarray]) -> list[Row]:
     """Rows on the limit of stiff tyres: order of convergence in each engine, and difference between the engines."""
     rows = []
     for engine, gap in eigenvalue_gaps.items():
@@ -150,7 +154,7 @@ def _energy_rows(duration: float) -> list[Row]:
     gravity."""
     table = {"title": "benchmark run", "system": "bicycle", "run": {"duration": duration}}
     scene, rows = build(table), []
-    for engine in ("reference", *ENGINES):
+    for engine in ("reference", *ENGINE_NAMES):
         try:
             gap = run(scene, engine).detail.unaccounted()
         except RunFailed:
@@ -175,7 +179,7 @@ def _energy_rows(duration: float) -> list[Row]:
     return [*rows, seen.within(1.019e-3, 1e-5, "the ledger sees a planted fault a hundred thousand times", "none")]
 
 
-def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
+def _measured_bicycle_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     """Rows on the measured bicycle: predictions with nothing fitted, and predictions for each speed with parameters
     that were chosen and fitted on the other speeds."""
     root = os.environ.get("TWINRIG_DATA")
@@ -186,33 +190,34 @@ def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     bicycle, seen = load_bicycle("steer_by_wire"), observations(folder)
     rows, table = [], []
     for observation in seen:
-        rows += _unfitted_rows(bicycle, observation)
+        rows += _unfitted_prediction_rows(bicycle, observation)
         by = (
             None
             if quick
             else ranked_suspects(bicycle, MEASURED_FEEDBACK, [other for other in seen if other is not observation])
         )
-        rows += [] if by is None else _predicted_rows(bicycle, by, observation)
-        table.append(_table_line(bicycle, by, observation))
-    return [*rows, *_choice_rows(ranked_suspects(bicycle, MEASURED_FEEDBACK, seen))], table
+        rows += [] if by is None else _fitted_prediction_rows(bicycle, by, observation)
+        table.append(_weave_table_line(bicycle, by, observation))
+    return [*rows, *_suspect_parameter_rows(ranked_suspects(bicycle, MEASURED_FEEDBACK, seen))], table
 
 
-def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
+def _unfitted_prediction_rows(bicycle: Whipple, weave_observation: Observation) -> list[Row]:
+    """Rows: weave at one speed predicted with nothing fitted, compared with the measured one."""
     model, mean, deviation = (
-        predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
-        observation.mean,
-        observation.deviation,
+        predicted_weave(bicycle, MEASURED_FEEDBACK, weave_observation),
+        weave_observation.mean,
+        weave_observation.deviation,
     )
-    at = f"{observation.speed:g} m/s, {len(observation.weave)} windows"
+    at = f"{weave_observation.speed:g} m/s, {len(weave_observation.weave)} windows"
     damping = Observed(
-        f"bicycle.measured.damping.{observation.speed:g}",
+        f"bicycle.measured.damping.{weave_observation.speed:g}",
         SYSTEM,
         f"weave damping at {at}, nothing fitted: deviation by the measured {-mean[0]:.2f} +- {deviation[0]:.2f} 1/s",
         float(model[0] / mean[0] - 1.0),
         "",
     )
     frequency = Observed(
-        f"bicycle.measured.frequency.{observation.speed:g}",
+        f"bicycle.measured.frequency.{weave_observation.speed:g}",
         SYSTEM,
         f"weave frequency at {at}, nothing fitted: deviation by the measured {mean[1]:.2f} +- {deviation[1]:.2f} rad/s",
         float(model[1] / mean[1] - 1.0),
@@ -221,23 +226,26 @@ def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
     why = "parameters and feedback as published, no number fitted"
     judged = (
         damping.at_most(0.1, why, "measured")
-        if observation.speed >= LOWEST_JUDGED_SPEED
+        if weave_observation.speed >= LOWEST_JUDGED_SPEED
         else damping.beside(0.0, why, "measured")
     )
     return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
 
 
-def _predicted_rows(bicycle: Whipple, choice: SubsetChoice, observation: Observation) -> list[Row]:
-    gaps = forecast_deviations(bicycle, MEASURED_FEEDBACK, choice, observation)
+def _fitted_prediction_rows(
+    bicycle: Whipple, parameter_choice: SubsetChoice, weave_observation: Observation
+) -> list[Row]:
+    """Rows: weave at one speed predicted with parameters fitted to the other speeds, compared with the measured one."""
+    gaps = forecast_deviations(bicycle, MEASURED_FEEDBACK, parameter_choice, weave_observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
         "that were settled with all of these speeds in sight"
     )
     return [
         Observed(
-            f"bicycle.chosen.{name}.{observation.speed:g}",
+            f"bicycle.chosen.{name}.{weave_observation.speed:g}",
             SYSTEM,
-            f"weave {name} at {observation.speed:g} m/s by suspects chosen on the other speeds: "
+            f"weave {name} at {weave_observation.speed:g} m/s by suspects chosen on the other speeds: "
             "standard deviations off",
             float(gap),
             "",
@@ -246,18 +254,19 @@ def _predicted_rows(bicycle: Whipple, choice: SubsetChoice, observation: Observa
     ]
 
 
-def _choice_rows(choice: SubsetChoice) -> list[Row]:
+def _suspect_parameter_rows(parameter_choice: SubsetChoice) -> list[Row]:
     """Rows: for each parameter that the experimenters suspected, the p value of the F test of leaving the parameter
     out."""
     parameters_text = ", ".join(
-        f"{name} {value:.3g}" for name, value in zip(choice.best_subset.names, choice.best_subset.values, strict=True)
+        f"{name} {value:.3g}"
+        for name, value in zip(parameter_choice.best_subset.names, parameter_choice.best_subset.values, strict=True)
     )
     return [
         Observed(
             f"bicycle.suspects.{key}",
             SYSTEM,
             f"chance of leaving {suspect} out; best subset: {parameters_text}",
-            choice.removal_tests[name][1],
+            parameter_choice.removal_tests[name][1],
             "",
         ).at_most(0.05, "F test against the fullest subset that can be told apart", "measured")
         for key, suspect, name in (
@@ -265,19 +274,26 @@ def _choice_rows(choice: SubsetChoice) -> list[Row]:
             ("speed_gain", "the speed sensor's gain", "speed_gain"),
             ("speed_bias", "the speed sensor's bias", "speed_bias"),
         )
-        if name in choice.removal_tests
+        if name in parameter_choice.removal_tests
     ]
 
 
-def _table_line(bicycle: Whipple, choice: SubsetChoice | None, observation: Observation) -> list[str]:
+def _weave_table_line(
+    bicycle: Whipple, parameter_choice: SubsetChoice | None, weave_observation: Observation
+) -> list[str]:
+    """Line of the table of measured and predicted weave at one speed."""
     model, mean, deviation = (
-        predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
-        observation.mean,
-        observation.deviation,
+        predicted_weave(bicycle, MEASURED_FEEDBACK, weave_observation),
+        weave_observation.mean,
+        weave_observation.deviation,
     )
-    gaps = np.empty(0) if choice is None else forecast_deviations(bicycle, MEASURED_FEEDBACK, choice, observation)
+    gaps = (
+        np.empty(0)
+        if parameter_choice is None
+        else forecast_deviations(bicycle, MEASURED_FEEDBACK, parameter_choice, weave_observation)
+    )
     return [
-        f"{observation.speed:g} m/s",
+        f"{weave_observation.speed:g} m/s",
         f"{-mean[0]:.2f} +- {deviation[0]:.2f}",
         f"{-model[0]:.2f}",
         f"{mean[1]:.2f} +- {deviation[1]:.2f}",

@@ -42,7 +42,7 @@ CONTROLLER_NAMES = tuple(CONTROLLERS)[1:]
 """Names of the anti-lock controllers, without the first entry of CONTROLLERS, which applies the brakes fully."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of hysteresis, supply and limit cycle; a full run also has stops of the truck, substeps, and an ensemble of
     stops."""
     rows = [*_hysteresis_rows(), _air_supply_row(), *_limit_cycle_rows("shallow")]
@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for speed in (11.11, 22.2)
         for name in CONTROLLER_NAMES
     }
-    return [*rows, *_stop_rows(stops), *_substep_rows(), *_ensemble_rows()], {"stops": stops}
+    return [*rows, *_stop_rows(stops), *_substep_rows(), *_ice_stop_ensemble_rows()], {"stops": stops}
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
@@ -79,7 +79,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def hysteresis_loop(
+def brake_hysteresis_loop(
     brake: Brake, low_pressure: float, high_pressure: float, point_count: int = 2000
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pressures (bar) and torques (N m) of one hysteresis loop, from high to low pressure and back, after a first rise
@@ -90,7 +90,7 @@ def hysteresis_loop(
     return path, torques_of_pressures(path, of_wheels(brake))
 
 
-def loop_area(brake: Brake, low_pressure: float, high_pressure: float) -> float:
+def hysteresis_loop_area(brake: Brake, low_pressure: float, high_pressure: float) -> float:
     """Area (N m bar) of the hysteresis loop by the closed form of its polygon, whose four corners lie on the lines of
     rising and falling pressure."""
     most = brake.rising * (high_pressure - brake.push_out)
@@ -102,11 +102,12 @@ def loop_area(brake: Brake, low_pressure: float, high_pressure: float) -> float:
 
 
 def _hysteresis_rows() -> list[Row]:
+    """Rows: area and sense of the brake's hysteresis loop, and its torque below the push-out pressure."""
     worst, sense = 0.0, True
     for brake in (HYSTERETIC_BRAKE, PAPER_FRONT):
         for low in (0.0, 2.5):
-            p, t = hysteresis_loop(brake, low, 4.5)
-            worst = max(worst, abs(-np.trapezoid(t, p) / loop_area(brake, low, 4.5) - 1.0))
+            p, t = brake_hysteresis_loop(brake, low, 4.5)
+            worst = max(worst, abs(-np.trapezoid(t, p) / hysteresis_loop_area(brake, low, 4.5) - 1.0))
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
     rise = torques_of_pressures(np.linspace(0.0, 0.75, 100), of_wheels(HYSTERETIC_BRAKE))
     return [
@@ -155,19 +156,21 @@ def _air_supply_row() -> Row:
     ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
 
 
-def _wheel_at_constant_speed(inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
+def _front_wheel_at_constant_speed(spin_inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
+    """A front wheel on dry road whose vehicle keeps its speed."""
     return WheelAtSpeed(
-        11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINEAR_BRAKE, table_of_surface("dry")
+        11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, spin_inertia, LINEAR_BRAKE, table_of_surface("dry")
     )
 
 
 def _limit_cycle_rows(controller_name: str) -> list[Row]:
+    """Rows: period and friction utilisation of a five-phase controller's limit cycle, compared with exact values."""
     cycle, (period, used) = (
-        limit_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
-        exact_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+        limit_cycle(_front_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+        exact_cycle(_front_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
     )
     wrong = exact_cycle(
-        _wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[controller_name]
+        _front_wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[controller_name]
     )[0]
     return [
         Observed(
@@ -199,7 +202,7 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
             "relative difference of the period with samples of 5.5 ms from the period of the "
             f"continuous controller, {controller_name}",
             sampled_cycle(
-                _wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
+                _front_wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
             ).period
             / cycle.period
             - 1.0,
@@ -208,22 +211,22 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
     ]
 
 
-def truck_stop(surface_name: str, controller_name: str, speed: float) -> BrakingPath:
+def truck_stop(surface_name: str, controller_name: str, start_speed: float) -> BrakingPath:
     """The paper's truck braked to a stop on a surface by a controller with its default parameters."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
     return on_tyres(plane_of_truck(PAPER_TRUCK), [table_of_surface(surface_name)], PAPER_BRAKES, chambers).run(
-        CONTROLLERS[controller_name](4), speed
+        CONTROLLERS[controller_name](4), start_speed
     )
 
 
-def stop_results(surface_name: str, controller_name: str, speed: float) -> dict[str, float]:
+def stop_results(surface_name: str, controller_name: str, start_speed: float) -> dict[str, float]:
     """Results of one straight stop of the truck: distance (m), time (s); above 15 km/h also the friction utilisation
     and the longest wheel lock (ms)."""
-    path = truck_stop(surface_name, controller_name, speed)
+    path = truck_stop(surface_name, controller_name, start_speed)
     speeds = Stop(path).speed
     last = int(np.argmax(speeds < LOCK_FREE_SPEED))
     used = (
-        (speed**2 - speeds[last] ** 2)
+        (start_speed**2 - speeds[last] ** 2)
         / (2.0 * path.states[last, 0, 0])
         / GRAVITY
         / table_of_surface(surface_name).mu_x.max()
@@ -237,26 +240,27 @@ def stop_results(surface_name: str, controller_name: str, speed: float) -> dict[
     }
 
 
-def _longest_true_sequence(flags: np.ndarray) -> int:
+def _longest_true_sequence(truth_values: np.ndarray) -> int:
     """Length of the longest uninterrupted sequence of true values."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
+    ends = np.flatnonzero(np.diff(np.concatenate(([False], truth_values, [False])).astype(int)))
     return int((ends[1::2] - ends[::2]).max(initial=0))
 
 
-def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
+def _stop_rows(results_of_stops: dict[str, dict[str, float]]) -> list[Row]:
+    """Rows: longest wheel lock of all stops, and whether all stops end at rest."""
     return [
         Observed(
             "braking_controllers.locks",
             SYSTEM,
-            f"longest time for which a wheel locks above 15 km/h in {len(stops)} stops of four controllers",
-            max(stop_figures["locked"] for stop_figures in stops.values()),
+            f"longest time for which a wheel locks above 15 km/h in {len(results_of_stops)} stops of four controllers",
+            max(stop_figures["locked"] for stop_figures in results_of_stops.values()),
             "ms",
         ).at_most(1e3 * LONGEST_LOCK, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
         behaviour_row(
             "braking_controllers.stands",
             SYSTEM,
-            f"how {len(stops)} stops of four controllers end",
-            "at rest" if all(stop_figures["stands"] for stop_figures in stops.values()) else "moving",
+            f"how {len(results_of_stops)} stops of four controllers end",
+            "at rest" if all(stop_figures["stands"] for stop_figures in results_of_stops.values()) else "moving",
             "at rest",
             "below 1.5 m/s all brakes are applied",
         ),
@@ -264,6 +268,7 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
 
 
 def _substep_rows() -> list[Row]:
+    """Rows: stopping distance on snow and dry road by number of substeps, compared with the independent reference."""
     rows = []
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
         tight = reference_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
@@ -282,7 +287,7 @@ def _substep_rows() -> list[Row]:
     return rows
 
 
-def _ensemble_rows(run_count: int = 24, fine_substeps: int = 32) -> list[Row]:
+def _ice_stop_ensemble_rows(run_count: int = 24, fine_substep_count: int = 32) -> list[Row]:
     """Rows: two ensembles of stops on ice from slightly varied speeds, with different numbers of substeps. Single stops
     on ice do not repeat."""
     random = np.random.default_rng(SEED)
@@ -294,7 +299,7 @@ def _ensemble_rows(run_count: int = 24, fine_substeps: int = 32) -> list[Row]:
                 for speed in some
             ]
         )
-        for some, n in zip(speeds, (4, fine_substeps), strict=True)
+        for some, n in zip(speeds, (4, fine_substep_count), strict=True)
     ]
     level = float(ttest_ind(*distances, equal_var=False).pvalue)
     return [
@@ -302,7 +307,7 @@ def _ensemble_rows(run_count: int = 24, fine_substeps: int = 32) -> list[Row]:
             "braking_controllers.ice_mean",
             SYSTEM,
             f"relative difference of the mean stopping distance on ice of {run_count} runs with 4 substeps "
-            f"from {run_count} others with {fine_substeps}",
+            f"from {run_count} others with {fine_substep_count}",
             float(distances[0].mean() / distances[1].mean() - 1.0),
             "",
         ).at_most(1e-2, "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),

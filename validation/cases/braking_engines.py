@@ -30,7 +30,7 @@ from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"
-STEP, SPEED, LAST_SPEED, STEER = 1e-3, 11.11, 0.5, 0.03
+TIME_STEP, START_SPEED, END_SPEED, STEER_ANGLE = 1e-3, 11.11, 0.5, 0.03
 """Step (s), initial and final speed (m/s), and steer angle (rad) of the braked turn."""
 BRAKE_TORQUES = (870.0, 580.0)
 """Brake torque (N m) of each front and of each rear wheel: the truck goes 60 m, and no wheel locks."""
@@ -38,12 +38,12 @@ STIFF_TYRE_SLOPE = 100.0
 """Slope (1/rad) of the lateral friction of the trailer's tyres, so steep that the wheels nearly roll without slip."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the braked turn in engines, by hand-written equations and mirrored, of straight braking, and of the
     trailer. A quick run brakes down to 10 m/s only."""
-    until = 10.0 if quick else LAST_SPEED
+    until = 10.0 if quick else END_SPEED
     compiled = braked_truck_turn(until)
-    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER, BRAKE_TORQUES, SPEED, until)}
+    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER_ANGLE, BRAKE_TORQUES, START_SPEED, until)}
     beside |= {
         name: braked_truck_turn(until, step_function=EngineChassis(name, PAPER_PLANE).advance)
         for name in ("exudyn", "mujoco")
@@ -68,7 +68,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             f"braking_engines.speed.{steps}",
             SYSTEM,
             f"speed of a compiled truck with a bang-bang slip controller on ice, samples of 5.5 ms in {steps} step(s)",
-            simulation_speed(steps),
+            real_time_factor(steps),
             "times real time",
         ).aim(100.0, "asked for; by the processor's time, which wanders", "at least")
         for steps in (1, 4)
@@ -77,35 +77,38 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {name: list(where) for name, where in turns.items()}
 
 
-def braked_truck_turn(end_speed: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
-    """End of a braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s), interpolated linearly within the
-    last step."""
+def braked_truck_turn(
+    end_speed: float, steer_angle: float = STEER_ANGLE, step_function: Callable[..., Any] = advance
+) -> TurnEnd:
+    """End of a braked turn of the truck on ice from START_SPEED down to ``end_speed`` (m/s), interpolated linearly
+    within the last step."""
     truck = RollingTruck(
         on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
-        SPEED,
-        steer=steer,
+        START_SPEED,
+        steer=steer_angle,
         step_function=step_function,
     )
     while True:
         passed, position, fast = truck.time, truck.state[0].copy(), truck.speed
-        status, used = truck.on(np.repeat(BRAKE_TORQUES, 2), STEP)
+        status, used = truck.on(np.repeat(BRAKE_TORQUES, 2), TIME_STEP)
         if status != FINE or truck.speed <= end_speed:
             share = (fast - end_speed) / (fast - truck.speed)
             x, y, heading = (float(value) for value in position + share * (truck.state[0] - position))
             return TurnEnd(x, y, heading, float(passed + share * used))
 
 
-def simulation_speed(substep_count: int) -> float:
+def real_time_factor(substep_count: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
     vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
-    vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
+    vehicle.run(SlipBangBang(wheels=4), START_SPEED, 0.1)
     start = time.process_time()
-    path = vehicle.run(SlipBangBang(wheels=4), SPEED)
+    path = vehicle.run(SlipBangBang(wheels=4), START_SPEED)
     return float(path.times[-1]) / (time.process_time() - start)
 
 
 def _axle_load_rows() -> list[Row]:
+    """Rows: axle loads of a truck with locked wheels, and the sideways path of a truck with locked steered wheels."""
     rows = [
         Observed(
             f"braking_engines.transfer.{name.replace(' ', '-')}",
@@ -129,7 +132,8 @@ def _axle_load_rows() -> list[Row]:
 
 
 def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
-    mirrored, straight = braked_truck_turn(end_speed, -STEER), braked_truck_turn(end_speed, 0.0)
+    """Rows: a turn compared with its mirror image, and no yaw without steering."""
+    mirrored, straight = braked_truck_turn(end_speed, -STEER_ANGLE), braked_truck_turn(end_speed, 0.0)
     apart = max(
         abs(mirrored.x - steered_turn.x), abs(mirrored.y + steered_turn.y), abs(mirrored.heading + steered_turn.heading)
     )
@@ -147,10 +151,10 @@ def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
     ]
 
 
-def lateral_tyre_tables(slope: float) -> Tables:
+def lateral_tyre_tables(friction_slope: float) -> Tables:
     """Tyre tables with lateral friction alone. Its coefficient rises with a slope (1/rad) up to a slip angle of 0.01
     rad."""
-    mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
+    mu = np.array([[0.0], [0.01 * friction_slope], [0.01 * friction_slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     return stacked_tables([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
@@ -163,7 +167,7 @@ def _trailer_rows(quick: bool) -> list[Row]:
             "braking_engines.pull",
             SYSTEM,
             "relative difference of the drawbar angle on a straight pull from its closed form",
-            straight_pull_error(),
+            trailer_pull_error(),
             "",
         ).at_most(1e-4, why, "closed form")
     ]
@@ -176,35 +180,39 @@ def _trailer_rows(quick: bool) -> list[Row]:
                 off,
                 "",
             ).at_most(1e-4, why, "closed form")
-            for name, off in zip(("front", "rear"), circle_errors(), strict=True)
+            for name, off in zip(("front", "rear"), trailer_circle_errors(), strict=True)
         ]
     return rows
 
 
-def straight_pull_error(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, duration: float = 4.0) -> float:
+def trailer_pull_error(
+    start_angle: float = 0.5, v: float = 0.2, time_step: float = 5e-4, duration: float = 4.0
+) -> float:
     """Relative error of the drawbar angle psi after a straight pull over the time t at speed v. Exact, with drawbar
     length L: tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L)."""
-    n = round(duration / step)
-    state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN_TRAILER.drawbar, 0.0]])
+    n = round(duration / time_step)
+    state = np.array(
+        [[0.0, 0.0, start_angle, start_angle], [v, 0.0, -v * np.sin(start_angle) / CHOSEN_TRAILER.drawbar, 0.0]]
+    )
     states, _ = follow_hook(
         plane_of_trailer(CHOSEN_TRAILER),
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,
         np.tile([v, 0.0], (n + 1, 1)),
-        step,
+        time_step,
         STIFF_TYRE_SLOPE,
         np.zeros(4),
     )
-    exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN_TRAILER.drawbar))
+    exact = 2.0 * np.arctan(np.tan(start_angle / 2.0) * np.exp(-v * duration / CHOSEN_TRAILER.drawbar))
     return abs(float(states[-1, 0, 2] / exact - 1.0))
 
 
-def circle_errors(
-    radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: float = 20.0
+def trailer_circle_errors(
+    radius: float = 15.0, v: float = 0.5, time_step: float = 2e-4, duration: float = 20.0
 ) -> tuple[float, float]:
     """Relative errors of the radii of the trailer's front and rear axle on a steady circle. Exact, with drawbar length
     L: R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 - wheelbase^2."""
-    yaw_rate, times = v / radius, step * np.arange(round(duration / step) + 1)
+    yaw_rate, times = v / radius, time_step * np.arange(round(duration / time_step) + 1)
     hook = v * np.column_stack((-np.sin(yaw_rate * times), np.cos(yaw_rate * times)))
     front = np.sqrt(radius**2 - CHOSEN_TRAILER.drawbar**2)
     rear = np.sqrt(front**2 - CHOSEN_TRAILER.wheelbase**2)
@@ -217,7 +225,7 @@ def circle_errors(
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,
         hook,
-        step,
+        time_step,
         STIFF_TYRE_SLOPE,
         np.zeros(4),
     )

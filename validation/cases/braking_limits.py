@@ -30,7 +30,7 @@ SYSTEM: System = "anti-lock"
 SEED = 19
 STOP_COUNTS = {True: 3, False: 200}
 """Number of random stops, for a quick run (True) and a full run (False)."""
-VEHICLE_LIMITS = ("rolls over", "pitches over", "jackknifes", "turns over")
+VEHICLE_LIMIT_WORDS = ("rolls over", "pitches over", "jackknifes", "turns over")
 """Words in the error of a run that ends at a physical limit of the vehicle, which a legal scene may reach."""
 LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 LONG_RELEASE_CONTROLLER = FivePhase(
@@ -40,29 +40,33 @@ LONG_RELEASE_CONTROLLER = FivePhase(
 
 
 @allowing_breaches("stops at the limits, and random ones: that they end, or say why not, is judged")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all limits. A quick run takes three of the random stops, and one speed of the slow stops on split
     friction."""
-    ends = [ending_text(number) for number in range(STOP_COUNTS[quick])]
-    rows = [_random_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
-    rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
-    return rows + [_refused_row(*refusal_arguments) for refusal_arguments in REFUSED_INPUTS.items()], {"ends": ends}
+    ends = [random_stop_ending(number) for number in range(STOP_COUNTS[quick])]
+    rows = [_random_stops_row(ends), _jackknife_row(), *_rollover_rows(), _slow_pressure_rise_row(), _limit_cycle_row()]
+    rows += [_split_friction_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
+    return rows + [_refused_input_row(*refusal_arguments) for refusal_arguments in REFUSED_INPUTS.items()], {
+        "ends": ends
+    }
 
 
-def ending_text(scene_number: int) -> str:
+def random_stop_ending(stop_number: int) -> str:
     """Text on how a random stop ended; empty if the vehicle came to rest."""
     try:
-        path = run(build(random_stop(SEED, scene_number))).detail
+        path = run(build(random_stop(SEED, stop_number))).detail
     except RunFailed as error:
         return error.reason
     return "" if path.ended_at_rest else "does not stand"
 
 
-def _random_stops_row(endings: list[str]) -> Row:
-    limits = [end for end in endings if any(limit in end for limit in VEHICLE_LIMITS)]
-    wrong = [f"{i}: {end}" for i, end in enumerate(endings) if end and end not in limits]
+def _random_stops_row(stop_endings: list[str]) -> Row:
+    """Row: number of random stops that neither come to rest nor end at a physical limit of the vehicle."""
+    limits = [end for end in stop_endings if any(limit in end for limit in VEHICLE_LIMIT_WORDS)]
+    wrong = [f"{i}: {end}" for i, end in enumerate(stop_endings) if end and end not in limits]
     what = (
-        f"stops that do not finish, of {len(endings)} random legal ones, {len(limits)} of which end by a limit of the "
+        f"stops that do not finish, of {len(stop_endings)} random legal ones, {len(limits)} of which end by a limit "
+        "of the "
         f"vehicle: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "").within(
@@ -70,11 +74,12 @@ def _random_stops_row(endings: list[str]) -> Row:
     )
 
 
-def _braking_scene(**tables: Any) -> Any:
-    return build({"system": "braking", "title": "limit", **tables}, "limit.toml")
+def _braking_scene(**scene_tables: Any) -> Any:
+    """Scene of the system "braking" with the given tables."""
+    return build({"system": "braking", "title": "limit", **scene_tables}, "limit.toml")
 
 
-def _error_of_procedure(scene: Any) -> RunFailed | None:
+def _error_of_braking_procedure(scene: Any) -> RunFailed | None:
     """Error with which the only braking procedure of a scene fails; None if the procedure runs to its end."""
     try:
         run(scene)
@@ -86,7 +91,7 @@ def _error_of_procedure(scene: Any) -> RunFailed | None:
 def _jackknife_row() -> Row:
     """Row: largest recorded hinge angle of a truck and trailer that jackknife while the truck's rear wheels slide,
     compared with the limit angle."""
-    end = _error_of_procedure(
+    end = _error_of_braking_procedure(
         _braking_scene(
             vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
             run={"duration": 6.0},
@@ -113,12 +118,12 @@ def _jackknife_row() -> Row:
     ).within(1.0, 0.02, "a sample before the limit", "closed form")
 
 
-def _roll_rows() -> list[Row]:
+def _rollover_rows() -> list[Row]:
     """Rows: a high truck with a narrow track rolls over in a J-turn on dry road; compared is the lateral acceleration
     that the error states."""
     track, height = 1.8, 2.2
     axle = {"track": track}
-    end = _error_of_procedure(
+    end = _error_of_braking_procedure(
         _braking_scene(
             vehicle={"override": {"height": height, "front": axle, "rear": axle}},
             load_transfer={"front": 0.5},
@@ -149,7 +154,7 @@ def _roll_rows() -> list[Row]:
     ]
 
 
-def _slow_apply_row() -> Row:
+def _slow_pressure_rise_row() -> Row:
     """Row: pressure in a brake chamber that fills slowly, compared with an exponential."""
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
     air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
@@ -164,7 +169,7 @@ def _slow_apply_row() -> Row:
     ).at_most(1e-12, "supply (1 - exp(-t / slow))", "closed form")
 
 
-def _cycle_row() -> Row:
+def _limit_cycle_row() -> Row:
     """Row: period of the controller's limit cycle after a fast first application to a rolling wheel, compared with the
     exact period after a slow first application."""
     frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
@@ -180,23 +185,23 @@ def _cycle_row() -> Row:
     ).at_most(1e-4, "the cycle does not know how it was begun", "closed form")
 
 
-def _yaw_row(speed: float) -> Row:
+def _split_friction_yaw_row(start_speed: float) -> Row:
     """Row: final yaw angle of a stop on split friction with steps of 20 ms, compared with steps of 0.1 ms."""
 
-    def yaw(substeps: int) -> float:
+    def yaw(substep_count: int) -> float:
         scene = _braking_scene(
-            procedures={"p": {"kind": "split", "speed": speed, "right": "ice"}},
+            procedures={"p": {"kind": "split", "speed": start_speed, "right": "ice"}},
             brakes={"supply": 2.0},
             road={"stretches": [{"left": "dry"}]},
             load_transfer={},
-            run={"sample": 0.02, "substeps": substeps, "duration": 20.0},
+            run={"sample": 0.02, "substeps": substep_count, "duration": 20.0},
         )
         return float(run(scene).detail.states[-1, 0, 2])
 
     return Observed(
-        f"braking_limits.yaw.{speed:g}",
+        f"braking_limits.yaw.{start_speed:g}",
         SYSTEM,
-        f"ratio of the yaw with steps of 20 ms to the yaw with steps of 0.1 ms, stop from {speed:g} "
+        f"ratio of the yaw with steps of 20 ms to the yaw with steps of 0.1 ms, stop from {start_speed:g} "
         "m/s on split friction",
         yaw(1) / yaw(200),
         "",
@@ -221,9 +226,10 @@ REFUSED_INPUTS: dict[str, Callable[[], Any]] = {
 """Inputs that are physically impossible, each with a function that must raise InputError."""
 
 
-def _refused_row(input_name: str, build_refused: Callable[[], Any]) -> Row:
+def _refused_input_row(input_name: str, build_refused_scene: Callable[[], Any]) -> Row:
+    """Row: an impossible input is refused by an error that names the entry and its value."""
     try:
-        build_refused()
+        build_refused_scene()
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"

@@ -47,36 +47,39 @@ FURTHER_CASES = {
     "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0),
 }
 """Surface, steady slip, initial speed (m/s), and factors of mass and of spin inertia of each further case."""
-DISTANCE_BOUND = 5e-4
+DISTANCE_ERROR_BOUND = 5e-4
 """Largest relative error of a stopping distance that is asked for."""
 SWEEP_STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
 """Steps (s) of the sweep over brake torques, for a quick run (True) and a full run (False)."""
-SMALLEST_FIGURE_STEP = 5e-4
+SMALLEST_STEP_IN_FIGURE = 5e-4
 """Smallest of the sweep's steps (s) that the figure shows."""
 FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
 """Surfaces on which the sweep takes every brake torque at every step."""
-TORQUE_LEVELS, LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
+TORQUE_LEVELS, TORQUE_LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
 """Brake torques of the sweep divided by the locking torque; and the selection of these levels for the quick run, and
 for other surfaces in steps below the paper's."""
-SLOW_SPEED = 0.5
+SLOW_START_SPEED = 0.5
 """Initial speed (m/s) of the sweep with steps below 1 ms, which would otherwise take many steps."""
 STANDSTILL_SECONDS = 2.0
 """Time (s) for which the simulation goes on after a stop, to see that the vehicle stays at rest."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all stops. A quick run has the four headline cases, and a sweep with two steps on two surfaces."""
-    steps = tuple(step for step in SWEEP_STEPS[quick] if step >= SMALLEST_FIGURE_STEP)
+    steps = tuple(step for step in SWEEP_STEPS[quick] if step >= SMALLEST_STEP_IN_FIGURE)
     curves = {
-        name: _errors_over_step(*headline_arguments, steps) for name, headline_arguments in HEADLINE_CASES.items()
+        name: _stopping_distance_errors(*headline_arguments, steps)
+        for name, headline_arguments in HEADLINE_CASES.items()
     }
-    rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
+    rows = [row for name, curve in curves.items() for row in _headline_case_rows(name, curve)]
     if not quick:
-        rows += [_further_case_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
+        rows += [
+            _stopping_distance_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()
+        ]
     rows += [
-        _sweep_row(
+        _torque_sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
-            TORQUE_LEVELS[LEVEL_SELECTION] if quick else TORQUE_LEVELS,
+            TORQUE_LEVELS[TORQUE_LEVEL_SELECTION] if quick else TORQUE_LEVELS,
             SWEEP_STEPS[quick],
         ),
         _locked_wheel_row(),
@@ -86,34 +89,40 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"curves": curves, "steps": steps}
 
 
-def _errors_over_step(surface: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
+def _stopping_distance_errors(
+    surface_name: str, steady_slip: float, start_speed: float, time_steps: tuple[float, ...]
+) -> dict[str, Any]:
     """Errors of twinrig's and of other integration schemes over the step: relative error of the stopping distance, and
     the remaining speed (m/s) if a scheme does not stop."""
-    tyre, _ = both = friction_table(surface)
-    force, torque = steady_torque(FRONT_WHEEL, tyre, slip)
-    true = exact_distance(FRONT_WHEEL, tyre, torque, speed)
+    tyre, _ = both = friction_table(surface_name)
+    force, torque = steady_torque(FRONT_WHEEL, tyre, steady_slip)
+    true = exact_distance(FRONT_WHEEL, tyre, torque, start_speed)
     distances = {
-        "ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]
+        "ours": [
+            (constant_torque_stop(FRONT_WHEEL, both, torque, start_speed, step).distance, 0.0) for step in time_steps
+        ]
     }
     distances |= {
-        key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES
+        key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, start_speed, step) for step in time_steps]
+        for key in SCHEMES
     }
     steadily = constant_torque_stop(
-        FRONT_WHEEL, both, torque, speed, rim_turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
+        FRONT_WHEEL, both, torque, start_speed, rim_turning=(1.0 - steady_slip) * start_speed / FRONT_WHEEL.radius
     ).distance
     return {
         "exact": true,
-        "steady": steadily / (FRONT_WHEEL.mass * speed**2 / (2.0 * force)) - 1.0,
+        "steady": steadily / (FRONT_WHEEL.mass * start_speed**2 / (2.0 * force)) - 1.0,
         "errors": {key: [(distance / true - 1.0, left) for distance, left in ends] for key, ends in distances.items()},
-        "at": steps.index(PAPER_STEP),
+        "at": time_steps.index(PAPER_STEP),
     }
 
 
-def _headline_rows(case_name: str, curve: dict[str, Any]) -> list[Row]:
-    key, at = f"braking_stop.{case_name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
-    errors = {scheme: curves[at] for scheme, curves in curve["errors"].items()}
+def _headline_case_rows(case_name: str, error_curves: dict[str, Any]) -> list[Row]:
+    """Rows of a headline case: error of the stopping distance, and that of other integration schemes."""
+    key, at = f"braking_stop.{case_name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", error_curves["at"]
+    errors = {scheme: curves[at] for scheme, curves in error_curves["errors"].items()}
     ours, _ = errors.pop("ours")
-    why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
+    why = f"asked for; the exact distance is {error_curves['exact']:.6f} m, from the slip's own equation to 1e-9"
     rows = [
         Observed(
             f"{key}.distance",
@@ -121,12 +130,12 @@ def _headline_rows(case_name: str, curve: dict[str, Any]) -> list[Row]:
             f"relative error of the stopping distance of a wheel that rolls first, {case_name}, steps of 5.5 ms",
             ours,
             "",
-        ).at_most(DISTANCE_BOUND, why, "closed form"),
+        ).at_most(DISTANCE_ERROR_BOUND, why, "closed form"),
         Observed(
             f"{key}.steady",
             SYSTEM,
             f"relative error of the stopping distance at constant slip, {case_name}, steps of 5.5 ms",
-            curve["steady"],
+            error_curves["steady"],
             "",
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
     ]
@@ -146,56 +155,67 @@ def _headline_rows(case_name: str, curve: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def _further_case_row(
-    case_name: str, surface: str, slip: float, speed: float, mass_factor: float, spin_inertia_factor: float
+def _stopping_distance_row(
+    case_name: str,
+    surface_name: str,
+    steady_slip: float,
+    start_speed: float,
+    mass_factor: float,
+    spin_inertia_factor: float,
 ) -> Row:
+    """Row of a further case: error of the stopping distance."""
     quarter = Quarter(
         mass=mass_factor * FRONT_WHEEL.mass,
         radius=FRONT_WHEEL.radius,
         spin_inertia=spin_inertia_factor * FRONT_WHEEL.spin_inertia,
     )
-    tyre, _ = both = friction_table(surface)
-    torque = steady_torque(quarter, tyre, slip)[1]
+    tyre, _ = both = friction_table(surface_name)
+    torque = steady_torque(quarter, tyre, steady_slip)[1]
     error = (
-        constant_torque_stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
+        constant_torque_stop(quarter, both, torque, start_speed).distance
+        / exact_distance(quarter, tyre, torque, start_speed)
+        - 1.0
     )
     return Observed(
         f"braking_stop.further.{case_name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
-        f"relative error of the stopping distance, {case_name} ({surface}, {100 * slip:g} % slip, {speed:g} "
+        f"relative error of the stopping distance, {case_name} ({surface_name}, {100 * steady_slip:g} % slip, "
+        f"{start_speed:g} "
         "m/s), steps of 5.5 ms",
         error,
         "",
-    ).at_most(DISTANCE_BOUND, "as the four above", "closed form")
+    ).at_most(DISTANCE_ERROR_BOUND, "as the four above", "closed form")
 
 
-def broken_rules(stopped: QuarterStop, radius: float, is_braked: bool) -> list[str]:
+def broken_plausibility_rules(quarter_stop: QuarterStop, wheel_radius: float, is_braked: bool) -> list[str]:
     """Names of the rules of plausibility that a simulated stop breaks."""
-    path, speed = stopped.path, stopped.path.speed
-    rim = radius * path.turning
+    path, speed = quarter_stop.path, quarter_stop.path.speed
+    rim = wheel_radius * path.turning
     broken = {
         "no number": not all(np.isfinite(path_field).all() for path_field in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
-        "does not stop": is_braked and stopped.step_of_rest < 0,
-        "creeps": stopped.step_of_rest >= 0
+        "does not stop": is_braked and quarter_stop.step_of_rest < 0,
+        "creeps": quarter_stop.step_of_rest >= 0
         and bool(
-            np.abs(speed[stopped.step_of_rest :]).max() > 0.0 or np.ptp(path.position[stopped.step_of_rest :]) > 0.0
+            np.abs(speed[quarter_stop.step_of_rest :]).max() > 0.0
+            or np.ptp(path.position[quarter_stop.step_of_rest :]) > 0.0
         ),
     }
     return [name for name, wrong in broken.items() if wrong]
 
 
-def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tuple[float, ...]) -> Row:
+def _torque_sweep_row(surface_names: tuple[str, ...], torque_levels: np.ndarray, time_steps: tuple[float, ...]) -> Row:
+    """Row: number of stops of the sweep over brake torques that break a rule of plausibility."""
     wrong, runs = list[str](), 0
-    for on, step in product(surfaces, steps):
+    for on, step in product(surface_names, time_steps):
         tyre = friction_table(on)
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
-        speed = 11.11 if step >= 1e-3 else SLOW_SPEED
+        speed = 11.11 if step >= 1e-3 else SLOW_START_SPEED
         for level in (
-            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[LEVEL_SELECTION]
+            torque_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else torque_levels[TORQUE_LEVEL_SELECTION]
         ):
-            faults = broken_rules(
+            faults = broken_plausibility_rules(
                 constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, STANDSTILL_SECONDS),
                 FRONT_WHEEL.radius,
                 bool(level),
@@ -203,10 +223,11 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
             wrong += [f"{on}, {level:g} of lock, {1e3 * step:g} ms: {', '.join(faults)}"] if faults else []
             runs += 1
     some = f" (below {1e3 * PAPER_STEP:g} ms every fifth level, but on {', '.join(FULL_SWEEP_SURFACES)} all)"
-    some = "" if set(surfaces) <= set(FULL_SWEEP_SURFACES) else some
+    some = "" if set(surface_names) <= set(FULL_SWEEP_SURFACES) else some
     what = (
-        f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW_SPEED:g}: {len(surfaces)} surfaces, "
-        f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
+        f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW_START_SPEED:g}: {len(surface_names)} "
+        "surfaces, "
+        f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(time_steps):g} to {1e3 * max(time_steps):g} ms{some}, "
         f"watched for {STANDSTILL_SECONDS:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no "
         "stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"
@@ -217,6 +238,7 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
 
 
 def _locked_wheel_row() -> Row:
+    """Row: largest relative error of the stopping distance of a locked wheel, over all surfaces."""
     errors = []
     for on in NAMED_SURFACES:
         tyre = friction_table(on)
@@ -234,6 +256,7 @@ def _locked_wheel_row() -> Row:
 
 
 def _wheel_release_row() -> Row:
+    """Row: a locked wheel begins to turn when the falling brake torque reaches that of the sliding friction."""
     errors = []
     for on, step in product(NAMED_SURFACES, (1e-3, PAPER_STEP, 2e-2)):
         tyre, tables = friction_table(on)
@@ -254,6 +277,7 @@ def _wheel_release_row() -> Row:
 
 
 def _friction_level_row(level_count: int) -> Row:
+    """Row: the stopping distance falls steadily with rising friction."""
     torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
     distances = [
         constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance
@@ -296,14 +320,15 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
             ax.loglog(milliseconds, np.maximum(errors, 1e-7), style, label=label)
             ax.plot(milliseconds[left > 0.0], errors[left > 0.0], "x", color="black", markersize=9)
-        ax.axhline(100.0 * DISTANCE_BOUND, color=GREY, linewidth=0.8)
+        ax.axhline(100.0 * DISTANCE_ERROR_BOUND, color=GREY, linewidth=0.8)
         ax.axvline(1e3 * PAPER_STEP, color=GREY, linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
         ax.label_outer()
     add_heading(figure, "Braked to a stop by a constant torque: which step each scheme needs")
     legend_below(figure, axes.flat[0])
     caption = (
-        f"Error of the stopping distance over the step; grey: the bound of {100 * DISTANCE_BOUND:g} % and the paper's "
+        f"Error of the stopping distance over the step; grey: the bound of {100 * DISTANCE_ERROR_BOUND:g} % and the "
+        "paper's "
         "step. Crosses: it has not stopped in three times its time. Errors below 1e-7 % are drawn there."
     )
     return [(caption, figure)]

@@ -36,7 +36,7 @@ TURN_TORQUES, HARD_TURN_TORQUES = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 2
 """Brake torques (N m) of the four wheels in J-turns; no wheel locks."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of stops with locked wheels, and of a J-turn and its mirror image; a full run also compares Exudyn and
     MuJoCo, the limit of a stiff suspension, and ice."""
     wet = table_of_surface("wet")
@@ -49,12 +49,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [
             *_locked_wheel_rows(HARD_FRICTION),
             *_engine_rows(wet),
-            *_ice_rows(),
-            *_step_rows(wet),
-            _simulation_speed_row(wet),
+            *_ice_stop_rows(),
+            *_substep_rows(wet),
+            _real_time_factor_row(wet),
         ]
-        data["limit"] = stiff_limit(wet)
-        rows += _stiff_limit_rows(data["limit"])
+        data["limit"] = stiff_suspension_distances(wet)
+        rows += _stiff_suspension_rows(data["limit"])
     return rows, data
 
 
@@ -106,11 +106,12 @@ def _locked_wheel_rows(mu: float) -> list[Row]:
             ).at_most(1e-3, "what stands has no slip, and friction holds it", "closed form"),
         ]
         if name == "box":
-            rows += _pitch_rows(mu, pitch, gained)
+            rows += _pitch_and_load_transfer_rows(mu, pitch, gained)
     return rows
 
 
-def _pitch_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
+def _pitch_and_load_transfer_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
+    """Rows: pitch and load transfer of the braked box, compared with closed forms."""
     exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD_FRICTION else 2e-3
     return [
         Observed(
@@ -125,6 +126,7 @@ def _pitch_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
 
 
 def _mirror_rows(left_turn: BrakingPath, mirrored_turn: BrakingPath) -> list[Row]:
+    """Row: a J-turn of the car compared with its mirror image."""
     apart = np.abs(left_turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored_turn.states[-1, 0, :3]).max()
     return [
         Observed(
@@ -137,10 +139,10 @@ def _mirror_rows(left_turn: BrakingPath, mirrored_turn: BrakingPath) -> list[Row
     ]
 
 
-def _engine_rows(wet_table: TyreTable) -> list[Row]:
+def _engine_rows(wet_tyre_table: TyreTable) -> list[Row]:
     """Row: distance between Exudyn and MuJoCo at the end of a braked turn with steps of 1 ms."""
     ends = [
-        braked_vehicle(car(), wet_table, engine, 0.05, 1e-3)
+        braked_vehicle(car(), wet_tyre_table, engine, 0.05, 1e-3)
         .run(steady_torques(*HARD_TURN_TORQUES), 15.0)
         .states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
@@ -156,9 +158,10 @@ def _engine_rows(wet_table: TyreTable) -> list[Row]:
     ]
 
 
-def _step_rows(wet_table: TyreTable) -> list[Row]:
+def _substep_rows(wet_tyre_table: TyreTable) -> list[Row]:
+    """Rows: stopping distance with 1 and with 4 substeps per sample, compared with 16 substeps."""
     distances = [
-        braked_vehicle(car(), wet_table, steer=0.05, substeps=n)
+        braked_vehicle(car(), wet_tyre_table, steer=0.05, substeps=n)
         .run(steady_torques(*HARD_TURN_TORQUES), 10.0)
         .states[-1, 0, 0]
         for n in (1, 4, 16)
@@ -181,7 +184,7 @@ def _step_rows(wet_table: TyreTable) -> list[Row]:
     ]
 
 
-def _ice_rows() -> list[Row]:
+def _ice_stop_rows() -> list[Row]:
     """Rows: stop on ice by the slip controller, with the suspension and with the plane vehicle with load transfer."""
     ice, speed = table_of_surface("ice"), 11.11
     stops = [
@@ -222,10 +225,10 @@ class _TimedController:
         return command
 
 
-def _simulation_speed_row(wet_table: TyreTable) -> Row:
+def _real_time_factor_row(wet_tyre_table: TyreTable) -> Row:
     """Row of the simulation speed, from the fastest tenth of the samples, which other processes disturb least."""
     vehicle, controller = (
-        braked_vehicle(car(), wet_table, substeps=4, gradient=150.0),
+        braked_vehicle(car(), wet_tyre_table, substeps=4, gradient=150.0),
         _TimedController(SlipBangBang(wheels=4)),
     )
     vehicle.run(controller, 15.0, 2.0)
@@ -243,7 +246,7 @@ def _simulation_speed_row(wet_table: TyreTable) -> Row:
     )
 
 
-def stiff_limit(tyre: TyreTable) -> list[list[float]]:
+def stiff_suspension_distances(tyre_table: TyreTable) -> list[list[float]]:
     """Distance (m) between the ends of a J-turn of the box on its suspension and of the plane vehicle with load
     transfer, for three stiffness factors. Each row of the result: stiffness factor, distance. The wheels have hardly
     any inertia."""
@@ -251,7 +254,7 @@ def stiff_limit(tyre: TyreTable) -> list[list[float]]:
     for stiffer in (1.0, 10.0, 100.0):
         stiff_box = box(stiffer, 0.01)
         ends = [
-            braked_vehicle(stiff_box, tyre, engine, 0.015, substeps=4)
+            braked_vehicle(stiff_box, tyre_table, engine, 0.015, substeps=4)
             .run(steady_torques(*TURN_TORQUES), 10.0)
             .states[-1, 0, :2]
             for engine in ("mujoco", None)
@@ -260,14 +263,15 @@ def stiff_limit(tyre: TyreTable) -> list[list[float]]:
     return distances
 
 
-def _stiff_limit_rows(ends: list[list[float]]) -> list[Row]:
+def _stiff_suspension_rows(distances_by_stiffness: list[list[float]]) -> list[Row]:
+    """Row: stiffer springs bring the box's J-turn closer to that of the vehicle in the plane."""
     return [
         Observed(
             "braking_suspension.limit",
             SYSTEM,
             "ratio of distances from the plane vehicle at the end of the box's J-turn: springs 100 "
             "times as stiff, to the plain springs",
-            ends[-1][1] / ends[0][1],
+            distances_by_stiffness[-1][1] / distances_by_stiffness[0][1],
             "",
         ).at_most(0.05, "stiff springs are the plane vehicle with algebraic load transfer", "shared kernel")
     ]

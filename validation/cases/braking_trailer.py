@@ -17,7 +17,7 @@ from validation.spatial.towing import give_towed_wheels_car_heading, static_load
 
 TITLE = "Braking with a trailer on the suspension"
 SYSTEM: System = "anti-lock"
-ENGINES = ("mujoco", "exudyn")
+ENGINE_NAMES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """Duration (s) of a stop, in the quick and in the full run."""
 STATICS_TOLERANCE = 1e-3
@@ -26,10 +26,10 @@ mrad moves the centre of mass, half a metre above the ball, forward by 5e-4 of i
 ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of axle loads, and of accelerations and stops. A quick run has one engine; a full run also has locked
     wheels, slip control, planted faults, and more vehicles in Exudyn and MuJoCo."""
-    vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)
+    vehicles, engines = (("caravan",), ENGINE_NAMES[:1]) if quick else (tuple(whole.TRAINS), ENGINE_NAMES)
     rows = [_axle_loads_row()]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
     rows += [
@@ -38,11 +38,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for engine in engines
     ]
     if not quick:
-        rows += [_locked_wheels_row(), *_caravan_brakes_rows(), *_slip_control_rows(), *_fault_rows()]
+        rows += [_locked_wheels_row(), *_caravan_brakes_rows(), *_slip_control_rows(), *_planted_fault_rows()]
     return rows, {}
 
 
 def _axle_loads_row() -> Row:
+    """Row: axle loads of car and caravan on the suspension, compared with statics."""
     car = whole.towing_car()
     path = braked_vehicle(car, constant_friction(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
     front, rear, axle, _ = static_loads(car.handling)
@@ -56,32 +57,36 @@ def _axle_loads_row() -> Row:
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
 
-def _acceleration_row(vehicle: str, engine: str) -> Row:
-    accelerations = whole.accelerations(whole.TRAINS[vehicle](), engine)
+def _acceleration_row(vehicle_name: str, engine_name: str) -> Row:
+    """Row: accelerations of a train at random states in an engine, compared with plain code."""
+    accelerations = whole.accelerations(whole.TRAINS[vehicle_name](), engine_name)
     return Observed(
-        f"braking_trailer.accelerations.{vehicle.replace(' ', '_')}.{engine}",
+        f"braking_trailer.accelerations.{vehicle_name.replace(' ', '_')}.{engine_name}",
         SYSTEM,
-        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
+        f"largest difference of the {vehicle_name}'s accelerations in {engine_name} from plain code at "
         f"{whole.STATE_COUNT} states of "
         "any heading",
-        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
+        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle_name)),
         "by the largest",
     ).at_most(1e-12, ROUNDING_REASON, "native")
 
 
-def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
-    path = whole.run(whole.TRAINS[vehicle](), engine, duration)
+def _stop_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
+    """Row: course of a stop of a train in an engine, compared with plain code."""
+    path = whole.run(whole.TRAINS[vehicle_name](), engine_name, duration)
     return Observed(
-        f"braking_trailer.stop.{vehicle}.{engine}",
+        f"braking_trailer.stop.{vehicle_name}.{engine_name}",
         SYSTEM,
-        f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain code, slip controller "
+        f"largest difference of {duration:g} s of a stop of the {vehicle_name} in {engine_name} from plain code, "
+        "slip controller "
         "of all wheels on split and changing friction",
-        whole.path_difference(path, whole.plain_run(vehicle, duration)),
+        whole.path_difference(path, whole.plain_run(vehicle_name, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")
 
 
 def _locked_wheels_row() -> Row:
+    """Row: stopping distance of car and caravan with all wheels locked, compared with the closed form."""
     stopping_way, wanted = train.locked_stop_and_closed_form()
     return Observed(
         "braking_trailer.locked",
@@ -93,6 +98,7 @@ def _locked_wheels_row() -> Row:
 
 
 def _caravan_brakes_rows() -> list[Row]:
+    """Rows: deceleration, axle load and ball force while the caravan brakes alone, compared with the closed form."""
     errors = train.caravan_errors()
     quantities = {
         "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",
@@ -135,7 +141,7 @@ def _slip_control_rows() -> list[Row]:
     ]
 
 
-def _fault_rows() -> list[Row]:
+def _planted_fault_rows() -> list[Row]:
     """Rows: faults planted in the force table that Exudyn and MuJoCo share must be caught."""
     pulled = train.relative_difference(train.caravan_run(train.plant_brakes_on_car), train.caravan_closed_form())
     turned = whole.towing_car.__wrapped__()

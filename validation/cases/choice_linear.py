@@ -24,14 +24,14 @@ SYSTEM: System = "effects"
 SCENE_COUNT, FREQUENCY_JUDGED_COUNT = 40, 10
 """Number of random scenes, three of four with detailed vehicles; and number of these scenes that are also judged by
 frequency responses."""
-NEARBY_COUNT = 8
+NEARBY_SCENE_COUNT = 8
 """Number of random speeds, and of random parameter sets, at which a choice is checked."""
-TOLERANCE = 0.02
+COMMON_TOLERANCE = 0.02
 """Relative tolerance of every other scene; the others have random tolerances from 0.5 to 10 %."""
-QUICK_SEEDS = (2, 5)
+QUICK_SCENE_SEEDS = (2, 5)
 """Seeds of the random scenes of a quick run; in both scenes effects are left out."""
-CHANGE_STAGES = ("predicted", "confirmed")
-JUDGED_RANGE = (1e-4, 0.05)
+STAGES_OF_CHANGE = ("predicted", "confirmed")
+JUDGED_CHANGE_RANGE = (1e-4, 0.05)
 """Smallest and largest relative change whose prediction is judged: above rounding errors, and below 5 %."""
 
 
@@ -41,83 +41,81 @@ class JudgedChoice:
     of the identity that relates covariance and adjoint; frequency_changes (quantities,) : changes by frequency
     responses, or None.
 
-    nearby_ratio : largest change at random speeds and with random parameters, divided by the tolerance;
+    nearby_change_ratio : largest change at random speeds and with random parameters, divided by the tolerance;
     sampled_saving : saving by the covariance of sampled runs.
     """
 
-    scene: LinearRide
-    choice: RideChoice
+    ride: LinearRide
+    effect_choice: RideChoice
     identity_error: float
     frequency_changes: np.ndarray | None
-    nearby_ratio: float
+    nearby_change_ratio: float
     sampled_saving: float
 
     @property
-    def saving(self) -> float:
+    def force_call_saving(self) -> float:
         """Number of force calls that the complete scene needs, divided by that of the reduced scene, at equal
         accuracy."""
-        return self.choice.cost_before.calls / self.choice.cost_after.calls
+        return self.effect_choice.cost_before.calls / self.effect_choice.cost_after.calls
 
     @property
     def is_honest(self) -> bool:
         """False if the choice claims to keep the tolerance although frequency responses or, without them, its own
         confirmed changes show that it does not."""
-        changes = self.choice.confirmed_change if self.frequency_changes is None else self.frequency_changes
-        return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
+        changes = self.effect_choice.confirmed_change if self.frequency_changes is None else self.frequency_changes
+        return not self.effect_choice.within_tolerance or bool((abs(changes) <= self.ride.tolerance * (1 + 1e-2)).all())
 
 
-def judged_choice_of(scene: LinearRide, by_frequency: bool) -> JudgedChoice:
+def judge_choice_for_ride(ride: LinearRide, with_frequency_responses: bool) -> JudgedChoice:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
-    ``by_frequency``, by frequency responses."""
-    chooser = chooser_over_speeds(scene)
+    ``with_frequency_responses``, by frequency responses."""
+    chooser = chooser_over_speeds(ride)
     choice, full_scene = chooser.choose(), chooser.full_scenes[0]
-    rest = full_scene.reduced(reduced_without(scene.scene, choice.left_out))
+    rest = full_scene.reduced(reduced_without(ride.scene, choice.left_out))
     two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return JudgedChoice(
-        scene,
+        ride,
         choice,
         float(abs(two / deviation - 1).max()),
-        changes_by_frequency(chooser, choice) if by_frequency else None,
-        worst_nearby(chooser, chosen, NEARBY_COUNT if chosen else 0, NEARBY_COUNT),
+        changes_by_frequency(chooser, choice) if with_frequency_responses else None,
+        worst_nearby(chooser, chosen, NEARBY_SCENE_COUNT if chosen else 0, NEARBY_SCENE_COUNT),
         measured_step(chooser, chosen) / measured_step(chooser, none) if chosen else 1.0,
     )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of forty scenes of random vehicles and speed ranges, and of the published half car. A quick run has two
     random scenes and the half car."""
-    seeds = QUICK_SEEDS if quick else range(SCENE_COUNT)
+    seeds = QUICK_SCENE_SEEDS if quick else range(SCENE_COUNT)
     choices = [
-        judged_choice_of(
-            random_linear_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+        judge_choice_for_ride(
+            random_linear_ride(seed, COMMON_TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
             quick or seed < FREQUENCY_JUDGED_COUNT,
         )
         for seed in seeds
     ]
-    rows = [*_tolerance_rows(choices), _adjoint_identity_row(choices), *_nearby_and_saving_rows(choices)]
+    rows = [*_kept_tolerance_rows(choices), _adjoint_identity_row(choices), *_nearby_and_saving_rows(choices)]
     if not quick:
-        rows += [_prediction_row(choices), _saving_row(choices), *_solver_count_rows()]
+        rows += [_predicted_change_row(choices), _saving_row(choices), *_solved_equation_count_rows()]
     pair_rows, pair = _half_car_rows()
-    return [*rows, *pair_rows, *_activity_rows()], {
+    return [*rows, *pair_rows, *_energy_activity_rows()], {
         "scenes": [_summary_of_choice(choice) for choice in choices],
         "pair": pair,
     }
 
 
-def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
-    share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in choices]))
-    lies = sum(not judged_choice.is_honest for judged_choice in choices)
-    second = [judged_choice for judged_choice in choices if judged_choice.frequency_changes is not None]
-    gap = max(
-        float(abs(judged_choice.frequency_changes - judged_choice.choice.confirmed_change).max())
-        for judged_choice in second
-    )
+def _kept_tolerance_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
+    """Rows: share of scenes whose tolerance is kept, and scenes for which the choice claims so wrongly."""
+    share = float(np.mean([judged.effect_choice.within_tolerance for judged in judged_choices]))
+    lies = sum(not judged.is_honest for judged in judged_choices)
+    second = [judged for judged in judged_choices if judged.frequency_changes is not None]
+    gap = max(float(abs(judged.frequency_changes - judged.effect_choice.confirmed_change).max()) for judged in second)
     return [
         Observed(
             "choice_linear.kept",
             SYSTEM,
-            f"share of {len(choices)} random scenes whose tolerance is kept after confirmation",
+            f"share of {len(judged_choices)} random scenes whose tolerance is kept after confirmation",
             share,
             "",
         ).within(1.0, 0.05, "asked: 95 of 100", "none"),
@@ -141,14 +139,14 @@ def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
     ]
 
 
-def _prediction_row(choices: list[JudgedChoice]) -> Row:
+def _predicted_change_row(judged_choices: list[JudgedChoice]) -> Row:
     """Row: share of predicted changes that are within a factor of 2 of the confirmed ones, over all choices and all
     quantities whose change is above rounding and below 5 %."""
     predicted, confirmed_ = (
-        np.concatenate([getattr(judged_choice.choice, f"{stage}_change") for judged_choice in choices])
-        for stage in CHANGE_STAGES
+        np.concatenate([getattr(judged.effect_choice, f"{stage}_change") for judged in judged_choices])
+        for stage in STAGES_OF_CHANGE
     )
-    is_judged = (abs(confirmed_) > JUDGED_RANGE[0]) & (abs(confirmed_) < JUDGED_RANGE[1])
+    is_judged = (abs(confirmed_) > JUDGED_CHANGE_RANGE[0]) & (abs(confirmed_) < JUDGED_CHANGE_RANGE[1])
     ratios = predicted[is_judged] / confirmed_[is_judged]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
     return Observed(
@@ -165,40 +163,41 @@ def _prediction_row(choices: list[JudgedChoice]) -> Row:
     )
 
 
-def _adjoint_identity_row(choices: list[JudgedChoice]) -> Row:
+def _adjoint_identity_row(judged_choices: list[JudgedChoice]) -> Row:
+    """Row: largest error of the identity of covariance and adjoint over all scenes."""
     return Observed(
         "choice_linear.identity",
         SYSTEM,
         "difference of the variance of what is left, from the whole scene's covariance and the "
         "reduced adjoint, from the reduced covariance, worst of all scenes",
-        max(judged_choice.identity_error for judged_choice in choices),
+        max(judged.identity_error for judged in judged_choices),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
 
 
-def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
+def _nearby_and_saving_rows(judged_choices: list[JudgedChoice]) -> list[Row]:
     """Rows over all scenes: whether the tolerance also holds at other speeds and with changed parameters, and the
     saving. Both are computed by methods that the choice does not use."""
     told_in_advance = sum(
-        bool(judged_choice.choice.refusal_texts) and not judged_choice.choice.left_out for judged_choice in choices
+        bool(judged.effect_choice.refusal_texts) and not judged.effect_choice.left_out for judged in judged_choices
     )
-    gaps = [abs(judged_choice.saving / judged_choice.sampled_saving - 1.0) for judged_choice in choices]
-    saving = [judged_choice for judged_choice in choices if judged_choice.choice.left_out]
+    gaps = [abs(judged.force_call_saving / judged.sampled_saving - 1.0) for judged in judged_choices]
+    saving = [judged for judged in judged_choices if judged.effect_choice.left_out]
     return [
         Observed(
             "choice_linear.nearby",
             SYSTEM,
-            f"largest ratio of the change to the tolerance in {len(saving)} of {len(choices)} scenes in "
-            f"which effects were left out, {NEARBY_COUNT} random speeds each, every mass, stiffness and "
+            f"largest ratio of the change to the tolerance in {len(saving)} of {len(judged_choices)} scenes in "
+            f"which effects were left out, {NEARBY_SCENE_COUNT} random speeds each, every mass, stiffness and "
             "damping up to 5 % off at random",
-            max(judged_choice.nearby_ratio for judged_choice in choices),
+            max(judged.nearby_change_ratio for judged in judged_choices),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
             "choice_linear.said",
             SYSTEM,
-            f"share of {len(choices)} scenes in which all effects that could go were refused with a reason",
-            told_in_advance / len(choices),
+            f"share of {len(judged_choices)} scenes in which all effects that could go were refused with a reason",
+            told_in_advance / len(judged_choices),
             "",
         ).at_most(0.1, "asked: at most a tenth", "none"),
         Observed(
@@ -219,7 +218,7 @@ def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
-            str(sum(judged_choice.saving < 1.0 + EQUAL_COST_LOG for judged_choice in saving)),
+            str(sum(judged.force_call_saving < 1.0 + EQUAL_COST_LOG for judged in saving)),
             "0",
             "what saves nothing stays in",
             "none",
@@ -227,8 +226,9 @@ def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
     ]
 
 
-def _saving_row(choices: list[JudgedChoice]) -> Row:
-    saved = [judged_choice.saving for judged_choice in choices if judged_choice.scene.tolerance == TOLERANCE]
+def _saving_row(judged_choices: list[JudgedChoice]) -> Row:
+    """Row: median saving of force calls over the scenes with the common tolerance."""
+    saved = [judged.force_call_saving for judged in judged_choices if judged.ride.tolerance == COMMON_TOLERANCE]
     return Observed(
         "choice_linear.saving",
         SYSTEM,
@@ -239,7 +239,7 @@ def _saving_row(choices: list[JudgedChoice]) -> Row:
     ).beside("", "it depends on what is asked of which vehicle: a wheel's force needs the wheel", "none")
 
 
-def _solver_count_rows() -> list[Row]:
+def _solved_equation_count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and of Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom, divided by the square of its number of effects."""
     chooser = Chooser.from_scene(car_scene())
@@ -262,6 +262,7 @@ def _solver_count_rows() -> list[Row]:
 
 
 def _half_car_chooser() -> Chooser:
+    """Chooser of effects for the published half car."""
     return Chooser.from_scene(load(HALF_CAR_SCENE))
 
 
@@ -303,7 +304,7 @@ def _half_car_rows() -> tuple[list[Row], dict[str, Any]]:
     ], {"alone": alone.tolist(), "both": both.tolist(), "step": step}
 
 
-def _activity_rows() -> list[Row]:
+def _energy_activity_rows() -> list[Row]:
     """Rows: the pitch inertia has a large energy activity, yet locking the pitch does not change the bounce of a
     symmetric body."""
     chooser = _half_car_chooser()
@@ -332,14 +333,15 @@ def _activity_rows() -> list[Row]:
 
 
 def _summary_of_choice(judged_choice: JudgedChoice) -> dict[str, Any]:
-    choice = judged_choice.choice
+    """Numbers of a choice that the report's tables and figure need."""
+    choice = judged_choice.effect_choice
     return {
-        "tolerance": judged_choice.scene.tolerance,
+        "tolerance": judged_choice.ride.tolerance,
         "predicted": choice.predicted_change.tolist(),
         "confirmed": choice.confirmed_change.tolist(),
-        "saving": judged_choice.saving,
+        "saving": judged_choice.force_call_saving,
         "kept": choice.within_tolerance,
-        "nearby": judged_choice.nearby_ratio,
+        "nearby": judged_choice.nearby_change_ratio,
         "measured": judged_choice.sampled_saving,
         "said": list(choice.refusal_texts),
         "left out": len(choice.left_out),
@@ -367,7 +369,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
         100 * abs(np.array([v for judged_choice in case_data["scenes"] for v in judged_choice[key]]))
-        for key in CHANGE_STAGES
+        for key in STAGES_OF_CHANGE
     )
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
@@ -386,10 +388,10 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     add_heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
-    return [(FIGURE_TEXT, figure)]
+    return [(FIGURE_CAPTION, figure)]
 
 
-FIGURE_TEXT = (
+FIGURE_CAPTION = (
     "Random scenes of vehicles, most with stiff bushings and light parts on stiff mounts: what saves calls is left out "
     "as far as the tolerance allows, predicted from one covariance and one adjoint solve of the whole scene, and "
     "confirmed by the exact solve of what is left, between the speeds and with parameters off."

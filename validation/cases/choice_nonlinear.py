@@ -17,9 +17,9 @@ from validation.ride.drawn_rides import COPIES, NonlinearRide, random_nonlinear_
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
-SCENE_COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
+SCENE_COUNT_BY_SYSTEM = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
 """Number of random scenes of each system."""
-ENGINES = {
+ENGINES_BY_SYSTEM = {
     "pitch-plane": ("reference", "mujoco"),
     "wheelset": ("reference", "mujoco", "exudyn"),
     "braking": ("mujoco", "reference", "reference"),
@@ -31,35 +31,43 @@ FRESH_COPIES_RATIO, FRESH_SEED = 4, 77
 these copies."""
 UNDERSAMPLED_SEED, FINE_TOLERANCE = 4, 0.005
 """Seed of a random ride, and a tolerance that is too fine for the fewest Monte Carlo copies."""
-RESAMPLE_COUNT, LOW_QUANTILE = 4000, 0.0015
+RESAMPLE_COUNT, SIGNIFICANT_CHANGE_QUANTILE = 4000, 0.0015
 """Number of bootstrap samples of the copies, and the quantile of the resampled changes that counts as significant."""
-QUICK_SEEDS = (0, 2, 3)
+QUICK_SCENE_SEEDS = (0, 2, 3)
 """Seeds of the pitch-plane scenes in a quick run, which has no other system."""
-JUDGED_RANGE = (1e-4, 0.05)
+JUDGED_CHANGE_RANGE = (1e-4, 0.05)
 """Smallest and largest relative change whose prediction is judged, as for linear scenes."""
 
 
-def judge_choice(system: str, seed: int) -> ChoiceCheckedByRuns:
+def judge_choice_for_scene(system_name: str, seed: int) -> ChoiceCheckedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
-    if system == "ride":
-        return judge_ride(random_nonlinear_ride(seed))
-    return choice_checked_by_runs(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+    if system_name == "ride":
+        return judge_choice_for_ride(random_nonlinear_ride(seed))
+    return choice_checked_by_runs(
+        draw_scene(system_name, seed),
+        system_name,
+        ENGINES_BY_SYSTEM[system_name][seed % len(ENGINES_BY_SYSTEM[system_name])],
+    )
 
 
-def judge_ride(bent_ride: NonlinearRide) -> ChoiceCheckedByRuns:
+def judge_choice_for_ride(nonlinear_ride: NonlinearRide) -> ChoiceCheckedByRuns:
     """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
     that the choice did not use."""
-    engine = ENGINES["ride"][0]
-    choice = Chooser(bent_ride.prepared_in_time(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
-    fresh = Variants(bent_ride.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
+    engine = ENGINES_BY_SYSTEM["ride"][0]
+    choice = Chooser(
+        nonlinear_ride.prepared_in_time(), engine, list(nonlinear_ride.quantities), nonlinear_ride.tolerance
+    ).choose()
+    fresh = Variants(nonlinear_ride.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.quantities_of_run(), fresh.quantities_of_run(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
-        return ChoiceCheckedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
+        return ChoiceCheckedByRuns(
+            "ride", engine, nonlinear_ride, choice, np.full(len(nonlinear_ride.quantities), np.inf)
+        )
     again = [
         _significant_change(full_scene.quantity(name).cases[0], rest.quantity(name).cases[0])
-        for name in bent_ride.quantities
+        for name in nonlinear_ride.quantities
     ]
-    return ChoiceCheckedByRuns("ride", engine, bent_ride, choice, np.array(again))
+    return ChoiceCheckedByRuns("ride", engine, nonlinear_ride, choice, np.array(again))
 
 
 def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.ndarray) -> float:
@@ -69,32 +77,37 @@ def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.
         len(full_mean_squares), size=(RESAMPLE_COUNT, len(full_mean_squares))
     )
     changes = np.abs(np.sqrt(reduced_mean_squares[picked].mean(axis=1) / full_mean_squares[picked].mean(axis=1)) - 1.0)
-    return float(np.quantile(changes, LOW_QUANTILE))
+    return float(np.quantile(changes, SIGNIFICANT_CHANGE_QUANTILE))
 
 
 @allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of random scenes of four systems; a quick run has three scenes of the pitch plane."""
-    seeds = {"pitch-plane": QUICK_SEEDS} if quick else {system: range(count) for system, count in SCENE_COUNTS.items()}
-    choices = [judge_choice(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
+    seeds = (
+        {"pitch-plane": QUICK_SCENE_SEEDS}
+        if quick
+        else {system: range(count) for system, count in SCENE_COUNT_BY_SYSTEM.items()}
+    )
+    choices = [judge_choice_for_scene(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
         *_kept_tolerance_rows(choices),
-        _prediction_row(choices, quick),
+        _predicted_change_row(choices, quick),
         *(row for system in seeds for row in _saving_rows(choices, system)),
     ]
-    rows += [] if quick else [_refusal_row()]
+    rows += [] if quick else [_refused_choice_row()]
     return rows, {"scenes": [_summary_of_choice(judged_choice) for judged_choice in choices], "systems": list(seeds)}
 
 
-def _kept_tolerance_rows(choices: list[ChoiceCheckedByRuns]) -> list[Row]:
+def _kept_tolerance_rows(judged_choices: list[ChoiceCheckedByRuns]) -> list[Row]:
+    """Rows: share of scenes whose tolerance is kept, and number of choices that claim so wrongly."""
     kept_share = float(
-        np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in choices])
+        np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in judged_choices])
     )
     return [
         Observed(
             "choice_nonlinear.kept",
             SYSTEM,
-            f"share of {len(choices)} random scenes whose tolerance is kept",
+            f"share of {len(judged_choices)} random scenes whose tolerance is kept",
             kept_share,
             "",
         ).within(1.0, 0.05, "asked: at least 95 of 100", "none"),
@@ -102,19 +115,19 @@ def _kept_tolerance_rows(choices: list[ChoiceCheckedByRuns]) -> list[Row]:
             "choice_nonlinear.honest",
             SYSTEM,
             "choices that are reported as kept although two more runs show that they are not",
-            float(sum(not judged_choice.is_honest for judged_choice in choices)),
+            float(sum(not judged_choice.is_honest for judged_choice in judged_choices)),
             "",
         ).at_most(0.0, "asked: never", "none"),
     ]
 
 
-def _refusal_row() -> Row:
+def _refused_choice_row() -> Row:
     """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed the
     tolerance."""
     asked, outcome = random_nonlinear_ride(UNDERSAMPLED_SEED), "a choice"
     try:
         Chooser(
-            asked.prepared_in_time(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE
+            asked.prepared_in_time(FEWEST_COPIES), ENGINES_BY_SYSTEM["ride"][0], list(asked.quantities), FINE_TOLERANCE
         ).choose()
     except InputError as error:
         outcome = "refused" if "samples would tell" in error.allowed else error.allowed
@@ -129,18 +142,22 @@ def _refusal_row() -> Row:
     )
 
 
-def _predicted_and_confirmed(choices: list[ChoiceCheckedByRuns]) -> np.ndarray:
-    """Predicted and confirmed relative changes (n, 2) of all quantities whose confirmed change is in JUDGED_RANGE."""
+def _predicted_and_confirmed_changes(judged_choices: list[ChoiceCheckedByRuns]) -> np.ndarray:
+    """Predicted and confirmed relative changes (n, 2) of all quantities whose confirmed change is in
+    JUDGED_CHANGE_RANGE."""
     pairs = [
         (p, c)
-        for judged_choice in choices
+        for judged_choice in judged_choices
         for p, c in zip(judged_choice.choice.predicted_change, judged_choice.choice.confirmed_change, strict=True)
     ]
-    return np.array([pair for pair in pairs if JUDGED_RANGE[0] < pair[1] < JUDGED_RANGE[1]]).reshape(-1, 2)
+    return np.array([pair for pair in pairs if JUDGED_CHANGE_RANGE[0] < pair[1] < JUDGED_CHANGE_RANGE[1]]).reshape(
+        -1, 2
+    )
 
 
-def _prediction_row(choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
-    ratios = np.divide(*_predicted_and_confirmed(choices).T)
+def _predicted_change_row(judged_choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
+    """Row: share of the predicted changes that are within a factor of 2 of the confirmed ones."""
+    ratios = np.divide(*_predicted_and_confirmed_changes(judged_choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
     quantity = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
@@ -151,17 +168,22 @@ def _prediction_row(choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
     return Observed(name, SYSTEM, quantity, share, "").within(1.0, 0.05, asked, "none")
 
 
-def _saving_rows(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
-    of_system = [judged_choice for judged_choice in choices if judged_choice.system == system]
+def _saving_rows(judged_choices: list[ChoiceCheckedByRuns], system_name: str) -> list[Row]:
+    """Rows: saving of force calls and of computing time in the scenes of one system."""
+    of_system = [judged_choice for judged_choice in judged_choices if judged_choice.system == system_name]
     calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
     seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
-    name = f"choice_nonlinear.saving.{system}"
-    note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
+    name = f"choice_nonlinear.saving.{system_name}"
+    note = (
+        "steps within a sample alone may grow"
+        if system_name == "braking"
+        else "it depends on the step that a scene has"
+    )
     return [
         Observed(
             name,
             SYSTEM,
-            f"ratio of calls before and after the choice, median of {len(of_system)} scenes of {system}",
+            f"ratio of calls before and after the choice, median of {len(of_system)} scenes of {system_name}",
             float(np.median(calls[:, 0] / calls[:, 2])),
             "times",
         ).aim(5.0, note, "at least"),
@@ -169,7 +191,7 @@ def _saving_rows(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
             f"{name}.step",
             SYSTEM,
             "ratio of calls before and after longer steps alone, with all effects, median of "
-            f"{len(of_system)} scenes of {system}",
+            f"{len(of_system)} scenes of {system_name}",
             float(np.median(calls[:, 0] / calls[:, 1])),
             "times",
         ).beside("", "what is left is due to effects", "none"),
@@ -184,6 +206,7 @@ def _saving_rows(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
 
 
 def _summary_of_choice(judged_choice: ChoiceCheckedByRuns) -> Saved:
+    """Numbers of a choice that the report's tables and figure need."""
     choice = judged_choice.choice
     return {
         "system": judged_choice.system,
@@ -263,10 +286,10 @@ def draw(case_data: Saved) -> Drawn:
     left.legend(loc="upper left")
     right.legend(loc="best")
     add_heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
-    return [(FIGURE_TEXT, figure)]
+    return [(FIGURE_CAPTION, figure)]
 
 
-FIGURE_TEXT = (
+FIGURE_CAPTION = (
     "Random scenes of half cars on roads, wheelsets, braked trucks and rides on bent springs: effects that the "
     "quantities can do without are left out and steps lengthened as far as the tolerance allows, predicted from runs "
     "without one and two effects in steps as long as hardly matters, and confirmed by the whole run."

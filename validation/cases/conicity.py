@@ -18,35 +18,37 @@ from validation.common.scenes import data_folder
 TITLE = "Equivalent conicity by EN 15302"
 SYSTEM: System = "contact"
 TABLE_FOLDER, PROFILE_NAMES = "en15302", ("E1", "E2", "E3", "E4")
-TABLE_SPACING = 0.1
+TABLE_ROW_SPACING = 0.1
 """Lateral distance (mm) between the rows of the standard's tables, which are symmetric about zero."""
-CONICITY_TOLERANCE = 0.003
+CONICITY_ERROR_BOUND = 0.003
 """Largest error of the conicity that is asked for; the standard prints three digits."""
 ROUNDING_TOLERANCE = 1e-11
-LATERAL_SHIFTS = np.linspace(-8.0, 8.0, 161)
+LATERAL_DISPLACEMENTS = np.linspace(-8.0, 8.0, 161)
 """Lateral displacements (mm) of the wheelset in the tables of the closed forms."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the closed forms and of the standard's profiles; a full run also has a wheelset with wheels of unequal
     radii."""
-    rows = [*_closed_form_rows(), _cubic_difference_row(), _refusal_row()]
+    rows = [*_closed_form_rows(), _cubic_radius_difference_row(), _refused_tables_row()]
     saved_data: dict[str, Any] = {}
     for name in PROFILE_NAMES:
         of_standard, saved = _reference_profile_rows(name)
         rows += of_standard
         saved_data |= saved
     if not quick:
-        rows += _mirror_rows()
+        rows += _exchanged_wheels_rows()
     return rows, {"standard": saved_data}
 
 
-def _relative_error(wave_period: float, exact: float) -> float:
-    return abs(wave_period / exact - 1.0)
+def _relative_period_error(wave_period: float, exact_period: float) -> float:
+    """Relative error of the wave's period."""
+    return abs(wave_period / exact_period - 1.0)
 
 
-def _closed_form_row(row_name: str, quantity: str, error: float, tolerance_reason: str) -> Row:
-    return Observed(f"conicity.{row_name}", SYSTEM, quantity, error, "").at_most(
+def _closed_form_row(row_name: str, quantity_name: str, relative_error: float, tolerance_reason: str) -> Row:
+    """Row: relative error of a quantity whose exact value has a closed form."""
+    return Observed(f"conicity.{row_name}", SYSTEM, quantity_name, relative_error, "").at_most(
         ROUNDING_TOLERANCE, tolerance_reason, "closed form"
     )
 
@@ -54,16 +56,20 @@ def _closed_form_row(row_name: str, quantity: str, error: float, tolerance_reaso
 def _closed_form_rows() -> list[Row]:
     """Rows on tables of the difference of rolling radii that are exact between their rows, so that errors are due to
     rounding alone."""
-    cone = max(abs(equivalent_conicity(LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS, a) / 0.05 - 1.0) for a in (0.1, 3.0, 8.0))
-    wave = klingel_wave(RollingRadiusTable(LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS + 1.0 * 0.1), 3.0)
+    cone = max(
+        abs(equivalent_conicity(LATERAL_DISPLACEMENTS, 0.1 * LATERAL_DISPLACEMENTS, a) / 0.05 - 1.0)
+        for a in (0.1, 3.0, 8.0)
+    )
+    wave = klingel_wave(RollingRadiusTable(LATERAL_DISPLACEMENTS, 0.1 * LATERAL_DISPLACEMENTS + 1.0 * 0.1), 3.0)
     tread = np.where(
-        np.abs(LATERAL_SHIFTS) < 3.0,
-        0.05 * LATERAL_SHIFTS,
-        np.sign(LATERAL_SHIFTS) * (0.15 + 0.8 * (np.abs(LATERAL_SHIFTS) - 3.0)),
+        np.abs(LATERAL_DISPLACEMENTS) < 3.0,
+        0.05 * LATERAL_DISPLACEMENTS,
+        np.sign(LATERAL_DISPLACEMENTS) * (0.15 + 0.8 * (np.abs(LATERAL_DISPLACEMENTS) - 3.0)),
     )
     bent = max(
-        _relative_error(
-            klingel_wave(RollingRadiusTable(LATERAL_SHIFTS, tread), a).period, two_slope_period(0.05, 0.8, 3.0, a)
+        _relative_period_error(
+            klingel_wave(RollingRadiusTable(LATERAL_DISPLACEMENTS, tread), a).period,
+            two_slope_period(0.05, 0.8, 3.0, a),
         )
         for a in (3.1, 5.0, 7.9)
     )
@@ -71,7 +77,8 @@ def _closed_form_rows() -> list[Row]:
     left, right = 0.1, 0.4
     uneven = klingel_wave(
         RollingRadiusTable(
-            LATERAL_SHIFTS, np.where(LATERAL_SHIFTS < 0.0, left * LATERAL_SHIFTS, right * LATERAL_SHIFTS)
+            LATERAL_DISPLACEMENTS,
+            np.where(LATERAL_DISPLACEMENTS < 0.0, left * LATERAL_DISPLACEMENTS, right * LATERAL_DISPLACEMENTS),
         ),
         3.0,
     )
@@ -82,7 +89,7 @@ def _closed_form_rows() -> list[Row]:
         _closed_form_row(
             "offset",
             "cones on wheels of unequal radii, relative error",
-            _relative_error(wave.conicity, 0.05),
+            _relative_period_error(wave.conicity, 0.05),
             "the offset moves the centre alone",
         ),
         _closed_form_row(
@@ -97,13 +104,13 @@ def _closed_form_rows() -> list[Row]:
         _closed_form_row(
             "jump",
             "period with a jump in the middle",
-            _relative_error(jump.period, 4.0 * math.sqrt(4.0 / 0.3)),
+            _relative_period_error(jump.period, 4.0 * math.sqrt(4.0 / 0.3)),
             "parabolas",
         ),
         _closed_form_row(
             "uneven",
             "period of a wheel steeper than the other",
-            _relative_error(uneven.period, halves),
+            _relative_period_error(uneven.period, halves),
             "two half sines",
         ),
         _closed_form_row(
@@ -115,17 +122,17 @@ def _closed_form_rows() -> list[Row]:
     ]
 
 
-def two_slope_period(inner_slope: float, outer_slope: float, bend: float, amplitude: float) -> float:
+def two_slope_period(inner_slope: float, outer_slope: float, bend_displacement: float, amplitude: float) -> float:
     """Period of Klingel's wave if the difference of rolling radii has the slope ``inner_slope`` up to the displacement
-    ``bend`` and ``outer_slope`` beyond. The amplitude is larger than ``bend``."""
-    rest = inner_slope * bend / outer_slope
-    deep, root = amplitude - bend + rest, math.sqrt(outer_slope)
+    ``bend_displacement`` and ``outer_slope`` beyond. The amplitude is larger than ``bend_displacement``."""
+    rest = inner_slope * bend_displacement / outer_slope
+    deep, root = amplitude - bend_displacement + rest, math.sqrt(outer_slope)
     speed = root * math.sqrt(deep**2 - rest**2)
-    within = math.atan(math.sqrt(inner_slope) * bend / speed) / math.sqrt(inner_slope)
+    within = math.atan(math.sqrt(inner_slope) * bend_displacement / speed) / math.sqrt(inner_slope)
     return 4.0 * (within + math.acos(rest / deep) / root)
 
 
-def _cubic_difference_row() -> Row:
+def _cubic_radius_difference_row() -> Row:
     """Row: observed order of the period's error in the table spacing, for a difference of rolling radii that is cubic
     in the displacement. The exact period is an elliptic integral."""
     a, b, amplitude = 0.1, 0.02, 4.0
@@ -134,21 +141,23 @@ def _cubic_difference_row() -> Row:
     errors = []
     for rows in (161, 321):
         y = np.linspace(-8.0, 8.0, rows)
-        errors.append(_relative_error(klingel_wave(RollingRadiusTable(y, a * y + b * y**3), amplitude).period, exact))
+        errors.append(
+            _relative_period_error(klingel_wave(RollingRadiusTable(y, a * y + b * y**3), amplitude).period, exact)
+        )
     order = math.log2(errors[0] / errors[1])
     why = "complete elliptic integral; lines between rows are off by the square of their distance"
     observed = Observed("conicity.cubic", SYSTEM, "order of the error in the spacing, dr = a y + b y^3", order, "")
     return observed.within(2.0, 0.1, why, "closed form")
 
 
-def _refusal_row() -> Row:
+def _refused_tables_row() -> Row:
     """Row: tables of the difference of rolling radii that allow no periodic wave are refused."""
     refused = 0
     for y, dr, amplitude in (
-        (LATERAL_SHIFTS, -LATERAL_SHIFTS, 3.0),
-        (LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS + 1.0, 3.0),
-        (LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS, 8.1),
-        (LATERAL_SHIFTS, 0.1 * (LATERAL_SHIFTS + 6.0), 3.0),
+        (LATERAL_DISPLACEMENTS, -LATERAL_DISPLACEMENTS, 3.0),
+        (LATERAL_DISPLACEMENTS, 0.1 * LATERAL_DISPLACEMENTS + 1.0, 3.0),
+        (LATERAL_DISPLACEMENTS, 0.1 * LATERAL_DISPLACEMENTS, 8.1),
+        (LATERAL_DISPLACEMENTS, 0.1 * (LATERAL_DISPLACEMENTS + 6.0), 3.0),
     ):
         try:
             equivalent_conicity(y, dr, amplitude)
@@ -170,7 +179,7 @@ def _reference_profile_rows(profile_name: str) -> tuple[list[Row], dict[str, Any
         ids = (f"conicity.{profile_name}.outside", f"conicity.{profile_name}.error")
         return [not_run(id, SYSTEM, quantity, reason) for id, quantity in zip(ids, quantities, strict=True)], {}
     dr = np.array(table_file.read_text().split(), float)
-    y = TABLE_SPACING * (np.arange(dr.size) - (dr.size - 1) / 2.0)
+    y = TABLE_ROW_SPACING * (np.arange(dr.size) - (dr.size - 1) / 2.0)
     limits = np.loadtxt(table_file.with_name(f"ben_{profile_name}.dat"))
     limits = limits[limits[:, 0] <= y[-1] + 1e-9]  # beyond, the table says nothing
     amplitudes, printed, upper, lower = limits[:, :4].T
@@ -183,7 +192,7 @@ def _reference_profile_rows(profile_name: str) -> tuple[list[Row], dict[str, Any
         Observed(f"conicity.{profile_name}.outside", SYSTEM, quantities[0], outside, "").at_most(0.0, why, "published"),
         Observed(
             f"conicity.{profile_name}.error", SYSTEM, quantities[1], float(np.abs(seen - printed).max()), ""
-        ).at_most(CONICITY_TOLERANCE, "printed to three digits; the bound asked for", "published"),
+        ).at_most(CONICITY_ERROR_BOUND, "printed to three digits; the bound asked for", "published"),
         Observed(
             f"conicity.{profile_name}.harmonic",
             SYSTEM,
@@ -196,11 +205,12 @@ def _reference_profile_rows(profile_name: str) -> tuple[list[Row], dict[str, Any
     return rows, {profile_name: {key: np.asarray(values).tolist() for key, values in saved.items()}}
 
 
-def _harmonic_conicity(y: np.ndarray, dr: np.ndarray, wave: KlingelWave) -> float:
-    return harmonic_linearised_conicity(y, dr, wave.amplitude * (1.0 - 1e-9), wave.centre)
+def _harmonic_conicity(y: np.ndarray, radius_difference: np.ndarray, wave: KlingelWave) -> float:
+    """Conicity by the first harmonic of the wave that a table of radius differences gives."""
+    return harmonic_linearised_conicity(y, radius_difference, wave.amplitude * (1.0 - 1e-9), wave.centre)
 
 
-def _mirror_rows() -> list[Row]:
+def _exchanged_wheels_rows() -> list[Row]:
     """Rows: conicity and centre of the wave for wheels of 920 and 918 mm diameter, compared with the mirror image with
     both wheels exchanged."""
     profiles, y = Profiles(), np.arange(-8e-3, 8.0001e-3, 5e-4)

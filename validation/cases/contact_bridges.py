@@ -30,8 +30,8 @@ from validation.contact import slow_wheels
 
 TITLE = "What a contact kernel costs inside an engine"
 SYSTEM: System = "rolling-vehicle"
-STEP = 2e-5
-STEP_COUNTS = {
+TIME_STEP = 2e-5
+STEP_COUNT_BY_BRIDGE = {
     "none": 1000,
     "empty": 600,
     "native": 160,
@@ -42,11 +42,18 @@ STEP_COUNTS = {
 }
 """Number of steps of a timed run, by bridge, for an integrator with one force call per step. The runs take a few
 milliseconds, so that some of them are not disturbed by other processes."""
-CONTACT_LAWS = (("linear", 0), ("fastsim", 7), ("fastsim", 11), ("fastsim", 21), ("fastsim", 41), ("simplified", 21))
+CONTACT_THEORIES_AND_CELLS = (
+    ("linear", 0),
+    ("fastsim", 7),
+    ("fastsim", 11),
+    ("fastsim", 21),
+    ("fastsim", 41),
+    ("simplified", 21),
+)
 """Contact theories, each with a number of cells per strip."""
-MAIN_LAW = CONTACT_LAWS[3]
+MAIN_CONTACT_LAW = CONTACT_THEORIES_AND_CELLS[3]
 WHEEL_COUNTS = (1, 4, 8)
-CALLS_PER_STEP = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
+FORCE_CALLS_PER_STEP = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Number of force calls per step of each integrator."""
 ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 THEORY_NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
@@ -55,124 +62,136 @@ INTEGRATORS = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
 TIMING_ROUNDS, FIGURE_ROUNDS = 48, 6
 """Timing rounds of the set-ups that have rows, which are timed separately because other work between them slows short
 runs; and timing rounds of all set-ups for the table."""
-SHORTEST_RUN = 0.001
+SHORTEST_RUN_SECONDS = 0.001
 TIMING_NOTE = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
 
 @dataclass(frozen=True)
-class Setup:
+class ContactTimingSetup:
     """One way to simulate wheels with contact. bridge: how the engine calls the contact forces (none, empty, native,
-    jitted, plain, or a route of Exudyn's); law: contact theory and number of cells, None where no contact is
+    jitted, plain, or a route of Exudyn's); contact_law: contact theory and number of cells, None where no contact is
     computed."""
 
     engine: str
-    method: str
+    integrator: str
     bridge: str
-    law: tuple[str, int] | None
+    contact_law: tuple[str, int] | None
     wheel_count: int
 
     def law_name(self) -> str:
         """Name of the contact law."""
-        if self.law is None:
+        if self.contact_law is None:
             return "no contact" if self.bridge == "none" else "empty callback"
-        theory, cells = self.law
+        theory, cells = self.contact_law
         return f"FASTSIM, {cells} cells" if theory == "fastsim" else THEORY_NAMES[theory]
 
     @property
     def is_reported(self) -> bool:
         """Whether the report has a row on the cost of this set-up."""
-        return (self.law, self.wheel_count) == (MAIN_LAW, 4) and self.bridge in ("native", ROUTES[0])
+        return (self.contact_law, self.wheel_count) == (MAIN_CONTACT_LAW, 4) and self.bridge in ("native", ROUTES[0])
 
     @property
-    def without_contact(self) -> "Setup":
+    def without_contact(self) -> "ContactTimingSetup":
         """The same set-up without contact."""
-        return replace(self, bridge="none", law=None)
+        return replace(self, bridge="none", contact_law=None)
 
     def wheels(self) -> Wheels:
         """The wheels that this set-up simulates."""
-        theory, cells = self.law or ("none", 21)
+        theory, cells = self.contact_law or ("none", 21)
         return Wheels(self.wheel_count, cast(Theory, theory), cells or 21)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on equal results of threads and engines, and on low speeds; a full run also has the cost of every contact
     law and bridge.
 
     Costs are measured by the full run only: a few timing rounds are not enough.
     """
     rows, done = slow_wheels.rows(quick)
-    rows += [_threads_row(), _agreement_row()]
+    rows += [_equal_bits_in_threads_row(), _engine_agreement_row()]
     data: dict[str, Any] = {"slow": [asdict(run) for run in done]}
     if quick:
         return rows, data
-    setups = all_setups()
+    setups = all_timing_setups()
     listed_setups = [setup for setup in setups if setup.is_reported]
-    rows += _cost_rows(
-        MeasuredTimes([*listed_setups, *(setup.without_contact for setup in listed_setups)], TIMING_ROUNDS)
+    rows += _bridge_cost_rows(
+        MeasuredContactTimes([*listed_setups, *(setup.without_contact for setup in listed_setups)], TIMING_ROUNDS)
     )
-    shown = MeasuredTimes(setups, FIGURE_ROUNDS)
+    shown = MeasuredContactTimes(setups, FIGURE_ROUNDS)
     return rows, {**data, "points": [shown.table_entry(setup) for setup in setups]}
 
 
-def all_setups() -> list[Setup]:
+def all_timing_setups() -> list[ContactTimingSetup]:
     """All timed combinations of engine, integrator, bridge, contact law and number of wheels."""
     setups = []
     for engine, (usual, fine) in INTEGRATORS.items():
         best, *other_bridges = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
         for method, count in (*((usual, count) for count in WHEEL_COUNTS), (fine, 4)):
-            setups += [Setup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
+            setups += [ContactTimingSetup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
             setups += [
-                Setup(engine, method, best, law, count) for law in (CONTACT_LAWS if method == usual else (MAIN_LAW,))
+                ContactTimingSetup(engine, method, best, law, count)
+                for law in (CONTACT_THEORIES_AND_CELLS if method == usual else (MAIN_CONTACT_LAW,))
             ]
         setups += [
-            Setup(engine, method, other_bridge, MAIN_LAW, 4)
+            ContactTimingSetup(engine, method, other_bridge, MAIN_CONTACT_LAW, 4)
             for method in (usual, fine)
             for other_bridge in other_bridges
         ]
-    return [*setups, Setup("mujoco", "Euler", "plain", CONTACT_LAWS[-1], 4)]
+    return [*setups, ContactTimingSetup("mujoco", "Euler", "plain", CONTACT_THEORIES_AND_CELLS[-1], 4)]
 
 
-class MeasuredTimes:
+class MeasuredContactTimes:
     """Measured times (s) of every timing round: per step of each set-up, and per evaluation of the contact forces of
     all wheels."""
 
-    def __init__(self, setups: list[Setup], round_count: int) -> None:
-        self.setups = setups
-        kernels = sorted({(setup.law, setup.wheel_count) for setup in setups if setup.law is not None})
+    def __init__(self, timing_setups: list[ContactTimingSetup], round_count: int) -> None:
+        self.setups = timing_setups
+        kernels = sorted(
+            {(setup.contact_law, setup.wheel_count) for setup in timing_setups if setup.contact_law is not None}
+        )
         runs, loops = (
-            [_timed_march(setup) for setup in setups],
+            [_timed_march(setup) for setup in timing_setups],
             [_timed_kernel(law, wheel_count) for law, wheel_count in kernels],
         )
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        seconds = interleave([*jobs, *(job for job, _ in loops)], round_count, SHORTEST_RUN, clock=time.process_time)
+        seconds = interleave(
+            [*jobs, *(job for job, _ in loops)], round_count, SHORTEST_RUN_SECONDS, clock=time.process_time
+        )
         full_time, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {
-            setup: (a, b, steps - 1) for setup, a, b, (_, steps) in zip(setups, full_time, first, runs, strict=True)
+            setup: (a, b, steps - 1)
+            for setup, a, b, (_, steps) in zip(timing_setups, full_time, first, runs, strict=True)
         }
         self._calls = {kernel: setup / calls for kernel, setup, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
-    def times_by_round(self, setup: Setup) -> tuple[Any, Any, Any]:
+    def times_by_round(self, timing_setup: ContactTimingSetup) -> tuple[Any, Any, Any]:
         """Times (s) by timing round: of a step, of a step without contact (the engine's own share), and of the contact
         kernel in a step."""
         step, bare = (
             (full_time - first) / steps
-            for full_time, first, steps in (self._steps[setup], self._steps[setup.without_contact])
+            for full_time, first, steps in (self._steps[timing_setup], self._steps[timing_setup.without_contact])
         )
-        calls = 1 if setup.bridge == "before each step" else CALLS_PER_STEP[setup.method]
-        return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.wheel_count]
+        calls = 1 if timing_setup.bridge == "before each step" else FORCE_CALLS_PER_STEP[timing_setup.integrator]
+        return (
+            step,
+            bare,
+            0.0
+            if timing_setup.contact_law is None
+            else calls * self._calls[timing_setup.contact_law, timing_setup.wheel_count],
+        )
 
-    def table_entry(self, setup: Setup) -> dict[str, Any]:
+    def table_entry(self, timing_setup: ContactTimingSetup) -> dict[str, Any]:
         """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of the step."""
-        a, b, c = self.times_by_round(setup)
+        a, b, c = self.times_by_round(timing_setup)
         step, bare, kernel = (float(np.median(round_times)) for round_times in (a, b, c))
         share = median((a - b - c) / a)
         return {
-            "engine": setup.engine,
-            "method": setup.method,
-            "bridge": setup.bridge,
-            "law": setup.law_name(),
-            "wheels": setup.wheel_count,
-            "main": setup.law == MAIN_LAW,
+            "engine": timing_setup.engine,
+            "method": timing_setup.integrator,
+            "bridge": timing_setup.bridge,
+            "law": timing_setup.law_name(),
+            "wheels": timing_setup.wheel_count,
+            "main": timing_setup.contact_law == MAIN_CONTACT_LAW,
             "step": step,
             "own": bare,
             "kernel": kernel,
@@ -182,65 +201,71 @@ class MeasuredTimes:
         }
 
 
-def _timed_kernel(law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], Any], int]:
-    wheels = Setup("", "", "native", law, wheel_count).wheels()
+def _timed_kernel(contact_law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], Any], int]:
+    """Function that evaluates the contact forces of all wheels a number of times, and this number."""
+    wheels = ContactTimingSetup("", "", "native", contact_law, wheel_count).wheels()
     q, v = wheels.state()
-    f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if law[0] == "simplified" else 200
+    f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if contact_law[0] == "simplified" else 200
     return lambda: _repeat_kernel(numbers, q, v, f, calls), calls
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_kernel(table_of_wheels, q, v, force_sum, repeats):
-    for _ in range(repeats):
-        forces(start(table_of_wheels), 0.0, start(q), start(v), start(force_sum))
+def _repeat_kernel(wheel_table, q, v, force_sum, repeat_count):
+    for _ in range(repeat_count):
+        forces(start(wheel_table), 0.0, start(q), start(v), start(force_sum))
 
 
-def _timed_march(setup: Setup) -> tuple[Callable[[int], Any], int]:
+def _timed_march(timing_setup: ContactTimingSetup) -> tuple[Callable[[int], Any], int]:
     """Function that simulates a given number of steps, and the number of steps to time."""
-    wheels = setup.wheels()
-    kind = setup.bridge if setup.bridge in STEP_COUNTS else "native"
+    wheels = timing_setup.wheels()
+    kind = timing_setup.bridge if timing_setup.bridge in STEP_COUNT_BY_BRIDGE else "native"
     if wheels.theory == "simplified":
-        kind = "plain simplified" if setup.bridge == "plain" else "simplified"
-    law = library_law(wheels) if setup.bridge == "plain" else None
-    march = (_mujoco_march if setup.engine == "mujoco" else _exudyn_march)(setup, wheels, law)
-    return march, max(2, STEP_COUNTS[kind] // CALLS_PER_STEP[setup.method])
+        kind = "plain simplified" if timing_setup.bridge == "plain" else "simplified"
+    law = contact_law_of_library(wheels) if timing_setup.bridge == "plain" else None
+    march = (_mujoco_march if timing_setup.engine == "mujoco" else _exudyn_march)(timing_setup, wheels, law)
+    return march, max(2, STEP_COUNT_BY_BRIDGE[kind] // FORCE_CALLS_PER_STEP[timing_setup.integrator])
 
 
-def _mujoco_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
-    start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, STEP, setup.method))
+def _mujoco_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law: Any) -> Callable[[int], Any]:
+    """Function that simulates a given number of steps in MuJoCo."""
+    start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, TIME_STEP, timing_setup.integrator))
     callback = {
         "none": lambda: None,
         "empty": lambda: empty_law().ctypes,
         "native": lambda: kernel_law(forces).ctypes,
         "jitted": lambda: python_law(add_forces),
-        "plain": lambda: python_law(law),
-    }[setup.bridge]()
+        "plain": lambda: python_law(contact_law),
+    }[timing_setup.bridge]()
 
-    def job(steps: int) -> None:
+    def job(step_count: int) -> None:
         mujoco.set_mjcb_passive(callback)
         try:
-            march.run(start, steps)
+            march.run(start, step_count)
         finally:
             mujoco.set_mjcb_passive(None)
 
     return job
 
 
-def _exudyn_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
+def _exudyn_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law: Any) -> Callable[[int], Any]:
+    """Function that simulates a given number of steps in Exudyn."""
     zeros, of = [0.0] * wheels.size, None
-    if setup.bridge == "empty":
+    if timing_setup.bridge == "empty":
         of = lambda q, v: zeros  # noqa: E731
-    elif setup.bridge != "none":
-        of = Forces(wheels, law).of
-    rolling, state = Rolling(wheels, of, setup.bridge if setup.bridge in ROUTES else ROUTES[0]), wheels.state()
-    return lambda steps: rolling.run(*state, steps, STEP, setup.method)
+    elif timing_setup.bridge != "none":
+        of = Forces(wheels, contact_law).of
+    rolling, state = (
+        Rolling(wheels, of, timing_setup.bridge if timing_setup.bridge in ROUTES else ROUTES[0]),
+        wheels.state(),
+    )
+    return lambda steps: rolling.run(*state, steps, TIME_STEP, timing_setup.integrator)
 
 
-def library_law(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
+def contact_law_of_library(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     """Contact law that calls the library's Python functions: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
-    def add(table_of_wheels: Array, q: Array, v: Array, force_sum: Array) -> None:
+    def add(wheel_table: Array, q: Array, v: Array, force_sum: Array) -> None:
         pressed: Any
         creep: Any
         for k, (position, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
@@ -258,13 +283,14 @@ def library_law(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     return add
 
 
-def _cost_rows(measured_times: MeasuredTimes) -> list[Row]:
+def _bridge_cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
+    """Rows: cost of the bridge in each engine, with the main contact law at four wheels."""
     rows = []
     for setup in measured_times.setups:
         if not setup.is_reported:
             continue
         step, bare, kernel = measured_times.times_by_round(setup)
-        name, calls = f"contact_bridges.{setup.engine}.{setup.method}", CALLS_PER_STEP[setup.method]
+        name, calls = f"contact_bridges.{setup.engine}.{setup.integrator}", FORCE_CALLS_PER_STEP[setup.integrator]
         if setup.engine == "mujoco":
             value, low, high = median(step / (bare + kernel))
             what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
@@ -272,14 +298,15 @@ def _cost_rows(measured_times: MeasuredTimes) -> list[Row]:
             value, low, high = median((step - bare - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (
-            f"{ENGINE_NAMES[setup.engine]}, {setup.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
+            f"{ENGINE_NAMES[setup.engine]}, {setup.integrator}: {what}, step with FASTSIM at four wheels (21 x 21, "
+            "native, "
             f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
         rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, TIMING_NOTE))
     return rows
 
 
-def _threads_row() -> Row:
+def _equal_bits_in_threads_row() -> Row:
     """Row: runs from ten initial states give the same bits in two threads as in one."""
     wheels = Wheels()
     states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
@@ -296,7 +323,7 @@ def _threads_row() -> Row:
     )
 
 
-def _agreement_row() -> Row:
+def _engine_agreement_row() -> Row:
     """Row: difference of the states in Exudyn and MuJoCo after 0.1 s, by Runge-Kutta's method."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()

@@ -22,7 +22,7 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Creepage and spin coefficients of the linear theory"
 SYSTEM: System = "contact"
-COARSEST_CELLS = 10
+COARSEST_CELL_COUNT = 10
 """Cells per axis of the coarsest of three grids; the others have twice and four times as many. The long axis of a
 slender ellipse has more."""
 COEFFICIENT_NAMES = ("C11", "C22", "C23", "C33")
@@ -30,7 +30,7 @@ COEFFICIENT_TOLERANCES = {"C11": 0.015, "C22": 0.015, "C23": 0.015, "C33": 0.05}
 """Relative tolerance of the published table compared with the exact theory; for C33 it is doubled outside a/b = 0.2 to
 5."""
 POISSON_RATIOS = (0.0, 0.25, 0.5)
-QUICK_RATIOS = (0.8, 2.0)
+QUICK_AXIS_RATIOS = (0.8, 2.0)
 MISPRINTED_C23 = 1.15
 """C23 at a/b = 0.8 and Poisson's ratio 1/4 as some copies of the table print it; 1.25 is right."""
 SOLVER_RESIDUAL, SLIP_RESIDUAL = 3e-6, 1e-4
@@ -51,22 +51,24 @@ SLENDER_ELLIPSES = (
 REFERENCE_NOTE = "the same continuum problem solved on cells, extrapolated to none"
 
 
-def exact_coefficients(axis_ratio: float, poisson_ratio: float, cells: int = COARSEST_CELLS) -> Array:
+def exact_coefficients(axis_ratio: float, poisson_ratio: float, cell_count: int = COARSEST_CELL_COUNT) -> Array:
     """Creepage coefficients C11, C22, C23, C33 (4,) by the exact theory, extrapolated from three grids to infinitely
     small cells."""
-    coarse, middle, fine = (_coefficients_on_grid(axis_ratio, poisson_ratio, n) for n in (cells, 2 * cells, 4 * cells))
+    coarse, middle, fine = (
+        _coefficients_on_grid(axis_ratio, poisson_ratio, n) for n in (cell_count, 2 * cell_count, 4 * cell_count)
+    )
     limit = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
     if axis_ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
         limit[3] = fine[3] + (fine[3] - middle[3]) / 3.0
     return limit
 
 
-def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cells: int) -> Array:
+def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cell_count: int) -> Array:
     """Creepage coefficients (4,) by the exact linear theory on one grid, from unit creepages. C23 is the mean of two
     values: lateral force due to spin, and moment due to lateral creepage."""
     a, b = axis_ratio**0.5, axis_ratio**-0.5
     more = max(1.0, max(axis_ratio, 1.0 / axis_ratio) / 10.0)
-    columns, rows = round(cells * (more if a > b else 1.0)), round(cells * (more if b > a else 1.0))
+    columns, rows = round(cell_count * (more if a > b else 1.0)), round(cell_count * (more if b > a else 1.0))
     dx, dy = 2.0 * a / columns, 2.0 * b / rows
     x, y = centres(columns, dx), centres(rows, dy)
     inside = (x / a) ** 2 + (y[:, None] / b) ** 2 < 1.0
@@ -87,34 +89,37 @@ def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cells: int) -
     return np.array([-fx / area, -fy / area, (turn - side) / 2.0 / area**1.5, -moment / area**2])
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the nodes of the table and for a planted misprint; a full run also compares between and beyond the
     nodes."""
-    ratios, nus = (QUICK_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), POISSON_RATIOS)
+    ratios, nus = (QUICK_AXIS_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), POISSON_RATIOS)
     nodes = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio in ratios for nu in nus]
     data: dict[str, Any] = {"nodes": nodes}
-    rows = [*_node_rows(np.array(nodes)), _misprint_row(np.array(nodes))]
+    rows = [*_table_node_rows(np.array(nodes)), _misprint_row(np.array(nodes))]
     if not quick:
         middle = [(float(ratio), 0.25) for ratio in np.sqrt(RATIOS[1:] * RATIOS[:-1])]  # of every two ratios
         middle += [(ratio, nu) for ratio in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
         data["between"] = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio, nu in middle]
         data["beyond"] = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio, nu in SLENDER_ELLIPSES]
-        rows += _between_rows(np.array(data["between"]), np.array(nodes)) + _beyond_rows(np.array(data["beyond"]))
+        rows += _interpolation_rows(np.array(data["between"]), np.array(nodes)) + _slender_ellipse_rows(
+            np.array(data["beyond"])
+        )
     return rows, data
 
 
-def relative_deviations(exact_rows: Array) -> Array:
-    """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_rows (n, 6): axis ratio,
-    Poisson's ratio, and the four exact coefficients."""
-    c = coefficients(exact_rows[:, 0], exact_rows[:, 1])
-    return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / exact_rows[:, 2:] - 1.0
+def deviations_from_exact(exact_coefficient_rows: Array) -> Array:
+    """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_coefficient_rows (n, 6): axis
+    ratio, Poisson's ratio, and the four exact coefficients."""
+    c = coefficients(exact_coefficient_rows[:, 0], exact_coefficient_rows[:, 1])
+    return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / exact_coefficient_rows[:, 2:] - 1.0
 
 
-def _node_rows(nodes: Array) -> list[Row]:
-    off = np.abs(relative_deviations(nodes))
-    middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
+def _table_node_rows(table_nodes: Array) -> list[Row]:
+    """Rows: largest deviation of each published coefficient at the nodes of the table."""
+    off = np.abs(deviations_from_exact(table_nodes))
+    middle = (table_nodes[:, 0] > 0.19) & (table_nodes[:, 0] < 5.1)
     rows = [
-        _worst_difference_row(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", COEFFICIENT_TOLERANCES[name])
+        _worst_difference_row(name, off[middle, i], table_nodes[middle], "a/b 0.2 to 5", COEFFICIENT_TOLERANCES[name])
         for i, name in enumerate(COEFFICIENT_NAMES)
     ]
     if not middle.all():
@@ -122,7 +127,7 @@ def _node_rows(nodes: Array) -> list[Row]:
             _worst_difference_row(
                 name,
                 off[~middle, i],
-                nodes[~middle],
+                table_nodes[~middle],
                 "a/b 0.1 and 10",
                 COEFFICIENT_TOLERANCES[name] * (1 + (name == "C33")),
             )
@@ -131,21 +136,24 @@ def _node_rows(nodes: Array) -> list[Row]:
     return rows
 
 
-def _worst_difference_row(coefficient: str, deviations: Array, nodes: Array, range_text: str, bound: float) -> Row:
-    ratio, nu = nodes[int(deviations.argmax()), :2]
+def _worst_difference_row(
+    coefficient_name: str, deviations: Array, table_nodes: Array, range_text: str, tolerance: float
+) -> Row:
+    """Row: largest deviation of a coefficient among some nodes, with the node at which it occurs."""
+    ratio, nu = table_nodes[int(deviations.argmax()), :2]
     return Observed(
-        f"contact_coefficients.{coefficient}.{range_text.split()[1]}.{range_text.split()[-1]}",
+        f"contact_coefficients.{coefficient_name}.{range_text.split()[1]}.{range_text.split()[-1]}",
         SYSTEM,
-        f"relative difference of {coefficient} of the published table from the exact theory, {range_text}: worst "
+        f"relative difference of {coefficient_name} of the published table from the exact theory, {range_text}: worst "
         f"of {len(deviations)}, at a/b {ratio:.4g}, nu {nu:g}",
         float(deviations.max()),
         "",
-    ).at_most(bound, REFERENCE_NOTE, "published")
+    ).at_most(tolerance, REFERENCE_NOTE, "published")
 
 
-def _misprint_row(nodes: Array) -> Row:
+def _misprint_row(table_nodes: Array) -> Row:
     """Row: the comparison detects a widespread misprint of C23."""
-    node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
+    node = table_nodes[(np.abs(table_nodes[:, 0] - 0.8) < 1e-9) & (table_nodes[:, 1] == 0.25)][0]
     off = abs(MISPRINTED_C23 / node[4] - 1.0)
     return behaviour_row(
         "contact_coefficients.misprint",
@@ -158,14 +166,14 @@ def _misprint_row(nodes: Array) -> Row:
     )
 
 
-def _between_rows(exact_rows: Array, nodes: Array) -> list[Row]:
+def _interpolation_rows(exact_coefficient_rows: Array, table_nodes: Array) -> list[Row]:
     """Rows: interpolation error of the coefficients. This is the deviation between two nodes of the table minus the
     mean deviation at these nodes."""
-    at_nodes = relative_deviations(nodes).reshape(len(RATIOS), len(POISSON_RATIOS), 4)
+    at_nodes = deviations_from_exact(table_nodes).reshape(len(RATIOS), len(POISSON_RATIOS), 4)
     count = len(RATIOS) - 1
     along_ratio = (at_nodes[1:, 1] + at_nodes[:-1, 1]) / 2.0
     along_nu = [(at_nodes[i, k] + at_nodes[i, k + 1]) / 2.0 for i in (0, 9, 18) for k in (0, 1)]
-    off = np.abs(relative_deviations(exact_rows) - np.concatenate((along_ratio, along_nu)))
+    off = np.abs(deviations_from_exact(exact_coefficient_rows) - np.concatenate((along_ratio, along_nu)))
     spans = {"ratios": slice(0, count), "nu": slice(count, None)}
     why = "1 % is asked; the deviation of the nodes on both sides is taken off"
     return [
@@ -181,19 +189,25 @@ def _between_rows(exact_rows: Array, nodes: Array) -> list[Row]:
     ]
 
 
-def _beyond_rows(exact_rows: Array) -> list[Row]:
+def _slender_ellipse_rows(exact_coefficient_rows: Array) -> list[Row]:
     """Rows on slender contact ellipses beyond the table. C33 of ellipses that are long in the rolling direction has
     separate nodes at axis ratios 20 and 50, because it is a small difference of large terms."""
-    off = np.abs(relative_deviations(exact_rows))
-    long = exact_rows[:, 0] > 1.0
+    off = np.abs(deviations_from_exact(exact_coefficient_rows))
+    long = exact_coefficient_rows[:, 0] > 1.0
     asymptotes, nodes = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
     parts = [
-        (f"beyond.{name}", f"{name} at a/b {_ratios_text(exact_rows)}", off[:, i], 0.03, asymptotes)
+        (f"beyond.{name}", f"{name} at a/b {_axis_ratios_text(exact_coefficient_rows)}", off[:, i], 0.03, asymptotes)
         for i, name in enumerate(COEFFICIENT_NAMES[:3])
     ]
     parts += [
-        ("beyond.C33", f"C33 at a/b {_ratios_text(exact_rows[~long])}", off[~long, 3], 0.03, asymptotes),
-        ("beyond.C33.long", f"C33 at a/b {_ratios_text(exact_rows[long])}", off[long, 3], 0.1, nodes),
+        (
+            "beyond.C33",
+            f"C33 at a/b {_axis_ratios_text(exact_coefficient_rows[~long])}",
+            off[~long, 3],
+            0.03,
+            asymptotes,
+        ),
+        ("beyond.C33.long", f"C33 at a/b {_axis_ratios_text(exact_coefficient_rows[long])}", off[long, 3], 0.1, nodes),
     ]
     return [
         Observed(
@@ -207,9 +221,11 @@ def _beyond_rows(exact_rows: Array) -> list[Row]:
     ]
 
 
-def _ratios_text(exact_rows: Array) -> str:
+def _axis_ratios_text(exact_coefficient_rows: Array) -> str:
     """Text that lists the axis ratios of some rows."""
-    return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(exact_rows[:, 0]))
+    return ", ".join(
+        f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(exact_coefficient_rows[:, 0])
+    )
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
@@ -224,7 +240,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
                 for value, relative_error in zip(node[2:], parts, strict=True)
             ),
         )
-        for node, parts in zip(some, relative_deviations(some), strict=True)
+        for node, parts in zip(some, deviations_from_exact(some), strict=True)
     )
     note = (
         "Coefficients of the exact theory, nu = 1/4, and how far the published table is above them. C33 of the "
@@ -246,7 +262,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         left.loglog(ratio, curve, color=f"C{i}", label=name)
         left.loglog(quarter[:, 0], quarter[:, 2 + i], "o", color=f"C{i}", markersize=3.5)
         right.semilogx(
-            solved[:, 0], 100 * relative_deviations(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name
+            solved[:, 0], 100 * deviations_from_exact(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name
         )
     left.set(title="Coefficients [-], ν = 1/4 (dots: exact theory)", xlabel="a/b [-]")
     right.set(title="Library above exact theory [%], ν = 0 to 1/2", xlabel="a/b [-]", ylim=(-5, 20))

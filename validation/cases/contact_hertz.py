@@ -17,36 +17,39 @@ TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
 DECIMAL_DIGITS = 60
 RELATIVE_TOLERANCE = 1e-10
-LOAD = 1e5
+NORMAL_LOAD = 1e5
 PEAK_PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
 """Peak pressure (Pa) and short semi-axis (m) of the contacts compared."""
 MATERIAL_PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
 """Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
-NEAR_CIRCLE_RATIOS = tuple(1.0 - 10.0**-k for k in range(1, 16))
+NEARLY_CIRCULAR_AXIS_RATIOS = tuple(1.0 - 10.0**-k for k in range(1, 16))
 AXIS_RATIOS = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
 """Ratios of the short to the long semi-axis of the contacts compared."""
-QUANTITY_NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
+TITLES_OF_QUANTITIES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
 BOUND_REASON = (
     "K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
     "and no integral shared with the code"
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for axes, pressure, approach and load over all axis ratios, for one published contact, and for refusals; a
     quick run is the same."""
-    errors = _largest_errors((*AXIS_RATIOS, *NEAR_CIRCLE_RATIOS))
+    errors = _largest_errors((*AXIS_RATIOS, *NEARLY_CIRCULAR_AXIS_RATIOS))
     rows = [
         Observed(
             f"contact_hertz.{name}",
             SYSTEM,
-            f"largest relative error of {QUANTITY_NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
+            f"largest relative error of {TITLES_OF_QUANTITIES.get(name, name)}, axis ratios 1e-6 to 1e6",
             max(worst),
             "",
         ).at_most(RELATIVE_TOLERANCE, BOUND_REASON, "closed form")
         for name, worst in errors.items()
     ]
-    return rows + _published_rows() + _refusal_rows(), {"ratio": [*AXIS_RATIOS, *NEAR_CIRCLE_RATIOS], "errors": errors}
+    return rows + _published_rows() + _refusal_rows(), {
+        "ratio": [*AXIS_RATIOS, *NEARLY_CIRCULAR_AXIS_RATIOS],
+        "errors": errors,
+    }
 
 
 def exact_contact(axis_ratio: float) -> dict[str, Decimal]:
@@ -91,10 +94,10 @@ def _pi() -> Decimal:
     return (a + b) ** 2 / (4 * t)
 
 
-def _largest_errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
+def _largest_errors(axis_ratios: tuple[float, ...]) -> dict[str, list[float]]:
     """Largest relative error of every quantity at each axis ratio. The contacts are computed from the load and from the
     approach, with the long axis along x and along y."""
-    truth = [exact_contact(g) for g in ratios]
+    truth = [exact_contact(g) for g in axis_ratios]
     flat, steep, load, approach = (
         np.array([float(computed[name]) for computed in truth]) for name in ("flat", "steep", "load", "approach")
     )
@@ -114,9 +117,17 @@ def _largest_errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     }
 
 
-def _exchange_axes(touching: Hertz) -> Hertz:
+def _exchange_axes(hertz_contact: Hertz) -> Hertz:
     """The contact with the axes x and y exchanged."""
-    return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
+    return Hertz(
+        hertz_contact.b,
+        hertz_contact.a,
+        hertz_contact.p0,
+        hertz_contact.approach,
+        hertz_contact.load,
+        hertz_contact.B,
+        hertz_contact.A,
+    )
 
 
 def _published_rows() -> list[Row]:
@@ -167,13 +178,13 @@ def _refusal_rows() -> list[Row]:
     )
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
-        "flat": lambda: by_load(0.0, 1.0, LOAD, MATERIAL_PAIR),
-        "concave": lambda: by_load(1.0, -0.1, LOAD, MATERIAL_PAIR),
-        "not finite": lambda: by_load(1.0, np.nan, LOAD, MATERIAL_PAIR),
-        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, MATERIAL_PAIR),
+        "flat": lambda: by_load(0.0, 1.0, NORMAL_LOAD, MATERIAL_PAIR),
+        "concave": lambda: by_load(1.0, -0.1, NORMAL_LOAD, MATERIAL_PAIR),
+        "not finite": lambda: by_load(1.0, np.nan, NORMAL_LOAD, MATERIAL_PAIR),
+        "radius in mm": lambda: by_load(1 / 920, 1 / 600, NORMAL_LOAD, MATERIAL_PAIR),
         "modulus in MPa": lambda: Material(E=2.1e5, nu=0.28),
         "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, MATERIAL_PAIR),
-        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, MATERIAL_PAIR),
+        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], NORMAL_LOAD, MATERIAL_PAIR),
         "friction of steel on aluminium": MATERIAL_PAIR.require_likeness,
     }
     rows = [
@@ -181,7 +192,7 @@ def _refusal_rows() -> list[Row]:
             f"contact_hertz.refused.{name.replace(' ', '_')}",
             SYSTEM,
             f"a contact is refused: {name}",
-            _outcome(ask),
+            _outcome_of_computation(ask),
             "refused",
             why,
         )
@@ -200,9 +211,10 @@ def _refusal_rows() -> list[Row]:
     ]
 
 
-def _outcome(compute: Callable[[], object]) -> str:
+def _outcome_of_computation(compute_contact: Callable[[], object]) -> str:
+    """ "refused" if a computation raises InputError, else "accepted"."""
     try:
-        compute()
+        compute_contact()
     except InputError:
         return "refused"
     return "accepted"
@@ -235,7 +247,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
-    touching = by_load(curvature, 1.0, LOAD, MaterialPair())
+    touching = by_load(curvature, 1.0, NORMAL_LOAD, MaterialPair())
     for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):
         left.loglog(curvature, values * 1e3, label=name)
     left.set(title="Steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B [-]", ylabel="semi-axis [mm]")

@@ -51,43 +51,50 @@ RECOMPUTED_CASES = (
 the first two on coarser grids."""
 CELL_COUNTS = (7, 11, 21, 41)
 """Cells per strip at which the stated discretisation errors are judged; a quick run takes 21 alone."""
-JUDGED_CHOICES: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
+JUDGED_FASTSIM_OPTIONS: tuple[dict[str, str], ...] = (
+    {},
+    {"bound": "elliptic"},
+    {"march": "plain"},
+    {"flexibilities": "one"},
+)
 """Options of FASTSIM, changed from the best ones, whose stated discretisation errors are judged; a quick run takes the
 first alone."""
 REFERENCE_TOLERANCES = {True: 0.01, False: 0.005}
 """Error of the exact theory, divided by mu N, on the grids of a quick run (True) and of a full run (False)."""
-MISSED_SHARE = 0.06
+LARGEST_MISSED_SHARE = 0.06
 """Largest share of contacts whose error may exceed the stated one: the 5 % for which the band is made, and a contact or
 two."""
 MOMENT_TOLERANCES = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
 """Bounds of the moment's error divided by mu N sqrt(ab), by the traction bound of FASTSIM: of its mean, and of its 95 %
 quantile."""
-CONVERGED_CELLS = 161
+CONVERGED_CELL_COUNT = 161
 """Cells per strip whose result counts as exact when fewer cells are judged."""
-SLENDER_REASON = (
+SLENDER_CONTACT_REASON = (
     "reached for a/b 0.2 to 5 at every Poisson's ratio, not beyond: by mu N and the longer semi-axis the error "
     "is alike on slender ellipses, and that semi-axis is up to 3.2 sqrt(ab)"
 )
 """Reason why the moments of slender contacts by the elliptic traction bound miss their tolerance."""
-TABLE_ROWS, SEED = 100_000, 41
+LONG_TABLE_ROW_COUNT, SEED = 100_000, 41
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on whether the stated errors hold; a full run also compares Kalker's two programs, and times a long table of
     contacts."""
     cases = read_contacts()
     wide = read_wide(JUDGED_PART)
-    rows = _reference_rows(cases, quick) + _band_rows(cases, quick) + _total_rows(wide)
-    rows += _moment_rows(cases, read_drawn(JUDGED_PART), wide) + _cell_rows([*cases, *wide], quick)
+    rows = _stored_forces_rows(cases, quick) + _error_band_rows(cases, quick) + _total_error_rows(wide)
+    rows += _moment_error_rows(cases, read_drawn(JUDGED_PART), wide) + _discretisation_error_rows(
+        [*cases, *wide], quick
+    )
     if quick:
         return rows, {}
     programs = compare_programs(cases[::2])
-    return [*rows, *_program_rows(programs), _long_table_row(folder)], {"programs": programs}
+    return [*rows, *_program_time_rows(programs), _long_table_row(work_folder)], {"programs": programs}
 
 
-def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
+def _stored_forces_rows(contact_cases: list[ContactCase], quick: bool) -> list[Row]:
     """Row: difference of the stored exact forces from those that the exact theory computes now."""
-    known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in cases}
+    known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in contact_cases}
     answers = []
     for key in RECOMPUTED_CASES[:2] if quick else RECOMPUTED_CASES:
         now = with_exact_forces(known[key], (20,) if quick else (40,))
@@ -105,7 +112,7 @@ def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     ]
 
 
-def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
+def _error_band_rows(contact_cases: list[ContactCase], quick: bool) -> list[Row]:
     """Rows: share of contacts whose error exceeds the stated error band, for the contacts of the calibration set and
     for random ones."""
     unseen, rows = read_drawn(JUDGED_PART), []
@@ -113,9 +120,9 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     for name in ["blended intermediate"] if quick else [*FASTSIM_BANDS, "simplified"]:
         drawn = theory_errors(name, unseen)
         for some, row_name, which, most in (
-            (theory_errors(name, cases), "", "of the set", MISSED_SHARE),
+            (theory_errors(name, contact_cases), "", "of the set", LARGEST_MISSED_SHARE),
             (drawn, "drawn.", "drawn", 1 - BAND_SHARE),
-            (drawn.selected(against), "against.", "drawn with lateral creepage against spin", MISSED_SHARE),
+            (drawn.selected(against), "against.", "drawn with lateral creepage against spin", LARGEST_MISSED_SHARE),
         ):
             for what, kind, within in zip(
                 ("force", "moment"), ("band", "moment"), shares_within_bands(name, some), strict=True
@@ -134,11 +141,11 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     return rows
 
 
-def _total_rows(cases: list[ContactCase]) -> list[Row]:
+def _total_error_rows(contact_cases: list[ContactCase]) -> list[Row]:
     """Rows: share of random contacts whose error at 21 cells exceeds the stated total error of discretisation and
     theory, for every Poisson's ratio."""
-    ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
-    for case in cases:
+    ratios, off, stated = np.array([case.pair.nu for case in contact_cases]), [], []
+    for case in contact_cases:
         contact = case.contact(Fastsim, **BEST_CHOICES)
         answers, error = rolled(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
@@ -159,13 +166,15 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
     ]
 
 
-def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases: list[ContactCase]) -> list[Row]:
+def _moment_error_rows(
+    contact_cases: list[ContactCase], random_cases: list[ContactCase], wide_cases: list[ContactCase]
+) -> list[Row]:
     """Rows: error of FASTSIM's moment compared with the exact theory, by traction bound and set of contacts."""
     rows = []
     range_of_set = [case for case in wide_cases if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
     sets = {
-        "set": (cases, "the set"),
-        "drawn": (unseen, "the drawn contacts"),
+        "set": (contact_cases, "the set"),
+        "drawn": (random_cases, "the drawn contacts"),
         "less_wide": (range_of_set, "the wide contacts of a/b 0.2 to 5, Poisson's ratio 0 to 0.5"),
         "wide": (wide_cases, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
     }
@@ -181,18 +190,18 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases
                 "mu N sqrt(ab)",
             )
             rows.append(
-                observed.aim(allowed, SLENDER_REASON)
+                observed.aim(allowed, SLENDER_CONTACT_REASON)
                 if (bound, row_name) == ("elliptic", "wide")
                 else observed.at_most(allowed, "the exact theory, kept", "native")
             )
     return rows
 
 
-def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
+def _discretisation_error_rows(contact_cases: list[ContactCase], quick: bool) -> list[Row]:
     """Rows: share of contacts whose discretisation error, measured with many cells, exceeds the stated one."""
-    rows, some = [], cases[::9] if quick else cases
-    for choices, cells in product(JUDGED_CHOICES[: 1 if quick else None], (21,) if quick else CELL_COUNTS):
-        share = _shares_beyond_stated(some, cells, choices)
+    rows, some = [], contact_cases[::9] if quick else contact_cases
+    for choices, cells in product(JUDGED_FASTSIM_OPTIONS[: 1 if quick else None], (21,) if quick else CELL_COUNTS):
+        share = _shares_beyond_stated_error(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
             rows.append(
@@ -209,20 +218,23 @@ def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     return rows
 
 
-def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[str, str]) -> list[float]:
+def _shares_beyond_stated_error(
+    contact_cases: list[ContactCase], cell_count: int, fastsim_options: dict[str, str]
+) -> list[float]:
     """Shares of contacts whose discretisation errors of force and of moment exceed the stated ones."""
     answers = []
-    for case in cases:
-        contact = case.contact(Fastsim, **{**BEST_CHOICES, **choices})
-        fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED_CELLS)
+    for case in contact_cases:
+        contact = case.contact(Fastsim, **{**BEST_CHOICES, **fastsim_options})
+        fine, true = contact.roll(case.motion, cell_count), contact.roll(case.motion, CONVERGED_CELL_COUNT)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
-            np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + MOMENT_ROUNDING * case.limit
+            np.array(off)
+            > np.array(remaining_errors(contact, case.motion, cell_count, fine)) + MOMENT_ROUNDING * case.limit
         )
     return [float(value) for value in np.mean(answers, axis=0)]
 
 
-def _program_rows(program_times: dict[str, Any]) -> list[Row]:
+def _program_time_rows(program_times: dict[str, Any]) -> list[Row]:
     """Row: ratio of the computing times of Kalker's programs of 1983 and of 1982."""
     t = {name: np.array(values) for name, values in program_times["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
@@ -235,14 +247,14 @@ def _program_rows(program_times: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _long_table_row(folder: Path) -> Row:
+def _long_table_row(work_folder: Path) -> Row:
     """Row: computing time of a long table of contacts."""
     rng = np.random.default_rng(SEED)
     low, high = np.array([2.0, 2.0, 1.0, 0.1, -0.5, -0.5, -1.0]), np.array([9.0, 9.0, 150.0, 0.5, 0.5, 0.5, 1.0])
-    path, out = folder / "contact_cases.csv", folder / "contact_forces.csv"
+    path, out = work_folder / "contact_cases.csv", work_folder / "contact_forces.csv"
     np.savetxt(
         path,
-        rng.uniform(low, high, (TABLE_ROWS, 7)),
+        rng.uniform(low, high, (LONG_TABLE_ROW_COUNT, 7)),
         fmt="%.8g",
         delimiter=",",
         comments="",
@@ -253,8 +265,8 @@ def _long_table_row(folder: Path) -> Row:
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()
-    assert answers == {"rows": TABLE_ROWS, "wrong": 0}
-    what = f"time to answer a CSV of {TABLE_ROWS:,} contacts with errors and status, measured once"
+    assert answers == {"rows": LONG_TABLE_ROW_COUNT, "wrong": 0}
+    what = f"time to answer a CSV of {LONG_TABLE_ROW_COUNT:,} contacts with errors and status, measured once"
     return Observed("contact_price.table", SYSTEM, what, seconds, "s").beside(
         "seconds", "reported and never gated", "none"
     )

@@ -25,12 +25,12 @@ PROFILE_TOLERANCE = 2e-5
 """Largest distance (m) allowed between a built-in profile and the benchmark's."""
 LATERAL_SHIFTS = np.arange(0.0, 10.1, 0.5)
 """Lateral displacements (mm) of the wheelset."""
-QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
+QUICK_LATERAL_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
 WHEEL_LOAD = 1e4
 """Vertical load (N) of a wheel; the benchmark has 20 kN on a wheelset."""
-EXACT_CELLS = 40
+EXACT_CELL_COUNT = 40
 MATERIAL_PAIR = MaterialPair()
-BENCHMARK = (
+BENCHMARK_SOURCE = (
     "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
     "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm"
 )
@@ -38,14 +38,14 @@ CONTACT_JUMP = {"from": -22.6, "to": -33.4, "peak": 1556.0}
 """Lateral positions (mm) on the right rail between which the benchmark's contact jumps at a displacement of 5 mm, and
 its peak pressure there (MPa)."""
 FIGURE_LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
-FLANGE_SHIFT = 6.5
+FLANGE_CONTACT_SHIFT = 6.5
 """Lateral displacement (mm) from which the benchmark's flange touches the rail."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on the built-in profiles and on the contact points; a full run has every lateral displacement, also with
     yaw."""
-    shifts = QUICK_SHIFTS if quick else LATERAL_SHIFTS
+    shifts = QUICK_LATERAL_SHIFTS if quick else LATERAL_SHIFTS
     data: dict[str, Any] = {"no yaw": [_right_wheel_contact(float(shift), 0.0, not quick) for shift in shifts]}
     if not quick:
         data["yaw"] = [_right_wheel_contact(float(shift), 2.4e-3 * float(shift), False) for shift in shifts]
@@ -83,20 +83,21 @@ def _right_wheel_contact(lateral_shift: float, yaw: float, with_exact_peak: bool
     }
 
 
-def _exact_peak(patch: Any, load: float, box_ends: tuple[float, float, float, float]) -> float | None:
+def _exact_peak(contact_patch: Any, patch_load: float, patch_box: tuple[float, float, float, float]) -> float | None:
     """Peak pressure (MPa) of one contact patch under its load, by the exact theory; None if the patch merges with its
     neighbour."""
-    x0, x1, y0, y1 = box_ends
-    distance = patch.distance
+    x0, x1, y0, y1 = patch_box
+    distance = contact_patch.distance
     wide, high = 0.15 * (x1 - x0), 0.3 * (y1 - y0)
     grid = (x0 - wide, x1 + wide, max(y0 - high, distance.y[0]), min(y1 + high, distance.y[-1]))
     try:
-        return float(exact_normal(Shape("", distance, load), EXACT_CELLS, grid).pressure.max() / 1e6)
+        return float(exact_normal(Shape("", distance, patch_load), EXACT_CELL_COUNT, grid).pressure.max() / 1e6)
     except InputError:
         return None
 
 
 def _profile_file_rows() -> list[Row]:
+    """Rows: built-in profiles of wheel and rail compared with the benchmark's files."""
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
@@ -123,54 +124,55 @@ def _profile_file_rows() -> list[Row]:
     ]
 
 
-def wheel_profile_difference(wheel: ContactProfile) -> float:
+def wheel_profile_difference(file_profile: ContactProfile) -> float:
     """Largest difference in height (m) between the built-in S1002 profile and the wheel profile of a file, where both
     are defined."""
     rail_profile = s1002()
-    inside = (wheel.y >= rail_profile.y[0]) & (wheel.y <= rail_profile.y[-1])
-    return float(np.abs(rail_profile.curve(wheel.y[inside]) - wheel.z[inside]).max())
+    inside = (file_profile.y >= rail_profile.y[0]) & (file_profile.y <= rail_profile.y[-1])
+    return float(np.abs(rail_profile.curve(file_profile.y[inside]) - file_profile.z[inside]).max())
 
 
-def rail_profile_distance(rail: ContactProfile) -> float:
+def rail_profile_distance(file_profile: ContactProfile) -> float:
     """Largest distance (m) of a file's rail profile from the built-in inclined rail. The file has another origin, so
     the best shift is subtracted first."""
     laid = uic60().turned(Track().inclination)
     tree = KDTree(np.column_stack([laid.y, laid.z]))
-    points = np.column_stack([rail.y, rail.z])[rail.z < 0.036]
+    points = np.column_stack([file_profile.y, file_profile.z])[file_profile.z < 0.036]
 
     def largest_distance(lateral_shift: np.ndarray) -> float:
         return float(tree.query(points - lateral_shift)[0].max())
 
-    start = np.array([rail.y[np.argmin(rail.z)] - laid.y[np.argmin(laid.z)], 0.0])
+    start = np.array([file_profile.y[np.argmin(file_profile.z)] - laid.y[np.argmin(laid.z)], 0.0])
     return float(minimize(largest_distance, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-8}).fun)
 
 
-def _main_contact(case: dict[str, Any]) -> dict[str, float]:
+def _most_loaded_point(shift_record: dict[str, Any]) -> dict[str, float]:
     """The contact point with the largest normal force."""
-    return max(case["places"], key=lambda contact_point: contact_point["load"])
+    return max(shift_record["places"], key=lambda contact_point: contact_point["load"])
 
 
-def _contact_point_rows(cases: list[dict[str, Any]]) -> list[Row]:
-    by = {case["shift"]: case for case in cases}
-    flange = min(case["shift"] for case in cases if _main_contact(case)["angle"] > 45.0)
-    at5 = _main_contact(by[5.0])
+def _contact_point_rows(shift_records: list[dict[str, Any]]) -> list[Row]:
+    """Rows: displacement of flange contact, and the jump of the contact point, compared with the benchmark."""
+    by = {case["shift"]: case for case in shift_records}
+    flange = min(case["shift"] for case in shift_records if _most_loaded_point(case)["angle"] > 45.0)
+    at5 = _most_loaded_point(by[5.0])
     return [
         Observed(
             "contact_profiles.flange", SYSTEM, "sideways shift from which the flange carries the wheel", flange, "mm"
-        ).within(FLANGE_SHIFT, 0.25, f"{BENCHMARK}; half of its steps", "published"),
+        ).within(FLANGE_CONTACT_SHIFT, 0.25, f"{BENCHMARK_SOURCE}; half of its steps", "published"),
         Observed(
             "contact_profiles.jump_from",
             SYSTEM,
             "place of contact on the rail at a shift of 4.5 mm",
-            _main_contact(by[4.5])["rail"],
+            _most_loaded_point(by[4.5])["rail"],
             "mm",
-        ).within(CONTACT_JUMP["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
+        ).within(CONTACT_JUMP["from"], 1.0, f"{BENCHMARK_SOURCE}; where the patch is before it jumps", "published"),
         Observed(
             "contact_profiles.jump_to", SYSTEM, "place of contact on the rail at a shift of 5 mm", at5["rail"], "mm"
         ).within(
             CONTACT_JUMP["to"],
             1.0,
-            f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
+            f"{BENCHMARK_SOURCE}; a touching point here, the middle of a patch 4 mm wide there",
             "published",
         ),
         Observed(
@@ -183,14 +185,15 @@ def _contact_point_rows(cases: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
-    by = {case["shift"]: case for case in cases}
+def _benchmark_rows(shift_records: list[dict[str, Any]]) -> list[Row]:
+    """Rows: the loads of the patches add up to the wheel load, and peak pressures beside those of the benchmark."""
+    by = {case["shift"]: case for case in shift_records}
     vertical = max(
         abs(
             sum(contact_point["load"] * np.cos(np.radians(contact_point["angle"])) for contact_point in case["places"])
             - WHEEL_LOAD
         )
-        for case in cases
+        for case in shift_records
     )
     return [
         Observed(
@@ -206,14 +209,14 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
             "largest pressure at a shift of 5 mm, exact theory, of the patch that carries most",
             by[5.0]["exact"],
             "MPa",
-        ).beside(CONTACT_JUMP["peak"], BENCHMARK),
+        ).beside(CONTACT_JUMP["peak"], BENCHMARK_SOURCE),
         Observed(
             "contact_profiles.flange_peak",
             SYSTEM,
             "largest pressure at a shift of 6.5 mm, exact theory",
-            by[FLANGE_SHIFT]["exact"],
+            by[FLANGE_CONTACT_SHIFT]["exact"],
             "MPa",
-        ).beside("about 2600", BENCHMARK),
+        ).beside("about 2600", BENCHMARK_SOURCE),
     ]
 
 
@@ -231,15 +234,18 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
         "exact peak [MPa]",
     )
     note = (
-        f"{BENCHMARK}; {WHEEL_LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; "
+        f"{BENCHMARK_SOURCE}; {WHEEL_LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer "
+        "than 0.2 mm; "
         "y on the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
     )
     return [
-        Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in case_data.items()
+        Table(f"Places of contact, {name}", note, heads, tuple(_contact_point_table_rows(cases)))
+        for name, cases in case_data.items()
     ]
 
 
-def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
+def _contact_point_table_rows(shift_records: list[dict[str, Any]]) -> list[tuple[str, ...]]:
+    """Rows of the table of contact points."""
     return [
         (
             f"{case['shift']:g}",
@@ -252,7 +258,7 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
             f"{case['peak']:.0f}",
             f"{case['exact']:.0f}" if case["exact"] is not None else "-",
         )
-        for case in cases
+        for case in shift_records
         for contact_point in case["places"]
     ]
 

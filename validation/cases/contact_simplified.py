@@ -36,7 +36,7 @@ from validation.contact.contact_shapes import (
 
 TITLE = "Rolling contact of any shape: the theory of 1983"
 SYSTEM: System = "contact"
-EXACT_CELLS = 36
+EXACT_CELL_COUNT = 36
 """Cells of the exact grid along each axis."""
 FITTING_OPTIONS = {
     "elliptic": PLAIN,
@@ -48,70 +48,81 @@ FITTING_OPTIONS = {
 """Variants of the theory; the first is the default, the second follows the paper to the letter."""
 TIMING_ROUNDS = 10
 """Number of timing rounds."""
-NET_SIZES = (5, 7, 9, 11, 15, 19, 25)
+MESHES_PER_SIDE = (5, 7, 9, 11, 15, 19, 25)
 """Meshes per side of the coarse net of the normal problem."""
 CURVATURE_RATIOS = (0.05, 0.2, 1.0, 5.0, 20.0)
 """Ratios of curvatures B/A of the ellipses for which Hertz's closed form is exact."""
-APPROACH_TOLERANCE, JUMP_TOLERANCE = 0.02, 1e-6
+APPROACH_TOLERANCE, LOAD_JUMP_TOLERANCE = 0.02, 1e-6
 """Relative tolerance of the approach, and largest jump (N) of the load as a function of depth."""
 APPROACH_REASON = "the figure set for the theory"
-NO_CLAIM_REASON = "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
+NO_ACCURACY_CLAIM_REASON = (
+    "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
+)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on Hertz's ellipses and on the continuity of the load; a full run has all shapes, variants and net sizes,
     and computing times."""
     hertz = {
-        f"{ratio:g}": _hertz_errors(ratio, PLAIN) | {"paper": _hertz_errors(ratio, PAPER)["approach"]}
+        f"{ratio:g}": _errors_on_hertz_ellipse(ratio, PLAIN)
+        | {"paper": _errors_on_hertz_ellipse(ratio, PAPER)["approach"]}
         for ratio in CURVATURE_RATIOS
     }
-    jump = largest_jump(separate(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
+    jump = largest_load_jump(separate(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
-    rows = [*_hertz_rows(hertz), _jump_row(jump)]
+    rows = [*_hertz_rows(hertz), _load_jump_row(jump)]
     if quick:
         return rows, data
     data["shapes"] = {shape.name: _errors_of_variants(shape) for shape in shapes_by_formula() + profile_shapes()}
     data["grown"] = {shape.name: _approach_errors(shape) for shape in merged_shapes()} | _rail_approach_errors()
-    data["nets"] = {str(net): _hertz_errors(5.0, replace(PLAIN, net=net)) for net in NET_SIZES}
+    data["nets"] = {str(net): _errors_on_hertz_ellipse(5.0, replace(PLAIN, net=net)) for net in MESHES_PER_SIDE}
     data["time"] = _computing_times()
-    return rows + _shape_rows(data["shapes"]) + _merged_rows(data["grown"]) + _time_rows(data["time"]), data
+    return rows + _contact_shape_rows(data["shapes"]) + _merged_patch_rows(data["grown"]) + _computing_time_rows(
+        data["time"]
+    ), data
 
 
-def _hertz_errors(curvature_ratio: float, options: SimplifiedOptions) -> dict[str, float]:
+def _errors_on_hertz_ellipse(curvature_ratio: float, fitting_options: SimplifiedOptions) -> dict[str, float]:
     """Relative errors of approach, area and peak pressure on a Hertzian ellipse with the ratio of curvatures B/A."""
     exact = by_load(CURVATURE, CURVATURE * curvature_ratio, 1e5, MATERIAL_PAIR)
     a, b = float(exact.a), float(exact.b)
     contact = press(
-        quadratic(CURVATURE, CURVATURE * curvature_ratio, 2.5 * a, 2.5 * b), MATERIAL_PAIR, load=1e5, options=options
+        quadratic(CURVATURE, CURVATURE * curvature_ratio, 2.5 * a, 2.5 * b),
+        MATERIAL_PAIR,
+        load=1e5,
+        options=fitting_options,
     )
     return _relative_errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
 
-def _relative_errors(contact: NormalContact, approach: float, area: float, peak: float) -> dict[str, float]:
-    exact = {"approach": approach, "area": area, "peak": peak}
-    return {key: getattr(contact, key) / value - 1.0 for key, value in exact.items()}
+def _relative_errors(
+    normal_contact: NormalContact, exact_approach: float, exact_area: float, exact_peak: float
+) -> dict[str, float]:
+    """Relative errors of a contact's approach, area and peak pressure."""
+    exact = {"approach": exact_approach, "area": exact_area, "peak": exact_peak}
+    return {key: getattr(normal_contact, key) / value - 1.0 for key, value in exact.items()}
 
 
-def largest_jump(patch: Patch, step_count: int) -> float:
+def largest_load_jump(contact_patch: Patch, depth_step_count: int) -> float:
     """Largest jump (N) of the load as a function of depth. Each step of a sweep over depths is bisected towards the
     larger change, down to rounding."""
 
     def load(depth: float) -> float:
-        return load_at_depth(patch, depth, MATERIAL_PAIR).load
+        return load_at_depth(contact_patch, depth, MATERIAL_PAIR).load
 
-    return max(_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, step_count + 1).tolist()))
+    return max(_load_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, depth_step_count + 1).tolist()))
 
 
-def _jump(load: Callable[[float], float], low_depth: float, high_depth: float) -> float:
+def _load_jump(load_of_depth: Callable[[float], float], lower_depth: float, upper_depth: float) -> float:
     """Jump (N) of the load between two depths, located by bisection down to a relative distance of 1e-15."""
-    at_low, at_high = load(low_depth), load(high_depth)
-    while high_depth - low_depth > 1e-15 * high_depth:
-        middle = 0.5 * (low_depth + high_depth)
-        at_middle = load(middle)
+    at_low, at_high = load_of_depth(lower_depth), load_of_depth(upper_depth)
+    while upper_depth - lower_depth > 1e-15 * upper_depth:
+        middle = 0.5 * (lower_depth + upper_depth)
+        at_middle = load_of_depth(middle)
         if abs(at_middle - at_low) > abs(at_high - at_middle):
-            high_depth, at_high = middle, at_middle
+            upper_depth, at_high = middle, at_middle
         else:
-            low_depth, at_low = middle, at_middle
+            lower_depth, at_low = middle, at_middle
     return abs(at_high - at_low)
 
 
@@ -122,7 +133,9 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
         name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
         for name, fitting_options in FITTING_OPTIONS.items()
     }
-    normal = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or _box_around(contacts["elliptic"]))
+    normal = exact_normal(
+        contact_shape, EXACT_CELL_COUNT, contact_shape.box or _box_around_patches(contacts["elliptic"])
+    )
     motions = creepages(normal.area, contact_shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
@@ -140,7 +153,7 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
 
 def _approach_errors(contact_shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a separate grid for each patch, and with one grid for all patches."""
-    exact = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
+    exact = exact_normal(contact_shape, EXACT_CELL_COUNT, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
         name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options).approach
         / exact
@@ -158,12 +171,12 @@ def _rail_approach_errors() -> dict[str, dict[str, float]]:
         along = np.cos(min(patch_pressure.patch.lean for patch_pressure in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
-        error = pressed.approach * along / exact_contact_of_wheelset(position, pressed, EXACT_CELLS).approach - 1.0
+        error = pressed.approach * along / exact_contact_of_wheelset(position, pressed, EXACT_CELL_COUNT).approach - 1.0
         errors[name] = {"each": float(error), "one": np.nan}
     return errors
 
 
-def _box_around(normal_contact: NormalContact) -> Box:
+def _box_around_patches(normal_contact: NormalContact) -> Box:
     """Box around all patches of a contact, enlarged by a fifth of its size on every side."""
     x0, x1, y0, y1 = np.array([patch_pressure.box for patch_pressure in normal_contact.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
@@ -189,6 +202,7 @@ def _computing_times() -> dict[str, list[float]]:
 
 
 def _hertz_rows(errors_by_ratio: dict[str, dict[str, float]]) -> list[Row]:
+    """Rows: largest errors on Hertzian ellipses over all ratios of curvatures."""
     worst = {key: max(abs(case[key]) for case in errors_by_ratio.values()) for key in ("approach", "paper")}
     why = "the figure set for the theory; the closed form is Hertz's"
     rows = [
@@ -216,17 +230,19 @@ def _hertz_rows(errors_by_ratio: dict[str, dict[str, float]]) -> list[Row]:
     return rows
 
 
-def _jump_row(jump: float) -> Row:
+def _load_jump_row(load_jump: float) -> Row:
+    """Row: largest jump of the load as a function of depth."""
     return Observed(
-        "contact_simplified.continuity", SYSTEM, "largest jump of the load N(a3) of a lopsided contact", jump, "N"
+        "contact_simplified.continuity", SYSTEM, "largest jump of the load N(a3) of a lopsided contact", load_jump, "N"
     ).at_most(
-        JUMP_TOLERANCE,
+        LOAD_JUMP_TOLERANCE,
         "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory",
         "none",
     )
 
 
-def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
+def _contact_shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
+    """Rows: errors of approach and forces for every contact shape, compared with the exact theory."""
     rows = []
     for name, case in errors_by_shape.items():
         row_name = "contact_simplified." + "_".join(re.findall(r"\w+", name))
@@ -239,19 +255,19 @@ def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
         for key, what in (("area", "area"), ("peak", "peak pressure")):
             rows.append(
                 Observed(f"{row_name}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
-                    0.0, NO_CLAIM_REASON, "native"
+                    0.0, NO_ACCURACY_CLAIM_REASON, "native"
                 )
             )
         asked = f"{case['rolling']} of {case['asked']} creepages"
         rows.append(
             Observed(
                 f"{row_name}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
-            ).beside(0.0, NO_CLAIM_REASON, "native")
+            ).beside(0.0, NO_ACCURACY_CLAIM_REASON, "native")
         )
     return rows
 
 
-def _merged_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
+def _merged_patch_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
     """Rows: largest error of the approach among contacts whose patches have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
@@ -272,7 +288,8 @@ def _merged_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
     return rows
 
 
-def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
+def _computing_time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
+    """Rows: ratios of computing times of the theories."""
     why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
     return [
         Observed(
@@ -280,7 +297,7 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             SYSTEM,
             f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
             f"the 1982 program, {cost(seconds_by_program['1982'])}",
-            _time_ratio(seconds_by_program, "roll", "1982"),
+            _computing_time_ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
         Observed(
@@ -288,13 +305,14 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
             f"{cost(seconds_by_program['exact'])}, to that of this method, {cost(seconds_by_program['press'])}",
-            _time_ratio(seconds_by_program, "exact", "press"),
+            _computing_time_ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),
     ]
 
 
-def _time_ratio(seconds_by_program: dict[str, list[float]], numerator: str, denominator: str) -> float:
+def _computing_time_ratio(seconds_by_program: dict[str, list[float]], numerator: str, denominator: str) -> float:
+    """Ratio of the median computing times of two programs."""
     return float(np.median(seconds_by_program[numerator]) / np.median(seconds_by_program[denominator]))
 
 
@@ -322,7 +340,8 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
         for variant, errors in case["ways"].items()
     )
     note = (
-        f"Errors against the exact contact on {EXACT_CELLS} x {EXACT_CELLS} cells. Forces: mean and largest over "
+        f"Errors against the exact contact on {EXACT_CELL_COUNT} x {EXACT_CELL_COUNT} cells. Forces: mean and "
+        "largest over "
         "five kinds of "
         "creepage at 0.5 and 2 times the linear scale. Paper: pressure proportional to the depth, to the letter; "
         "elliptic: to its root, the default; gradient: least squares of the slopes; one net: one W for all patches."
@@ -359,9 +378,10 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
     """Sentences on the mean errors of the variants over all shapes."""
 
-    def mean(variant: str, key: str) -> str:
-        scale = 1.0 if key == "force" else 100.0
-        return f"{scale * np.nanmean([abs(case['ways'][variant][key]) for case in errors_by_shape.values()]):.1f} %"
+    def mean(variant_name: str, error_name: str) -> str:
+        scale = 1.0 if error_name == "force" else 100.0
+        errors = [abs(case["ways"][variant_name][error_name]) for case in errors_by_shape.values()]
+        return f"{scale * np.nanmean(errors):.1f} %"
 
     apart = errors_by_shape["two patches"]["ways"]
     return (
@@ -376,11 +396,11 @@ def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
     )
 
 
-def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
+def _net_errors_text(errors_by_net: dict[str, dict[str, float]]) -> str:
     """Sentences on the errors by the size of the net."""
-    sizes = (next(iter(nets)), str(PLAIN.net), list(nets)[-1])
-    first, used, last = (100.0 * abs(nets[net]["approach"]) for net in sizes)
-    area, peak = (100.0 * nets[sizes[-1]][key] for key in ("area", "peak"))
+    sizes = (next(iter(errors_by_net)), str(PLAIN.net), list(errors_by_net)[-1])
+    first, used, last = (100.0 * abs(errors_by_net[net]["approach"]) for net in sizes)
+    area, peak = (100.0 * errors_by_net[sizes[-1]][key] for key in ("area", "peak"))
     return (
         f"The approach settles: off by {first:.2f} % with {sizes[0]} x {sizes[0]} meshes, {used:.2f} % with the "
         f"{sizes[1]} x {sizes[1]} that are used, {last:.2f} % with {sizes[2]} x {sizes[2]}. Area and peak are off "

@@ -35,26 +35,26 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
 SEED = 12
-PATH_COUNT, QUICK_PATH_COUNT = 300, 60
+NOISE_PATH_COUNT, QUICK_NOISE_PATH_COUNT = 300, 60
 """Number of noise paths, in the full and in the quick run."""
-STEP = 5e-4
+TIME_STEP = 5e-4
 """Step (s) of the runs without noise."""
-MODEL_COUNT = 15
+RANDOM_VEHICLE_COUNT = 15
 """Number of random vehicle models. The ensemble of the sampling error has seven neighbouring roads instead."""
 SPEED_FACTORS = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)
 """Factors on the speed that give neighbouring roads."""
 
 
 @dataclass(frozen=True)
-class Combination:
-    """One combination of road, source of error and sampling rate. source : cause of the error: noise, interpolation or
-    model; road : settings of the road effect; rate : sampling rate (Hz); noise_deviation : standard deviation of the
-    force noise (N)."""
+class DriftOffScenario:
+    """One combination of road, source of error and sampling rate. error_source : noise,
+    interpolation or model; road_settings : settings of the road effect; sampling_rate : in Hz; duration : in s;
+    noise_deviation : standard deviation of the force noise (N)."""
 
     name: str
-    source: str
-    road: Saved
-    rate: float
+    error_source: str
+    road_settings: Saved
+    sampling_rate: float
     duration: float
     noise_deviation: float = 0.0
     interpolation: str = "linear"
@@ -62,53 +62,56 @@ class Combination:
 
 STUDY_ROAD = {"source": "study"}
 ISO_ROAD = {"source": "iso8608", "road_class": "D", "level": "one-sided"}
-COMBINATIONS = (
-    Combination("study 20 m/s", "noise", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 16.0, 30.7),
-    Combination("study 20 m/s", "noise", {**STUDY_ROAD, "speed": 20.0}, 200.0, 16.0, 30.7),
-    Combination("study 10 m/s", "noise", {**STUDY_ROAD, "speed": 10.0}, 500.0, 24.0, 30.0),
-    Combination("study 20 m/s, smoother", "noise", {**STUDY_ROAD, "speed": 20.0, "gd": 6e-4}, 1000.0, 30.0, 10.0),
-    Combination("study 30 m/s, smoother", "noise", {**STUDY_ROAD, "speed": 30.0, "gd": 1.2e-3}, 1000.0, 30.0, 3.0),
-    Combination("ISO class D 25 m/s", "noise", {**ISO_ROAD, "speed": 25.0, "seed": 3}, 500.0, 30.0, 15.0),
-    Combination("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 100.0, 30.0),
-    Combination("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 500.0, 40.0),
-    Combination("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 40.0),
-    Combination("study 15 m/s", "interpolation", {**STUDY_ROAD, "speed": 15.0}, 200.0, 50.0, interpolation="held"),
-    Combination("ISO class E 20 m/s", "interpolation", {**ISO_ROAD, "road_class": "E", "speed": 20.0}, 200.0, 40.0),
-    Combination("study 20 m/s", "model", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 30.0),
-    Combination("study 10 m/s", "model", {**STUDY_ROAD, "speed": 10.0}, 500.0, 40.0),
-    Combination("ISO class D 25 m/s", "model", {**ISO_ROAD, "speed": 25.0, "seed": 3}, 1000.0, 40.0),
+DRIFT_OFF_SCENARIOS = (
+    DriftOffScenario("study 20 m/s", "noise", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 16.0, 30.7),
+    DriftOffScenario("study 20 m/s", "noise", {**STUDY_ROAD, "speed": 20.0}, 200.0, 16.0, 30.7),
+    DriftOffScenario("study 10 m/s", "noise", {**STUDY_ROAD, "speed": 10.0}, 500.0, 24.0, 30.0),
+    DriftOffScenario("study 20 m/s, smoother", "noise", {**STUDY_ROAD, "speed": 20.0, "gd": 6e-4}, 1000.0, 30.0, 10.0),
+    DriftOffScenario("study 30 m/s, smoother", "noise", {**STUDY_ROAD, "speed": 30.0, "gd": 1.2e-3}, 1000.0, 30.0, 3.0),
+    DriftOffScenario("ISO class D 25 m/s", "noise", {**ISO_ROAD, "speed": 25.0, "seed": 3}, 500.0, 30.0, 15.0),
+    DriftOffScenario("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 100.0, 30.0),
+    DriftOffScenario("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 500.0, 40.0),
+    DriftOffScenario("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 40.0),
+    DriftOffScenario("study 15 m/s", "interpolation", {**STUDY_ROAD, "speed": 15.0}, 200.0, 50.0, interpolation="held"),
+    DriftOffScenario(
+        "ISO class E 20 m/s", "interpolation", {**ISO_ROAD, "road_class": "E", "speed": 20.0}, 200.0, 40.0
+    ),
+    DriftOffScenario("study 20 m/s", "model", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 30.0),
+    DriftOffScenario("study 10 m/s", "model", {**STUDY_ROAD, "speed": 10.0}, 500.0, 40.0),
+    DriftOffScenario("ISO class D 25 m/s", "model", {**ISO_ROAD, "speed": 25.0, "seed": 3}, 1000.0, 40.0),
 )
 
 
 @on_paper_road()
 @allowing_breaches("that runs drift off is what is shown", "upright")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each combination; a quick run has the first one with few noise paths."""
     combinations = [
-        _drift_off_figures(combination, folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
+        _drift_off_statistics(combination, work_folder, quick)
+        for combination in (DRIFT_OFF_SCENARIOS[:1] if quick else DRIFT_OFF_SCENARIOS)
     ]
     return [_drift_off_row(figures) for figures in combinations], {"combinations": combinations}
 
 
-def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> Saved:
+def _drift_off_statistics(scenario: DriftOffScenario, work_folder: Path, quick: bool) -> Saved:
     """Statistics of the predicted and measured drift-off times of a combination's ensemble; the time is infinite for
     runs that never drift off."""
     members = {"noise": _drift_by_noise, "interpolation": _drift_by_sampling, "model": _drift_by_model_error}[
-        combination.source
+        scenario.error_source
     ]
-    predicted, measured = members(combination, folder, QUICK_PATH_COUNT if quick else PATH_COUNT)
+    predicted, measured = members(scenario, work_folder, QUICK_NOISE_PATH_COUNT if quick else NOISE_PATH_COUNT)
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile_with_interval(np.array(measured), 0.5)
     inner = [quantile_with_interval(np.array(measured), level)[0] for level in (0.25, 0.75)]
     source_text = (
-        combination.source
-        + (f" {combination.noise_deviation:g} N" if combination.noise_deviation else "")
-        + ("" if combination.interpolation == "linear" else ", held")
+        scenario.error_source
+        + (f" {scenario.noise_deviation:g} N" if scenario.noise_deviation else "")
+        + ("" if scenario.interpolation == "linear" else ", held")
     )
     return {
-        "name": combination.name,
+        "name": scenario.name,
         "source": source_text,
-        "rate": combination.rate,
+        "rate": scenario.sampling_rate,
         "predicted": quantile_with_interval(np.array(late), 0.5)[0],
         "median": median,
         "low": low,
@@ -118,30 +121,33 @@ def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> S
     }
 
 
-def _drift_by_noise(combination: Combination, folder: Path, path_count: int) -> tuple[list[float | None], list[float]]:
+def _drift_by_noise(
+    scenario: DriftOffScenario, work_folder: Path, noise_path_count: int
+) -> tuple[list[float | None], list[float]]:
     """Predicted drift-off time (s), and the drift-off time of every noise path."""
-    true = virtual_drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
-    effects = {"force_noise": {"deviation": combination.noise_deviation, "seed": SEED}}
-    scene = force_scene(folder, duration=combination.duration, effects=effects)
-    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), path_count)["drift_off"]
-    quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
-    return [noise_error_curve(quiet, combination.noise_deviation).passing_time()], times.tolist()
+    true = virtual_drive(work_folder, scenario.duration, 1 / scenario.sampling_rate, road=scenario.road_settings)
+    effects = {"force_noise": {"deviation": scenario.noise_deviation, "seed": SEED}}
+    scene = force_scene(work_folder, duration=scenario.duration, effects=effects)
+    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), noise_path_count)["drift_off"]
+    quiet = assembly_of_scene(force_scene(work_folder, duration=scenario.duration))
+    return [noise_error_curve(quiet, scenario.noise_deviation).passing_time()], times.tolist()
 
 
 def _drift_by_sampling(
-    combination: Combination, folder: Path, path_count: int
+    scenario: DriftOffScenario, work_folder: Path, noise_path_count: int
 ) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) on similar roads, which have other speeds or other seeds."""
-    speed = combination.road["speed"]
+    speed = scenario.road_settings["speed"]
     roads = [
-        combination.road | ({"seed": i} if combination.road["source"] == "iso8608" else {"speed": speed * factor})
+        scenario.road_settings
+        | ({"seed": i} if scenario.road_settings["source"] == "iso8608" else {"speed": speed * factor})
         for i, factor in enumerate(SPEED_FACTORS)
     ]
     predicted, measured = [], []
     for road in roads:
-        true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=road)
+        true = virtual_drive(work_folder, scenario.duration, 1 / scenario.sampling_rate, TIME_STEP, road=road)
         assembly = assembly_of_scene(
-            force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
+            force_scene(work_folder, step=TIME_STEP, duration=scenario.duration, interpolation=scenario.interpolation)
         )
         predicted.append(interpolation_error_curve(assembly).passing_time())
         measured.append(_drift_off_time(assembly, true))
@@ -149,14 +155,16 @@ def _drift_by_sampling(
 
 
 def _drift_by_model_error(
-    combination: Combination, folder: Path, path_count: int
+    scenario: DriftOffScenario, work_folder: Path, noise_path_count: int
 ) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) of vehicles with random parameters, all started from the true
     state."""
-    true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
-    assembly = assembly_of_scene(force_scene(folder, step=STEP, duration=combination.duration))
+    true = virtual_drive(
+        work_folder, scenario.duration, 1 / scenario.sampling_rate, TIME_STEP, road=scenario.road_settings
+    )
+    assembly = assembly_of_scene(force_scene(work_folder, step=TIME_STEP, duration=scenario.duration))
     p, other_vehicles = assembly.parameters, list[Parameters]()
-    for i in range(MODEL_COUNT):
+    for i in range(RANDOM_VEHICLE_COUNT):
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))
         other_vehicles.append(
             p.model_copy(update=perturbed_parameters(p, dict(zip(PAPER_FACTORS, factors, strict=True))))
@@ -175,18 +183,19 @@ def _drift_off_time(assembly: Assembly, true_run: Result) -> float:
     return np.inf if time is None else time
 
 
-def _drift_off_row(combination: Saved) -> Row:
-    key = f"drift_off.{combination['source']}.{combination['name']}.{combination['rate']:g}Hz".replace(
+def _drift_off_row(drift_off_record: Saved) -> Row:
+    """Row: median measured drift-off time of a scenario divided by the predicted one."""
+    key = f"drift_off.{drift_off_record['source']}.{drift_off_record['name']}.{drift_off_record['rate']:g}Hz".replace(
         " ", "-"
     ).replace(",", "")
-    scatter = "{:.1f} to {:.1f} s".format(*combination["quartiles"])
+    scatter = "{:.1f} to {:.1f} s".format(*drift_off_record["quartiles"])
     what = (
-        f"drift-off of {combination['name']}, {combination['source']}, {combination['rate']:g} Hz: "
-        f"median of {combination['members']} runs "
-        f"(half of them {scatter}) over the prediction {combination['predicted']:.2f} s"
+        f"drift-off of {drift_off_record['name']}, {drift_off_record['source']}, {drift_off_record['rate']:g} Hz: "
+        f"median of {drift_off_record['members']} runs "
+        f"(half of them {scatter}) over the prediction {drift_off_record['predicted']:.2f} s"
     )
-    why = f"10 % is asked; the median lies in {combination['low']:.2f} to {combination['high']:.2f} s at 95 %"
-    return Observed(key, SYSTEM, what, combination["median"] / combination["predicted"], "").within(
+    why = f"10 % is asked; the median lies in {drift_off_record['low']:.2f} to {drift_off_record['high']:.2f} s at 95 %"
+    return Observed(key, SYSTEM, what, drift_off_record["median"] / drift_off_record["predicted"], "").within(
         1.0, 0.1, why, "closed form"
     )
 

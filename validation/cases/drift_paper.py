@@ -20,10 +20,10 @@ SINGLE_NOISE_SAMPLE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Changes of the scene that leave out the random models and all noise samples but one."""
 SAMPLING_RATES = (200.0, 400.0, 1000.0, 2000.0)
 """Sampling rates (Hz) of the full run; a quick run has only the study's."""
-QUICK_CHANGES = (*SINGLE_NOISE_SAMPLE, "run.duration=15")
+QUICK_SCENE_CHANGES = (*SINGLE_NOISE_SAMPLE, "run.duration=15")
 """Changes of the scene in a quick run: 15 s, in which undisturbed forces do not drift off."""
 
-COMPARED_FIGURES = (
+COMPARED_KEY_FIGURES = (
     (
         "undisturbed",
         "undisturbed",
@@ -93,14 +93,14 @@ COMPARED_FIGURES = (
 
 @allowing_breaches("that runs drift off is what the paper shows", "upright")
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments and inertia term of the hand-written reference; a quick run has 15 s
     and one sampling rate."""
-    scene = load(STUDY_SCENE, QUICK_CHANGES if quick else ())
-    runs, rate = _figures_by_run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
+    scene = load(STUDY_SCENE, QUICK_SCENE_CHANGES if quick else ())
+    runs, rate = _key_figures_by_run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
         Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)
-        for name, which, what, words, unit, paper, why in COMPARED_FIGURES
+        for name, which, what, words, unit, paper, why in COMPARED_KEY_FIGURES
         if runs[which][what] is not None
     ]
     lacking = runs["guided, perturbed"]
@@ -118,7 +118,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "closed form",
         )
     )
-    rates = {} if quick else {rate: _undisturbed_figures(rate) for rate in SAMPLING_RATES}
+    rates = {} if quick else {rate: _key_figures_without_noise(rate) for rate in SAMPLING_RATES}
     if rates:
         rows.append(
             Observed(
@@ -136,7 +136,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _figures_by_run(scene: Scene, run_names: Collection[str] = ()) -> dict[str, Saved]:
+def _key_figures_by_run(scene: Scene, run_names: Collection[str] = ()) -> dict[str, Saved]:
     """Figures of the study's runs in the hand-written reference by name of the run, for the named runs or for all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = measurement_and_runs(scene, Path(folder))
@@ -146,11 +146,11 @@ def _figures_by_run(scene: Scene, run_names: Collection[str] = ()) -> dict[str, 
         }
 
 
-def _undisturbed_figures(sampling_rate: float) -> dict[str, float]:
+def _key_figures_without_noise(sampling_rate: float) -> dict[str, float]:
     """Drift-off time (s) and largest enforced moment (N m) of undisturbed runs at one sampling rate (Hz), with steps of
     0.5 ms."""
     scene = load(STUDY_SCENE, (*SINGLE_NOISE_SAMPLE, "run.step=5e-4", f"options.sampling_rate={sampling_rate}"))
-    rows = _figures_by_run(scene, ("undisturbed", "guided, undisturbed"))
+    rows = _key_figures_by_run(scene, ("undisturbed", "guided, undisturbed"))
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
@@ -180,5 +180,6 @@ def tables(case_data: Saved) -> list[Table]:
     return tables
 
 
-def _cell_text(cell_value: float | None, format_name: str) -> str:
-    return "" if cell_value is None else format(cell_value, format_name)
+def _cell_text(cell_value: float | None, number_format: str) -> str:
+    """Text of a table cell; empty if there is no value."""
+    return "" if cell_value is None else format(cell_value, number_format)

@@ -31,7 +31,7 @@ SEED = 14
 SAMPLING_RATE, DURATION = 50.0, 15.0
 """Sampling rate (Hz) and length (s) of the runs by solver; the samples are few because adaptive solvers restart at
 each."""
-SOLVERS = (
+COMPARED_SOLVERS = (
     ("reference", "RK4", 1e-3),
     ("reference", "RK4", 5e-4),
     ("reference", "DOP853", 1e-6),
@@ -67,7 +67,7 @@ LOW_PASS_CUTOFFS = (5.0, 15.0, 50.0)
 INTEGRATION_SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44", 4, 1e-3))
 """Exudyn's methods, with order and step (s). Forces that were smoothed before the run are integrated by the reference's
 RK4, which equals Exudyn's RK44 to rounding."""
-PATH_COUNT = 20
+NOISE_PATH_COUNT = 20
 GROWTH_WINDOW = (4.0, 8.0)
 """Times (s) between which the growth of the spread is measured: after the start, before the pitch tumbles."""
 DAMAGE_SECONDS = 5.0
@@ -75,25 +75,27 @@ DAMAGE_SECONDS = 5.0
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on the drift-off times of solvers and interpolations, and on growth and damage with smoothing and
     integration schemes; a quick run has four solvers."""
-    solvers = _drift_by_solver(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
+    solvers = _drift_records_by_solver(
+        work_folder, (*COMPARED_SOLVERS[:2], *COMPARED_SOLVERS[-2:]) if quick else COMPARED_SOLVERS
+    )
     rows = _solver_rows(solvers)
     if quick:
         return rows, {"solvers": solvers, "smoothing": []}
-    smoothing = _treatment_records(folder)
+    smoothing = _treatment_records(work_folder)
     return rows + _smoothing_rows(smoothing), {"solvers": solvers, "smoothing": smoothing}
 
 
-def _drift_by_solver(folder: Path, solvers: Any) -> list[Saved]:
+def _drift_records_by_solver(work_folder: Path, solvers: Any) -> list[Saved]:
     """Drift-off time (s) and final pitch error (rad) of each solver under three inputs: linear samples, smooth samples,
     and noisy linear samples.
 
     Every solver takes the undisturbed linear samples. Only the half with the tighter tolerances takes the smooth ones,
     and only fixed-step solvers of this half take the noise.
     """
-    true = virtual_drive(folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
+    true = virtual_drive(work_folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
     drifted = []
     tight = solvers[1::2]
@@ -104,7 +106,7 @@ def _drift_by_solver(folder: Path, solvers: Any) -> list[Saved]:
         ("noisy", "linear", noise, fixed),
     )
     for name, rule, effects, chosen in inputs:
-        scene = force_scene(folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
+        scene = force_scene(work_folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
         assembly = assembly_of_scene(scene)
         for engine, method, value in chosen:
             solver = {"engine": engine, "method": method, "value": value, "input": name}
@@ -113,23 +115,25 @@ def _drift_by_solver(folder: Path, solvers: Any) -> list[Saved]:
 
 
 def _drift_of_run(
-    assembly: Assembly, engine: str, method: str, step_or_tolerance: float, true_run: Result
+    assembly: Assembly, engine_name: str, integration_method: str, step_or_tolerance: float, true_run: Result
 ) -> dict[str, float]:
     """Drift-off time (s) of a run (its duration if it does not drift off), and its final pitch error (rad)."""
-    settings = Settings(method, step_or_tolerance, DURATION)
-    if method in ADAPTIVE_METHODS:
-        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, step_or_tolerance)
-    run = build(engine, assembly, settings).run()
+    settings = Settings(integration_method, step_or_tolerance, DURATION)
+    if integration_method in ADAPTIVE_METHODS:
+        settings = Settings(
+            integration_method, 1e-3 if engine_name == "reference" else 5e-3, DURATION, step_or_tolerance
+        )
+    run = build(engine_name, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true_run.times, true_run["pitch"]))
     time = GrowthCurve(run.times, error).passing_time()
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
-def _treatment_records(folder: Path) -> list[Saved]:
+def _treatment_records(work_folder: Path) -> list[Saved]:
     """For each smoothing filter and each integration scheme, with the same noise: growth rate of the pitch's standard
     deviation, and damage ratio of the section forces."""
-    true = virtual_drive(folder, NOISY_SECONDS, 1 / NOISE_SAMPLING_RATE, 2.5e-4)
-    quiet = assembly_of_scene(force_scene(folder, step=1e-3, duration=NOISY_SECONDS))
+    true = virtual_drive(work_folder, NOISY_SECONDS, 1 / NOISE_SAMPLING_RATE, 2.5e-4)
+    quiet = assembly_of_scene(force_scene(work_folder, step=1e-3, duration=NOISY_SECONDS))
     treatments = [
         _treatment_record(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
         for cutoff in LOW_PASS_CUTOFFS
@@ -141,56 +145,66 @@ def _treatment_records(folder: Path) -> list[Saved]:
 
 
 def _treatment_record(
-    treatment: str,
+    treatment_name: str,
     true_run: Result,
-    quiet_assembly: Assembly,
-    cutoff: float | None,
-    engine: str,
-    method: str,
-    step: float,
+    noise_free_assembly: Assembly,
+    cutoff_frequency: float | None,
+    engine_name: str,
+    integration_method: str,
+    time_step: float,
 ) -> Saved:
-    forces = quiet_assembly.input
+    """Growth rate of the pitch's standard deviation and damage ratios for one smoothing filter or integration
+    scheme."""
+    forces = noise_free_assembly.input
     assert isinstance(forces, Sampled)
-    settings = Settings(method, step, NOISY_SECONDS)
-    clean = _noisy_states(engine, quiet_assembly, forces.values, cutoff, settings)
-    rows = np.rint(np.array(GROWTH_WINDOW) / step).astype(int)
+    settings = Settings(integration_method, time_step, NOISY_SECONDS)
+    clean = _noisy_states(engine_name, noise_free_assembly, forces.values, cutoff_frequency, settings)
+    rows = np.rint(np.array(GROWTH_WINDOW) / time_step).astype(int)
     spread = np.zeros(2)
-    for path in range(PATH_COUNT):
+    for path in range(NOISE_PATH_COUNT):
         noise = FORCE_NOISE * normal_samples(SEED, path, len(forces.values), 2)
         spread += (
-            _noisy_states(engine, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]
+            _noisy_states(engine_name, noise_free_assembly, forces.values + noise, cutoff_frequency, settings)[rows, 3]
+            - clean[rows, 3]
         ) ** 2
-    spread, law = np.sqrt(spread / PATH_COUNT), _pitch_deviation_law(_low_pass(forces.values, cutoff), quiet_assembly)
+    spread, law = (
+        np.sqrt(spread / NOISE_PATH_COUNT),
+        _pitch_deviation_law(_low_passed_forces(forces.values, cutoff_frequency), noise_free_assembly),
+    )
     growth, expected = (
         float(np.log(record_of_run[1] / record_of_run[0]) / np.diff(GROWTH_WINDOW)[0])
         for record_of_run in (spread, law)
     )
     return {
-        "name": treatment,
+        "name": treatment_name,
         "law": expected,
         "growth": growth,
         "spread": float(spread[1]),
-        **_damage_ratios(clean[:: round(1e-3 / step)], true_run, quiet_assembly),
+        **_damage_ratios(clean[:: round(1e-3 / time_step)], true_run, noise_free_assembly),
     }
 
 
 def _noisy_states(
-    engine: str, assembly: Assembly, force_samples: np.ndarray, cutoff: float | None, settings: Settings
+    engine_name: str,
+    assembly: Assembly,
+    force_samples: np.ndarray,
+    cutoff_frequency: float | None,
+    solver_settings: Settings,
 ) -> np.ndarray:
-    """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff`` (Hz) is
-    given."""
-    forces = Sampled(_low_pass(force_samples, cutoff), 1 / NOISE_SAMPLING_RATE, held=False)
-    return build(engine, replace(assembly, input=forces), settings).run().states
+    """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff_frequency``
+    (Hz) is given."""
+    forces = Sampled(_low_passed_forces(force_samples, cutoff_frequency), 1 / NOISE_SAMPLING_RATE, held=False)
+    return build(engine_name, replace(assembly, input=forces), solver_settings).run().states
 
 
-def _low_pass(force_samples: np.ndarray, cutoff: float | None) -> np.ndarray:
+def _low_passed_forces(force_samples: np.ndarray, cutoff_frequency: float | None) -> np.ndarray:
     """Samples filtered by a Butterworth low-pass of order 4, which runs forward and backward and so causes no delay;
     unchanged without a cut-off."""
-    if cutoff is None:
+    if cutoff_frequency is None:
         return force_samples
     from scipy.signal import butter, sosfiltfilt
 
-    return sosfiltfilt(butter(4, cutoff, fs=NOISE_SAMPLING_RATE, output="sos"), force_samples, axis=0)
+    return sosfiltfilt(butter(4, cutoff_frequency, fs=NOISE_SAMPLING_RATE, output="sos"), force_samples, axis=0)
 
 
 def _damage_ratios(states: np.ndarray, true_run: Result, assembly: Assembly) -> dict[str, float]:
@@ -203,22 +217,22 @@ def _damage_ratios(states: np.ndarray, true_run: Result, assembly: Assembly) -> 
     return {f"damage {name}": damage_ratio(loads[name], wanted[name]) for name in ("f3x", "f3z")}
 
 
-def _pitch_deviation_law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
+def _pitch_deviation_law(smoothed_forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     """Standard deviation (2,) of the pitch in rad at the two times of GROWTH_WINDOW by the closed law, computed from
     the smoothed forces (n, 2)."""
     p, period = assembly.parameters, 1 / NOISE_SAMPLING_RATE
-    rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
+    rates = sinh_law_rate(pitch_rate_of_forces(smoothed_forces, period, p), period, p)
     at = np.rint(np.array(GROWTH_WINDOW) / period).astype(int)
     return np.sqrt(
         pitch_variance(np.array(GROWTH_WINDOW), rates[at], rigid_pitch(p).noise_intensity(FORCE_NOISE, period))
     )
 
 
-def _solver_rows(solvers: list[Saved]) -> list[Row]:
+def _solver_rows(solver_records: list[Saved]) -> list[Row]:
     """Rows on the drift-off times of the solvers, and on the pitch errors of both interpolations."""
     rows = []
     for name in ("linear", "noisy"):
-        of_input = [solver_record for solver_record in solvers if solver_record["input"] == name]
+        of_input = [solver_record for solver_record in solver_records if solver_record["input"] == name]
         first = of_input[0]["drift-off"]
         for solver_record in of_input[1:]:
             solver = f"{solver_record['engine']} {solver_record['method']} {solver_record['value']:g}"
@@ -239,8 +253,8 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
                     "native",
                 )
             )
-    smooth = [solver_record["error"] for solver_record in solvers if solver_record["input"] == "smooth"]
-    linear = solvers[0]["error"]
+    smooth = [solver_record["error"] for solver_record in solver_records if solver_record["input"] == "smooth"]
+    linear = solver_records[0]["error"]
     return [
         *rows,
         Observed(
@@ -254,11 +268,11 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
     ]
 
 
-def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
+def _smoothing_rows(treatment_records: list[Saved]) -> list[Row]:
     """Rows: with every smoothing and scheme, the pitch's standard deviation grows by the closed law of the smoothed
     forces."""
     rows = []
-    for smoothing_record in smoothing:
+    for smoothing_record in treatment_records:
         key = smoothing_record["name"].replace(" ", "-").replace(",", "")
         rows += [
             Observed(
@@ -268,7 +282,9 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
                 f"the closed law, {smoothing_record['name']}",
                 smoothing_record["growth"] / smoothing_record["law"],
                 "",
-            ).within(1.0, 0.1, f"the same {PATH_COUNT} noise files in all; their own chance is 3 %", "closed form")
+            ).within(
+                1.0, 0.1, f"the same {NOISE_PATH_COUNT} noise files in all; their own chance is 3 %", "closed form"
+            )
         ]
         for axis, what in (
             (
@@ -322,12 +338,13 @@ def tables(case_data: Saved) -> list[Table]:
             "damage f3x / true damage",
         )
         about = (
-            f"{PATH_COUNT} noise files of {FORCE_NOISE} N at {NOISE_SAMPLING_RATE:g} Hz; damage without noise, "
+            f"{NOISE_PATH_COUNT} noise files of {FORCE_NOISE} N at {NOISE_SAMPLING_RATE:g} Hz; damage without noise, "
             f"first {DAMAGE_SECONDS:g} s, front section force in the chassis' frame."
         )
         tables.append(Table("Smoothing before the run, and schemes", about, columns, lines))
     return tables
 
 
-def _drift_off_text(solver: Saved) -> str:
-    return "never" if solver["drift-off"] >= DURATION else f"{solver['drift-off']:.2f}"
+def _drift_off_text(solver_record: Saved) -> str:
+    """Text of a solver's drift-off time; "never" if the run does not drift off."""
+    return "never" if solver_record["drift-off"] >= DURATION else f"{solver_record['drift-off']:.2f}"

@@ -19,15 +19,15 @@ from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import (
-    EFFECTS,
-    ENGINES,
-    STEP,
+    EFFECT_NAMES,
+    ENGINE_NAMES,
+    TIME_STEP,
     changes_text,
-    count_changes,
-    model,
-    scene,
-    scenes_without_and_with,
-    write_files,
+    component_count_changes,
+    engine_model,
+    scene_with_effects,
+    scenes_without_and_with_effect,
+    write_input_files,
 )
 from validation.choice.price_of_choice import price_of_choice
 from validation.common.grounds import allowing_breaches
@@ -42,7 +42,7 @@ comparison."""
 RATIO_ROUNDS, PRICE_ROUNDS = {True: 7, False: 80}, {True: 5, False: 15}
 """Numbers of timing rounds, for a quick run (True) and a full run (False): of the ratios to hand-built models, and of
 the price of each effect."""
-UNCHECKED_INTERVAL = 4
+ROUNDS_BETWEEN_UNCHECKED_RUNS = 4
 """The hand-built run without a result check is timed in the first of every so many rounds."""
 RIDE_STEP_COUNTS = {
     "reference": {True: 50, False: 500},
@@ -64,85 +64,99 @@ EFFECT_STEP_COUNT = 500
 
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of the computing times divided by those of hand-built models, and the price list of effects. A quick run
     simulates 2 s instead of 4 s, takes a tenth of the rounds, and each effect in one of the three engines, in turn."""
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
-        write_files(files_folder)
+        write_input_files(files_folder)
         ratios = {
-            engine: _ratio_to_hand_built(engine, files_folder, TIMED_STEP_COUNTS[quick], RATIO_ROUNDS[quick])
+            engine: _time_ratio_to_hand_built(engine, files_folder, TIMED_STEP_COUNTS[quick], RATIO_ROUNDS[quick])
             for engine in ("exudyn", "mujoco")
         }
         price = [
             _price_of_effect(effect, engine, files_folder, PRICE_ROUNDS[quick])
-            for i, effect in enumerate(EFFECTS)
-            for j, engine in enumerate(ENGINES)
-            if not quick or i % len(ENGINES) == j
+            for i, effect in enumerate(EFFECT_NAMES)
+            for j, engine in enumerate(ENGINE_NAMES)
+            if not quick or i % len(ENGINE_NAMES) == j
         ]
     rows = [
         row for engine, ratio in ratios.items() for row in _hand_built_rows(engine, ratio, TIMED_STEP_COUNTS[quick])
     ]
     rows += _wheelset_rows(TIMED_STEP_COUNTS[quick] // 4, quick) + _ride_rows(quick) + _contact_rows(quick)
-    rows += _car_rows(TIMED_STEP_COUNTS[quick] // 20, quick) + _stop_rows(quick) + ([] if quick else [_choice_row()])
+    rows += (
+        _car_rows(TIMED_STEP_COUNTS[quick] // 20, quick) + _stop_rows(quick) + ([] if quick else [_effect_choice_row()])
+    )
     return rows, {"price": price, "ratios": ratios}
 
 
-def hand_built(engine: str, bare_scene: Scene) -> Any:
+def hand_built_run(engine_name: str, bare_scene: Scene) -> Any:
     """Run of the hand-built model of the vehicle without effects in an engine: a function that returns the states."""
-    assembly, settings = assembly_of_scene(bare_scene), settings_of(bare_scene, engine)
-    run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
+    assembly, settings = assembly_of_scene(bare_scene), settings_of(bare_scene, engine_name)
+    run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine_name]
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio_to_hand_built(engine: str, folder: Path, step_count: int, round_count: int) -> Saved:
+def _time_ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: int, round_count: int) -> Saved:
     """Ratio of the computing time of twinrig's model of a scene without effects to that of the hand-built model, and
     the largest difference of their states.
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
-    bare = scene({}, step_count, folder)
-    ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(step_count + 1)
+    bare = scene_with_effects({}, step_count, work_folder)
+    ours, theirs, times = (
+        engine_model(bare, engine_name),
+        hand_built_run(engine_name, bare),
+        TIME_STEP * np.arange(step_count + 1),
+    )
     gap = float(np.abs(ours.run().states - theirs()).max())
-    jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
-    seconds = interleave(jobs, round_count, round_interval=(1, 1, UNCHECKED_INTERVAL), clock=time.process_time)
+    jobs = [ours.run, lambda: guard(engine_name, times, theirs(), bare.run.duration), theirs]
+    seconds = interleave(
+        jobs, round_count, round_interval=(1, 1, ROUNDS_BETWEEN_UNCHECKED_RUNS), clock=time.process_time
+    )
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
         "gap": gap,
-        "unchecked": paired_ratio(seconds[0, ::UNCHECKED_INTERVAL], seconds[2, ::UNCHECKED_INTERVAL]),
+        "unchecked": paired_ratio(
+            seconds[0, ::ROUNDS_BETWEEN_UNCHECKED_RUNS], seconds[2, ::ROUNDS_BETWEEN_UNCHECKED_RUNS]
+        ),
     }
 
 
-def _hand_built_rows(engine: str, comparison: Saved, step_count: int) -> list[Row]:
+def _hand_built_rows(engine_name: str, time_comparison: Saved, step_count: int) -> list[Row]:
+    """Rows: difference of a scene without effects from the hand-built model, and ratio of their computing times."""
     why = (
         f"interleaved runs of {step_count:,} steps, seconds of the processor, median of paired ratios: what the "
         "machinery costs where no effect is named"
     )
     return [
         Observed(
-            f"effect_prices.same.{engine}",
+            f"effect_prices.same.{engine_name}",
             SYSTEM,
-            f"{engine}: largest difference of the states of a bare scene from those of a hand-built model",
-            comparison["gap"],
+            f"{engine_name}: largest difference of the states of a bare scene from those of a hand-built model",
+            time_comparison["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
-        ratio_row(
-            f"effect_prices.ratio.{engine}",
-            f"{engine}: ratio of the time of a bare scene to that of a hand-built model "
+        time_ratio_row(
+            f"effect_prices.ratio.{engine_name}",
+            f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model "
             "whose result passes the same guard",
-            comparison["ratio"],
+            time_comparison["ratio"],
             why,
         ),
-        ratio_row(
-            f"effect_prices.unchecked.{engine}",
-            f"{engine}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
-            comparison["unchecked"],
+        time_ratio_row(
+            f"effect_prices.unchecked.{engine_name}",
+            f"{engine_name}: ratio of the time of a bare scene to that of a hand-built model whose result nobody "
+            "checks",
+            time_comparison["unchecked"],
             why,
         ),
     ]
 
 
-def ratio_row(row_id: str, title: str, ratio_and_interval: tuple[float, float, float], tolerance_reason: str) -> Row:
+def time_ratio_row(
+    row_id: str, title: str, ratio_and_interval: tuple[float, float, float], tolerance_reason: str
+) -> Row:
     """Row with a ratio of computing times and its 95 % interval."""
     value, low, high = ratio_and_interval
     return Observed(row_id, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(
@@ -163,7 +177,7 @@ def _wheelset_rows(step_count: int, quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.wheelset",
             "ratio of the time of a bare wheelset to that of the hand-written one, whose path passes the same checks",
             ratio,
@@ -194,7 +208,7 @@ def _ride_rows(quick: bool) -> list[Row]:
                 "the same vehicle on the same road; forces are summed in another order",
                 "none" if engine == "reference" else "native",
             ),
-            ratio_row(
+            time_ratio_row(
                 f"effect_prices.ratio.ride.{engine}",
                 f"{engine}: ratio of the time of a bare ride to that of {HAND_WRITTEN_RIDES[engine]}",
                 ratio,
@@ -221,7 +235,7 @@ def _car_rows(step_count: int, quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "native"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.handling",
             "MuJoCo: ratio of the time of a bare car of handling to that of the "
             "hand-written car, whose path passes the same guard",
@@ -248,7 +262,7 @@ def _stop_rows(quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s, shares",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.braking",
             "ratio of the time of a bare stop to that of the hand-written truck",
             ratio,
@@ -270,7 +284,7 @@ def _contact_rows(quick: bool) -> list[Row]:
             gap,
             "",
         ).at_most(1e-13, "the same cells, sums in another order", "none"),
-        ratio_row(
+        time_ratio_row(
             "effect_prices.ratio.contact",
             "ratio of the time of a call of FASTSIM on a bare ellipse to that of the hand-written FASTSIM",
             ratio,
@@ -279,7 +293,7 @@ def _contact_rows(quick: bool) -> list[Row]:
     ]
 
 
-def _choice_row() -> Row:
+def _effect_choice_row() -> Row:
     """Row: ratio of the time of a choice of effects for a linear car to the time of the car's full covariance."""
     (ratio, low, high), predicted_seconds = price_of_choice()
     return Observed(
@@ -293,30 +307,33 @@ def _choice_row() -> Row:
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price_of_effect(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
+def _price_of_effect(effect_name: str, engine_name: str, work_folder: Path, round_count: int) -> Saved:
     """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the numbers of
     components that the effect changes."""
     seconds = interleave(
-        [_timed_run(bare, engine) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, folder)],
+        [
+            _simulation_to_time(bare, engine_name)
+            for bare in scenes_without_and_with_effect(effect_name, EFFECT_STEP_COUNT, work_folder)
+        ],
         round_count,
         5e-3,
     )
     added = (seconds[1] - seconds[0]) / EFFECT_STEP_COUNT * 1e6
     return {
-        "effect": effect,
-        "engine": engine,
-        "adds": changes_text(count_changes(effect, engine, folder)) or "nothing",
+        "effect": effect_name,
+        "engine": engine_name,
+        "adds": changes_text(component_count_changes(effect_name, engine_name, work_folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
     }
 
 
-def _timed_run(simulated_scene: Scene, engine: str) -> Any:
+def _simulation_to_time(simulated_scene: Scene, engine_name: str) -> Any:
     """Function that runs a scene and computes its output channels; the model is built beforehand, outside the timed
     call."""
     assembly = assembly_of_scene(simulated_scene)
-    built = build(engine, assembly, settings_of(simulated_scene, engine))
+    built = build(engine_name, assembly, settings_of(simulated_scene, engine_name))
     return lambda: output_channels(assembly, built.run(), built)
 
 
@@ -331,16 +348,19 @@ def tables(case_data: Saved) -> list[Table]:
         "costs nothing."
     )
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
-    return [Table("Price list of effects", note, headings, tuple(_table_line(entry) for entry in case_data["price"]))]
+    return [
+        Table("Price list of effects", note, headings, tuple(_price_list_line(entry) for entry in case_data["price"]))
+    ]
 
 
-def _table_line(saved_entry: Saved) -> tuple[str, ...]:
-    value, low, high = saved_entry["ratio"]
+def _price_list_line(effect_cost_record: Saved) -> tuple[str, ...]:
+    """Line of the price list for one effect in one engine."""
+    value, low, high = effect_cost_record["ratio"]
     return (
-        saved_entry["effect"],
-        saved_entry["engine"],
-        saved_entry["adds"],
-        f"{saved_entry['step']:.2f}",
-        f"{saved_entry['us']['median']:+.2f} +/- {saved_entry['us']['mad']:.2f}",
+        effect_cost_record["effect"],
+        effect_cost_record["engine"],
+        effect_cost_record["adds"],
+        f"{effect_cost_record['step']:.2f}",
+        f"{effect_cost_record['us']['median']:+.2f} +/- {effect_cost_record['us']['mad']:.2f}",
         f"{value:.2f} ({low:.2f} to {high:.2f})",
     )

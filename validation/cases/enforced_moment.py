@@ -26,41 +26,41 @@ DURATION, QUICK_DURATION, ABRUPT_SECONDS, ROUGH_ROAD_SECONDS = 4.0, 1.5, 1.0, 2.
 """Lengths (s) of the runs: of the manoeuvre in a full and in a quick run, of the abrupt start (so long that its ringing
 is not most of the run), and on the study road."""
 SAMPLE_PERIOD = 1e-3
-STEP = 1e-3
+TIME_STEP = 1e-3
 MOMENT_TOLERANCE = 1e-4
-PRESCRIBED_PITCH = {"prescribed_pitch": {"file": "pitch.csv"}}
-BEST_SETTINGS = {
-    "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
-    "mujoco": Settings("RK4", STEP, DURATION),
+PRESCRIBED_PITCH_EFFECT = {"prescribed_pitch": {"file": "pitch.csv"}}
+BEST_SOLVER_SETTINGS = {
+    "exudyn": Settings("GeneralizedAlpha", TIME_STEP, DURATION, spectral_radius=0.6),
+    "mujoco": Settings("RK4", TIME_STEP, DURATION),
 }
 
 
-def write_manoeuvre(folder: Path, parameter_set_name: str, abrupt: bool = False) -> None:
+def write_manoeuvre(work_folder: Path, parameter_set_name: str, starts_abruptly: bool = False) -> None:
     """Write pitch and wheel forces of a manoeuvre with frequencies up to 2.7 Hz, the range of a car's pitch and heave
     motion.
 
-    The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``abrupt`` one with
+    The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``starts_abruptly`` one with
     4.4 rad/s^2 at once.
     """
-    p = parameter_set(parameter_set_name, "", folder)
+    p = parameter_set(parameter_set_name, "", work_folder)
     rest = equilibrium(p)
     t = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
     rise = s**3 * (10 - 15 * s + 6 * s**2)
     pitch = rise * (0.06 * np.sin(2 * np.pi * 1.2 * t) + 0.02 * np.sin(2 * np.pi * 2.7 * t))
-    if abrupt:
+    if starts_abruptly:
         pitch = 0.05 * (1 - np.cos(2 * np.pi * 1.5 * t))
     pitch = pitch + rest[3]
     front = p.k1 * rest[0] + rise * (900 * np.sin(2 * np.pi * 1.4 * t) + 300 * np.sin(2 * np.pi * 2.3 * t))
     rear = p.k2 * rest[1] + rise * 700 * np.sin(2 * np.pi * 1.7 * t + 1)
-    write_wheel_forces(folder, front, rear, SAMPLE_PERIOD)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
+    write_wheel_forces(work_folder, front, rear, SAMPLE_PERIOD)
+    write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
 
 
-def enforced_moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
+def enforced_moment(scene: Scene, engine_name: str, solver_settings: Settings) -> np.ndarray:
     """Enforced moment (n,) in N m at every millisecond of a scene."""
-    finer = replace(settings, duration=scene.run.duration)
-    return simulate(scene, engine, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / settings.step)]
+    finer = replace(solver_settings, duration=scene.run.duration)
+    return simulate(scene, engine_name, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / solver_settings.step)]
 
 
 def exact_moment(scene: Scene) -> np.ndarray:
@@ -69,14 +69,14 @@ def exact_moment(scene: Scene) -> np.ndarray:
     return enforced_moment(scene, "reference", Settings("RK4", SAMPLE_PERIOD / 16, scene.run.duration))
 
 
-def relative_rms_error(computed_values: np.ndarray, true_moment: np.ndarray) -> float:
+def relative_rms_error(computed_moment: np.ndarray, true_moment: np.ndarray) -> float:
     """Rms difference of two moments divided by the rms of the true moment."""
-    return float(np.sqrt(np.mean((computed_values - true_moment) ** 2) / np.mean(true_moment**2)))
+    return float(np.sqrt(np.mean((computed_moment - true_moment) ** 2) / np.mean(true_moment**2)))
 
 
 @on_paper_road()
 @allowing_breaches("the moment is compared, and its size is another matter", "little artificial")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for both vehicles in Exudyn and in MuJoCo, the ringing after an abrupt start, and the study road; a quick
     run has one vehicle and no study road."""
     with TemporaryDirectory() as name:
@@ -84,20 +84,23 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         rows = _manoeuvre_rows(
             work, VEHICLE_SETS[-1:] if quick else VEHICLE_SETS, QUICK_DURATION if quick else DURATION
         )
-        ringing, paths = _ringing_rows(work)
+        ringing, paths = _multiplier_ringing_rows(work)
         rough, table = ([], []) if quick else _study_road_rows(work, (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
     return rows + ringing + rough, {"table": table, "ringing": paths}
 
 
-def _manoeuvre_rows(folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
+def _manoeuvre_rows(work_folder: Path, parameter_set_names: tuple[str, ...], duration: float) -> list[Row]:
+    """Rows: error of the enforced moment in Exudyn and MuJoCo during the manoeuvre, for every vehicle."""
     rows = []
-    for parameter_set_name in vehicles:
-        write_manoeuvre(folder, parameter_set_name)
-        scene = force_scene(folder, parameter_set_name, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
+    for parameter_set_name in parameter_set_names:
+        write_manoeuvre(work_folder, parameter_set_name)
+        scene = force_scene(
+            work_folder, parameter_set_name, TIME_STEP, duration, "smooth", effects=PRESCRIBED_PITCH_EFFECT
+        )
         true = exact_moment(scene)
-        if parameter_set_name == vehicles[0]:
-            rows.append(_uncertainty_row(scene, true))
-        for engine, settings in BEST_SETTINGS.items():
+        if parameter_set_name == parameter_set_names[0]:
+            rows.append(_moment_uncertainty_row(scene, true))
+        for engine, settings in BEST_SOLVER_SETTINGS.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
                 Observed(
@@ -117,7 +120,7 @@ def _manoeuvre_rows(folder: Path, vehicles: tuple[str, ...], duration: float) ->
     return rows
 
 
-def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
+def _moment_uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
     """Row: uncertainty of the true moment, measured by its difference from an adaptive solver of another family at a
     tolerance of 1e-11."""
     by_other_solver = enforced_moment(scene, "reference", Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-11))
@@ -130,16 +133,18 @@ def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
     ).at_most(MOMENT_TOLERANCE / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
-def _ringing_rows(folder: Path) -> CaseAnswer:
+def _multiplier_ringing_rows(work_folder: Path) -> CaseAnswer:
     """Rows and data on an abrupt start: error of Exudyn's multiplier over the first 0.1 s, with and without consistent
     initial accelerations."""
-    write_manoeuvre(folder, "itwm_drift", abrupt=True)
-    scene = force_scene(folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH)
+    write_manoeuvre(work_folder, "itwm_drift", starts_abruptly=True)
+    scene = force_scene(
+        work_folder, step=TIME_STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH_EFFECT
+    )
     true = exact_moment(scene)
     first = slice(1, 101)
-    paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
+    paths: Saved = {"time": (TIME_STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
-        settings = Settings("GeneralizedAlpha", STEP, ABRUPT_SECONDS, spectral_radius=radius)
+        settings = Settings("GeneralizedAlpha", TIME_STEP, ABRUPT_SECONDS, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent_multiplier(scene, settings) - true)[
             first
         ].tolist()
@@ -171,9 +176,9 @@ def _ringing_rows(folder: Path) -> CaseAnswer:
     return rows, paths
 
 
-def _inconsistent_multiplier(scene: Scene, settings: Settings) -> np.ndarray:
+def _inconsistent_multiplier(scene: Scene, solver_settings: Settings) -> np.ndarray:
     """Exudyn's multiplier (n,) in N m if its initial accelerations are not made consistent with the constraint."""
-    model: Any = build("exudyn", assembly_of_scene(scene), settings)
+    model: Any = build("exudyn", assembly_of_scene(scene), solver_settings)
     model._first = 0.0
     model._consistent_start = lambda options: None
     multiplier = model.run().moment
@@ -181,23 +186,23 @@ def _inconsistent_multiplier(scene: Scene, settings: Settings) -> np.ndarray:
     return multiplier
 
 
-def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
+def _study_road_rows(work_folder: Path, time_steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """Rows and table on the paper's run with prescribed pitch on the study road: error of the enforced moment at each
     step, divided by the rms of the moment."""
-    virtual_drive(folder, ROUGH_ROAD_SECONDS + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
+    virtual_drive(work_folder, ROUGH_ROAD_SECONDS + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
     paper = perturbed_parameters(PARAMETERS)
     scene = force_scene(
-        folder,
+        work_folder,
         step=SAMPLE_PERIOD,
         duration=ROUGH_ROAD_SECONDS,
         interpolation="smooth",
         override=paper,
-        effects=PRESCRIBED_PITCH,
+        effects=PRESCRIBED_PITCH_EFFECT,
     )
     true = exact_moment(scene)
     table: list[list[Any]] = []
-    for engine, best in BEST_SETTINGS.items():
-        for step in steps:
+    for engine, best in BEST_SOLVER_SETTINGS.items():
+        for step in time_steps:
             settings = Settings(best.integrator, step, ROUGH_ROAD_SECONDS, spectral_radius=best.spectral_radius)
             table.append(
                 [
@@ -212,7 +217,7 @@ def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row],
             f"moment.rough.{engine}",
             SYSTEM,
             f"error of the enforced moment on the study road at 1 ms, {engine}, perturbed model",
-            next(row[3] for row in table if row[0] == engine and row[2] == STEP),
+            next(row[3] for row in table if row[0] == engine and row[2] == TIME_STEP),
             "of its rms",
         ).beside(
             MOMENT_TOLERANCE,
@@ -220,7 +225,7 @@ def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row],
             "table shows the step that it takes",
             "native",
         )
-        for engine in BEST_SETTINGS
+        for engine in BEST_SOLVER_SETTINGS
     ]
     return rows, table
 

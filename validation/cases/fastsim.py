@@ -40,12 +40,12 @@ CREEPAGE_KINDS = {
 CREEPAGE_LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING_LEVELS = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Creepage levels around the level from which the whole contact area slides."""
-LOAD, FRICTION, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
+NORMAL_LOAD, FRICTION_COEFFICIENT, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
 """Normal load (N), coefficient of friction, and sqrt(a b) (m) of the ellipses with the semi-axes a and b."""
 MATERIAL_PAIR = MaterialPair()
-FORCE_SCALES = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
+FORCE_SCALES = FRICTION_COEFFICIENT * NORMAL_LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
 """Scales of fx and fy (N) and of mz (N m)."""
-Contacts = dict[str, Any]
+ContactColumns = dict[str, Any]
 """Type of a set of contacts: arrays by the names of the parameters of ``fastsim``."""
 CELL_COUNTS = (11, 21, 41, 81)
 CONVERGED_CELLS, FINE_CELLS = 161, 321
@@ -59,10 +59,10 @@ INVARIANT_TOLERANCES = {
     "similarity": EXACT_TO_ROUNDING,
     "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell"),
 }
-GRID_REASON = "the same model with 321 cells per strip; a fifth of the model's own error"
+CELL_COUNT_REASON = "the same model with 321 cells per strip; a fifth of the model's own error"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the discretisation, the invariants and the derivatives; a full run also has the model's error and the
     computing time.
 
@@ -70,40 +70,43 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     rows, data = _discretisation_rows()
     rows += _invariant_rows(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
-    rows += _limit_rows() + _spin_rows() + _derivative_rows() + _random_contact_rows()
+    rows += _creepage_limit_rows() + _spin_moment_rows() + _force_derivative_rows() + _random_contact_rows()
     if quick:
         return rows, data
     answers, data["model"] = _model_error_rows()
-    timed, data["speed"] = speed_rows_and_table(MATERIAL_PAIR, LOAD, FRICTION, MEAN_SEMI_AXIS)
+    timed, data["speed"] = speed_rows_and_table(MATERIAL_PAIR, NORMAL_LOAD, FRICTION_COEFFICIENT, MEAN_SEMI_AXIS)
     return rows + answers + timed, data
 
 
-def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> Contacts:
+def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> ContactColumns:
     """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
     where c is sqrt(a b) and C is C11, C22 or C23 c."""
     ratio, kind, level = (
         grid.ravel() for grid in np.meshgrid(AXIS_RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
     )
     creepage_parts = np.array([CREEPAGE_KINDS[name] for name in kind_names])[kind] * level[:, None]
-    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2)
+    known, unit = (
+        coefficients(ratio, MATERIAL_PAIR.nu),
+        FRICTION_COEFFICIENT * NORMAL_LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2),
+    )
     scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_SEMI_AXIS], axis=1)
     xi_x, xi_y, spin = (creepage_parts * scale).T
     a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     return {
         "a": a,
         "b": b,
-        "load": np.full(len(a), LOAD),
-        "mu": np.full(len(a), FRICTION),
+        "load": np.full(len(a), NORMAL_LOAD),
+        "mu": np.full(len(a), FRICTION_COEFFICIENT),
         "xi_x": xi_x,
         "xi_y": xi_y,
         "spin": spin,
     }
 
 
-def _relative_forces(contacts: Contacts, **options: Any) -> Array:
+def _relative_forces(contacts: ContactColumns, **fastsim_options: Any) -> Array:
     """Forces fx and fy (n, 2) divided by mu N."""
-    answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **options)
-    return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
+    answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **fastsim_options)
+    return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION_COEFFICIENT * NORMAL_LOAD)
 
 
 def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
@@ -127,7 +130,7 @@ def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
                     f"largest error of the force at 21 cells per strip, {bound} bound, {len(truth)} cases",
                     float(errors[1].max()),
                     "mu N",
-                ).at_most(0.004, GRID_REASON, "none")
+                ).at_most(0.004, CELL_COUNT_REASON, "none")
             )
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
             order = float(np.log(mean[0] / mean[-1]) / np.log(CELL_COUNTS[-1] / CELL_COUNTS[0]))
@@ -149,13 +152,13 @@ def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
     return rows, {"cells": data}
 
 
-def _invariant_rows(batch_count: int, contact_count: int, first_stream: int) -> list[Row]:
+def _invariant_rows(batch_count: int, contact_count: int, first_random_stream: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batch_count):
         options = COMPUTED_OPTIONS[i % len(COMPUTED_OPTIONS)]
         for name, value in worst_violation(
-            random_contacts(SEED, first_stream + i, contact_count), options, MATERIAL_PAIR
+            random_contacts(SEED, first_random_stream + i, contact_count), options, MATERIAL_PAIR
         ).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
@@ -186,7 +189,7 @@ def _invariant_rows(batch_count: int, contact_count: int, first_stream: int) -> 
     ]
 
 
-def _limit_rows() -> list[Row]:
+def _creepage_limit_rows() -> list[Row]:
     """Rows: agreement with the linear theory at small creepages, and size and direction of the force in full
     sliding."""
     columns = creepage_contacts(("x", "y", "spin"), (1e-6,))
@@ -203,7 +206,7 @@ def _limit_rows() -> list[Row]:
     slid = fastsim(RollingEllipse(**sliding), MATERIAL_PAIR)
     slides = slid.stick == 0.0
     off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True))[slides].max()
-    short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0)[slides].max()
+    short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION_COEFFICIENT * NORMAL_LOAD) - 1.0)[slides].max()
     return [
         Observed(
             "fastsim.slope",
@@ -226,16 +229,16 @@ def _limit_rows() -> list[Row]:
     ]
 
 
-def _spin_rows() -> list[Row]:
+def _spin_moment_rows() -> list[Row]:
     """Rows: moment in full sliding under spin alone, on 21 cells, compared with the integral of mu times Hertz's
     pressure."""
     ratio = np.array(SPIN_AXIS_RATIOS)
     a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     longer, shorter = np.maximum(a, b), np.minimum(a, b)
-    most = FRICTION * LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
+    most = FRICTION_COEFFICIENT * NORMAL_LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
     rows = []
     for bound in POWERS:
-        ellipse = RollingEllipse(a=a, b=b, load=LOAD, mu=FRICTION, xi_x=0.0, xi_y=0.0, spin=1e5)
+        ellipse = RollingEllipse(a=a, b=b, load=NORMAL_LOAD, mu=FRICTION_COEFFICIENT, xi_x=0.0, xi_y=0.0, spin=1e5)
         spun = fastsim(ellipse, MATERIAL_PAIR, bound=bound)
         beyond = float(np.max(np.abs(spun.mz) / most - 1.0))
         what = f"moment of sliding about the centre beyond that of Hertz's pressure, {bound} bound, a/b 0.1 to 10"
@@ -254,10 +257,10 @@ def _spin_rows() -> list[Row]:
     return rows
 
 
-def _derivative_rows() -> list[Row]:
+def _force_derivative_rows() -> list[Row]:
     """Row: difference of the forces' analytic derivatives from central differences."""
     columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
-    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": LOAD}
+    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": NORMAL_LOAD}
     known, off = derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_forces_with_changed_input(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
@@ -279,10 +282,10 @@ def _derivative_rows() -> list[Row]:
     ]
 
 
-def _forces_with_changed_input(contacts: Contacts, input_name: str, step: float) -> Array:
-    """Forces and moments (n, 3) with one input changed by ``step``. If the load changes, the ellipse changes with the
-    load."""
-    moved = {**contacts, input_name: contacts[input_name] + step}
+def _forces_with_changed_input(contacts: ContactColumns, input_name: str, input_change: float) -> Array:
+    """Forces and moments (n, 3) with one input changed by ``input_change``. If the load changes, the ellipse changes
+    with the load."""
+    moved = {**contacts, input_name: contacts[input_name] + input_change}
     if input_name == "load":
         grown = np.cbrt(moved["load"] / contacts["load"])
         moved |= {"a": contacts["a"] * grown, "b": contacts["b"] * grown}

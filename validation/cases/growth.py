@@ -35,7 +35,7 @@ from validation.common.scenes import force_scene, on_paper_road, road_scene, vir
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
 SEED = 11
-PATH_COUNT = 3000
+NOISE_PATH_COUNT = 3000
 """Number N of Monte Carlo paths; the relative error of a standard deviation is 1/sqrt(2 N) = 1.3 %."""
 NOISE_DEVIATION, SAMPLING_RATE = 30.7, 1000.0
 """Standard deviation (N) of the noise on each force sample, 0.2 % of the largest force; and the sampling rate (Hz)."""
@@ -44,43 +44,46 @@ MONTE_CARLO_SECONDS = 10
 WINDOW_SECONDS, WINDOW_COUNT = 20, 4
 """Length (s) and number of the windows in which the growth rate is measured."""
 STUDY_ROAD = "20 m/s, Gd 2.4e-3"
-ROADS = {
+ROAD_SETTINGS = {
     f"{speed} m/s, Gd {gd}": {"source": "study", "speed": float(speed), "gd": float(gd)}
     for speed, gd in ((20, "2.4e-3"), (20, "6e-4"), (20, "1.5e-4"), (10, "2.4e-3"))
 }
 """The study road at other speeds and roughnesses."""
-LAW_REASON = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
+GROWTH_LAW_REASON = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on the growth rate, the standard deviation by noise, and the differences between steps and between engines;
     a quick run has one road and no Monte Carlo."""
-    true = virtual_drive(folder, MONTE_CARLO_SECONDS)
-    spread = _deviations_by_method(true, folder, quick)
+    true = virtual_drive(work_folder, MONTE_CARLO_SECONDS)
+    spread = _deviations_by_method(true, work_folder, quick)
     if quick:
-        roads = {STUDY_ROAD: _growth_rates(folder, ROADS[STUDY_ROAD], 2)}
+        roads = {STUDY_ROAD: _growth_rates(work_folder, ROAD_SETTINGS[STUDY_ROAD], 2)}
         return _deviation_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
-    roads = {name: _growth_rates(folder, road) for name, road in ROADS.items()}
-    roads["asymmetric twin"] = _growth_rates(folder, ROADS[STUDY_ROAD], parameter_set_name="asymmetric_twin")
-    rows = [*_deviation_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
-    return [*rows, _step_row(folder), _linear_row(folder)], {"spread": spread, "roads": roads}
+    roads = {name: _growth_rates(work_folder, road) for name, road in ROAD_SETTINGS.items()}
+    study_road = ROAD_SETTINGS[STUDY_ROAD]
+    roads["asymmetric twin"] = _growth_rates(work_folder, study_road, parameter_set_name="asymmetric_twin")
+    rows = [*_deviation_rows(spread), *_growth_rows(roads), _asymmetric_twin_row(work_folder)]
+    rows += [*_engine_rows(work_folder), _halved_step_row(work_folder), _linearised_vehicle_row(work_folder)]
+    return rows, {"spread": spread, "roads": roads}
 
 
-def _noisy_scene(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
-    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": path}}
-    return force_scene(folder, step=step, duration=duration, effects=noise)
+def _noisy_scene(work_folder: Path, duration: float, time_step: float = 1e-3, noise_path: int = 0) -> Scene:
+    """Scene of the force-excited vehicle on one path of force noise."""
+    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": noise_path}}
+    return force_scene(work_folder, step=time_step, duration=duration, effects=noise)
 
 
-def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
+def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> Saved:
     """Standard deviations of pitch and heave at 1 to 10 s by three methods: Monte Carlo (full run only), covariance
     along the path, and closed laws."""
     times, assembly = (
         np.arange(1, MONTE_CARLO_SECONDS + 1),
-        assembly_of_scene(_noisy_scene(folder, MONTE_CARLO_SECONDS)),
+        assembly_of_scene(_noisy_scene(work_folder, MONTE_CARLO_SECONDS)),
     )
     at = np.rint(times * SAMPLING_RATE).astype(int)
-    p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=MONTE_CARLO_SECONDS))
+    p, quiet = assembly.parameters, assembly_of_scene(force_scene(work_folder, duration=MONTE_CARLO_SECONDS))
     q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
     carried = covariance(quiet, NOISE_DEVIATION)
     alone = pitch_rate_of_forces(_force_samples(quiet).values, 1 / SAMPLING_RATE, p)
@@ -97,20 +100,21 @@ def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
         "heave covariance": carried.deviation("z3")[at],
     }
     if not quick:
-        job = noise_paths(_noisy_scene(folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
-        off = run_paths(job, PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
+        job = noise_paths(_noisy_scene(work_folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
+        off = run_paths(job, NOISE_PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
 
 
 def _force_samples(assembly: Assembly) -> Sampled:
+    """The sampled wheel forces of an assembly."""
     assert isinstance(assembly.input, Sampled)
     return assembly.input
 
 
 def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, sample_count: int) -> TangentPath:
-    """Error path over a section of a run that starts at sample number ``first_sample`` in the state ``start_state``
-    (8,)."""
+    """Error path over a section of a run that starts at sample number ``first_sample`` in the state
+    ``start_state`` (8,)."""
     forces = replace(
         _force_samples(assembly), values=_force_samples(assembly).values[first_sample : first_sample + sample_count + 1]
     )
@@ -118,12 +122,12 @@ def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, 
 
 
 def _growth_rates(
-    folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
+    work_folder: Path, road_settings: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
 ) -> Saved:
     """Growth rates (1/s) of the error on one road by four methods: from the run's pitch rate, from its forces, with
     other cut-off frequencies, and measured in time windows with forces in both frames."""
-    true = virtual_drive(folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road)
-    assembly = assembly_of_scene(force_scene(folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
+    true = virtual_drive(work_folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road_settings)
+    assembly = assembly_of_scene(force_scene(work_folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
     p, rate = assembly.parameters, true["pitch_rate"]
     alone = pitch_rate_of_forces(_force_samples(assembly).values, 1 / SAMPLING_RATE, p)
     starts = np.rint(np.arange(window_count) * WINDOW_SECONDS * SAMPLING_RATE).astype(int)
@@ -150,10 +154,10 @@ def _growth_rates(
     }
 
 
-def _deviation_rows(spread_record: Saved) -> list[Row]:
+def _deviation_rows(standard_deviations: Saved) -> list[Row]:
     """Rows: standard deviations of pitch and heave under noise, compared with their closed laws."""
-    seen = "pitch" if "pitch" in spread_record else "covariance"
-    by = f"Monte Carlo of {PATH_COUNT} paths" if seen == "pitch" else "covariance along the path"
+    seen = "pitch" if "pitch" in standard_deviations else "covariance"
+    by = f"Monte Carlo of {NOISE_PATH_COUNT} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
         Observed(
@@ -164,23 +168,23 @@ def _deviation_rows(spread_record: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, why, "closed form")
         for t, spread_then, expected in zip(
-            spread_record["time"], spread_record[seen], spread_record["law, run"], strict=True
+            standard_deviations["time"], standard_deviations[seen], standard_deviations["law, run"], strict=True
         )
     ]
-    miss = spread_record[seen][-1] / spread_record["t^1.5"][-1]
+    miss = standard_deviations[seen][-1] / standard_deviations["t^1.5"][-1]
     rows.append(
         Observed(
             "growth.spread.linear",
             SYSTEM,
-            f"ratio of the pitch's standard deviation at {spread_record['time'][-1]} s to t^1.5, the law without "
+            f"ratio of the pitch's standard deviation at {standard_deviations['time'][-1]} s to t^1.5, the law without "
             "growth",
             miss,
             "",
         ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
     )
     heave = (
-        np.array(spread_record["heave" if "heave" in spread_record else "heave covariance"])
-        / spread_record["heave law"]
+        np.array(standard_deviations["heave" if "heave" in standard_deviations else "heave covariance"])
+        / standard_deviations["heave law"]
     )
     rows.append(
         Observed(
@@ -191,7 +195,7 @@ def _deviation_rows(spread_record: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
     )
-    alone = np.array(spread_record["covariance"]) / spread_record["law, forces"]
+    alone = np.array(standard_deviations["covariance"]) / standard_deviations["law, forces"]
     return [
         *rows,
         Observed(
@@ -207,9 +211,10 @@ def _deviation_rows(spread_record: Saved) -> list[Row]:
     ]
 
 
-def _growth_rows(roads: Saved) -> list[Row]:
+def _growth_rows(growth_by_road: Saved) -> list[Row]:
+    """Rows: growth rate of the pitch error on every road, compared with its law."""
     rows = list[Row]()
-    for name, road in roads.items():
+    for name, road in growth_by_road.items():
         key = name.replace(" ", "-").replace(",", "")
         rows += [
             Observed(
@@ -218,7 +223,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
                 f"ratio of the growth rate along the true path to the rms of the fast pitch rate, {name}",
                 road["measured"] / road["run"],
                 "",
-            ).within(1.0, 0.03, LAW_REASON, "closed form"),
+            ).within(1.0, 0.03, GROWTH_LAW_REASON, "closed form"),
             Observed(
                 f"growth.forces.{key}",
                 SYSTEM,
@@ -237,7 +242,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
                 f"{road['swing law']:.3g}", "sqrt(J / (I + J)) times the rms of the fast pitch rate", "closed form"
             ),
         ]
-    worst = max(abs(rate / road["run"] - 1) for road in roads.values() for rate in road["cut-offs"])
+    worst = max(abs(rate / road["run"] - 1) for road in growth_by_road.values() for rate in road["cut-offs"])
     return [
         *rows,
         Observed(
@@ -250,26 +255,27 @@ def _growth_rows(roads: Saved) -> list[Row]:
     ]
 
 
-def _body_force_row(row_id: str, title: str, road: Saved) -> Row:
+def _body_force_row(row_id: str, title: str, growth_record: Saved) -> Row:
     """Row: with body-fixed forces the error does not grow if the vehicle does not couple heave to pitch. The growth of
     a vehicle with this coupling is reported without a verdict.
 
     With coupling c, the wheels' weight has a moment c g cos(pitch) about the common centre of mass, which body-fixed
     forces do not follow: on a hill of pitch beta a stiffness of 2 c g beta remains, of either sign.
     """
-    if road["coupling"] != 0.0:
+    if growth_record["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
-        return Observed(row_id, SYSTEM, title, road["body"], "1/s").beside("small", why, "none")
-    return Observed(row_id, SYSTEM, title, road["body"], "1/s").within(
-        0.0, road["body error"], "zero within its error; the wheels' inertia makes a slow swing of it", "closed form"
+        return Observed(row_id, SYSTEM, title, growth_record["body"], "1/s").beside("small", why, "none")
+    why = "zero within its error; the wheels' inertia makes a slow swing of it"
+    return Observed(row_id, SYSTEM, title, growth_record["body"], "1/s").within(
+        0.0, growth_record["body error"], why, "closed form"
     )
 
 
-def _twin_row(folder: Path) -> Row:
+def _asymmetric_twin_row(work_folder: Path) -> Row:
     """Row: growth law of a vehicle with unequal front and rear, whose lever arms count from the common centre of
     mass."""
-    true = virtual_drive(folder, 5.0, parameters="asymmetric_twin")
-    assembly = assembly_of_scene(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
+    true = virtual_drive(work_folder, 5.0, parameters="asymmetric_twin")
+    assembly = assembly_of_scene(force_scene(work_folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * SAMPLING_RATE)
     q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
     expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / SAMPLING_RATE, p)[at], q)))
@@ -281,12 +287,12 @@ def _twin_row(folder: Path) -> Row:
     return Observed("growth.twin", SYSTEM, what, float(deviation / expected), "").within(1.0, 0.05, why, "closed form")
 
 
-def _engine_rows(folder: Path) -> list[Row]:
+def _engine_rows(work_folder: Path) -> list[Row]:
     """Rows: largest difference between the engines' states under the same noise, until the pitch error reaches 0.05
     rad."""
-    true = virtual_drive(folder, MONTE_CARLO_SECONDS)
+    true = virtual_drive(work_folder, MONTE_CARLO_SECONDS)
     runs = {
-        engine: simulate(_noisy_scene(folder, MONTE_CARLO_SECONDS), engine)
+        engine: simulate(_noisy_scene(work_folder, MONTE_CARLO_SECONDS), engine)
         for engine in ("reference", "exudyn", "mujoco")
     }
     base = runs["reference"]
@@ -308,13 +314,13 @@ def _engine_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _step_row(folder: Path) -> Row:
+def _halved_step_row(work_folder: Path) -> Row:
     """Row: change of the pitch by half the step under the same noise, divided by the standard deviation of the
     pitch."""
     runs = {
         step: np.array(
             [
-                simulate(_noisy_scene(folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1]
+                simulate(_noisy_scene(work_folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1]
                 for path in range(20)
             ]
         )
@@ -328,13 +334,13 @@ def _step_row(folder: Path) -> Row:
     return Observed("growth.step", SYSTEM, what, gap, "").at_most(1e-4, "noise belongs to the samples", "closed form")
 
 
-def _linear_row(folder: Path) -> Row:
+def _linearised_vehicle_row(work_folder: Path) -> Row:
     """Row: if vehicle and measurement are linearised, even the perturbed vehicle does not drift off."""
     linear = {"geometry": "linear"}
     true = simulate(changed_scene(road_scene(duration=60.0), vehicle=linear), "reference")
-    write_measurement(true, folder, 1 / SAMPLING_RATE)
+    write_measurement(true, work_folder, 1 / SAMPLING_RATE)
     start = dict(zip(STATES, true.states[0, :4].tolist(), strict=True))
-    wrong = force_scene(folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
+    wrong = force_scene(work_folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
     run = simulate(changed_scene(wrong, vehicle=linear, start=start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
     what = "largest pitch error of the perturbed model, linearised, in 60 s"
@@ -377,7 +383,7 @@ def draw(case_data: Saved) -> Drawn:
     spread = case_data["spread"]
     figure, axis = subplots(figsize=(7.0, 3.6))
     marks = {
-        "pitch": ("ok", f"Monte Carlo, {PATH_COUNT} paths"),
+        "pitch": ("ok", f"Monte Carlo, {NOISE_PATH_COUNT} paths"),
         "covariance": ("x", "covariance along the true path"),
         "law, run": ("-", "closed law, rate from the run"),
         "t^1.5": ("--", "noise alone, without growth: t^1.5"),

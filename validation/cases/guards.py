@@ -18,16 +18,16 @@ from validation.hard_cases import prescribed_pitch, sampled_input, setups
 
 TITLE = "Guards against silent wrong answers"
 SYSTEM: System = "pitch-plane"
-UNSTABLE_STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
-DURATIONS = (0.04, 0.2, 2.0)
-QUICK_STEPS, QUICK_DURATIONS = UNSTABLE_STEPS[::2], DURATIONS[:2]
+UNSTABLE_TIME_STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
+RUN_DURATIONS = (0.04, 0.2, 2.0)
+QUICK_TIME_STEPS, QUICK_DURATIONS = UNSTABLE_TIME_STEPS[::2], RUN_DURATIONS[:2]
 """Steps and durations (s) of the runs at unstable steps, in a quick run."""
-SILENT_ERROR = 1.0
+SILENT_ERROR_LIMIT = 1.0
 """Error, divided by the motion, above which a complete run counts as silently wrong: 100 % wrong without a warning."""
-Runner = Callable[..., Any]
+RunFunction = Callable[..., Any]
 
 
-def ending(attempt_run: Callable[[], Any]) -> str:
+def run_ending(attempt_run: Callable[[], Any]) -> str:
     """How an attempt ends: "refused" (InputError), "raised" (RunFailed) or "answered"."""
     try:
         attempt_run()
@@ -38,16 +38,16 @@ def ending(attempt_run: Callable[[], Any]) -> str:
     return "answered"
 
 
-def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
-    """Integrators that an engine offers: fixed-step, adaptive, or both if ``adaptive`` is None."""
+def integrator_names(engine_name: str, is_adaptive: bool | None = None) -> list[str]:
+    """Integrators that an engine offers: fixed-step, adaptive, or both if ``is_adaptive`` is None."""
     return [
         name
-        for name, facts in CATALOGUE[engine].items()
-        if (engine, name) not in UNAVAILABLE_INTEGRATORS and adaptive in (None, facts.adaptive)
+        for name, facts in CATALOGUE[engine_name].items()
+        if (engine_name, name) not in UNAVAILABLE_INTEGRATORS and is_adaptive in (None, facts.adaptive)
     ]
 
 
-def road_assembly() -> Assembly:
+def study_road_assembly() -> Assembly:
     """Assembly of the vehicle on the study road."""
     return setups.vehicle(effects={"road": {"source": "study", "speed": 20.0}})
 
@@ -55,78 +55,87 @@ def road_assembly() -> Assembly:
 @cache
 def _tight_solution(duration: float) -> np.ndarray:
     """States at every millisecond by an integrator with tight tolerances."""
-    return setups.tight_solution(road_assembly(), 1e-3, duration).states
+    return setups.tight_solution(study_road_assembly(), 1e-3, duration).states
 
 
-def unstable_run_counts(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]:
+def unstable_run_counts(engine_name: str, run_function: RunFunction, quick: bool = False) -> dict[str, int]:
     """Numbers of runs that end right, refused, raised or silently wrong, for every fixed-step integrator at steps of 2
     to 10 ms and durations of 0.04 and 0.2 s, in a full run also of 2 s."""
     counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
-    for name in integrators(engine, adaptive=False):
-        for step in QUICK_STEPS if quick else UNSTABLE_STEPS:
-            for duration in QUICK_DURATIONS if quick else DURATIONS:
-                counts[_ending_of_unstable_run(engine, name, step, duration, runner)] += 1
+    for name in integrator_names(engine_name, is_adaptive=False):
+        for step in QUICK_TIME_STEPS if quick else UNSTABLE_TIME_STEPS:
+            for duration in QUICK_DURATIONS if quick else RUN_DURATIONS:
+                counts[_ending_of_unstable_run(engine_name, name, step, duration, run_function)] += 1
     return counts
 
 
-def _ending_of_unstable_run(engine: str, integrator: str, step: float, duration: float, runner: Runner) -> str:
+def _ending_of_unstable_run(
+    engine_name: str, integrator_name: str, time_step: float, duration: float, run_function: RunFunction
+) -> str:
+    """How a run at an unstable step ends: right, refused, raised or silently wrong."""
     try:
-        states = runner(engine, road_assembly(), step, duration, integrator).states
+        states = run_function(engine_name, study_road_assembly(), time_step, duration, integrator_name).states
     except InputError:
         return "refused"
     except RunFailed:
         return "raised"
-    truth = _tight_solution(duration)[:: round(step / 1e-3)]
+    truth = _tight_solution(duration)[:: round(time_step / 1e-3)]
     share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
-    return "right" if share <= SILENT_ERROR else "SILENT"
+    return "right" if share <= SILENT_ERROR_LIMIT else "SILENT"
 
 
-def nan_force_endings(engine: str) -> dict[str, str]:
+def nan_force_endings(engine_name: str) -> dict[str, str]:
     """How runs end if a force sample is NaN and has not passed the file reader, for every integrator and both
     interpolations."""
     base, endings = setups.vehicle(), {}
-    for name in integrators(engine):
+    for name in integrator_names(engine_name):
         for is_held in (True, False):
             forces = setups.static_forces(base, 102, 1e-3, is_held)
             forces.values[57, 0] = np.nan
-            attempt = partial(setups.run, engine, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
-            endings[f"{name}, {'held' if is_held else 'linear'}"] = ending(attempt)
+            attempt = partial(setups.run, engine_name, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
+            endings[f"{name}, {'held' if is_held else 'linear'}"] = run_ending(attempt)
     return endings
 
 
-def constrained_endings(engine: str) -> dict[str, str]:
+def prescribed_pitch_endings(engine_name: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
-    wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
+    wrong = [name for name in integrator_names(engine_name) if not CATALOGUE[engine_name][name].constraints]
     return {
-        name: ending(partial(setups.run, engine, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name)) for name in wrong
+        name: run_ending(partial(setups.run, engine_name, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name))
+        for name in wrong
     }
 
 
-def unchecked_constrained_endings() -> dict[str, str]:
+def unchecked_prescribed_pitch_endings() -> dict[str, str]:
     """How runs with a prescribed pitch end in Exudyn's explicit integrators if the check before the run is bypassed.
     The guard after the run compares the multiplier with the balance of moments."""
     names = [
-        name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED_INTEGRATORS.values()
+        name
+        for name in integrator_names("exudyn", is_adaptive=False)
+        if name not in setups.CONSTRAINED_INTEGRATORS.values()
     ]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
     scene = prescribed_pitch.guided_assembly()
-    return {name: ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
+    return {name: run_ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
-def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
+def _unexpected_endings(run_endings: dict[str, str], expected_ending: str) -> str:
     """The expected ending if all runs ended so; else text that lists the runs that did not."""
-    unexpected = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
-    return "; ".join(unexpected) or expected
+    unexpected = [f"{name}: {ended}" for name, ended in run_endings.items() if ended != expected_ending]
+    return "; ".join(unexpected) or expected_ending
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for each engine; a quick run has all of them, over fewer unstable steps and durations."""
     rows: list[Row] = []
     endings: Saved = {}
     for engine in CATALOGUE:
-        rows += _unstable_rows(engine, endings, quick)
-        rows += _input_rows(engine)
-    for name, endings_of in (("refused", constrained_endings("exudyn")), ("raised", unchecked_constrained_endings())):
+        rows += _unstable_step_rows(engine, endings, quick)
+        rows += _wrong_input_rows(engine)
+    for name, endings_of in (
+        ("refused", prescribed_pitch_endings("exudyn")),
+        ("raised", unchecked_prescribed_pitch_endings()),
+    ):
         how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
             behaviour_row(
@@ -139,7 +148,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             )
         )
     rows += [_explicit_solver_row(engine) for engine in ("reference", "mujoco")]
-    return [*rows, *_outside_engine_rows(), _disk_row(folder)], {"unstable": endings}
+    return [*rows, *_outside_engine_rows(), _full_disk_row(work_folder)], {"unstable": endings}
 
 
 def _outside_engine_rows() -> list[Row]:
@@ -168,93 +177,95 @@ def _outside_engine_rows() -> list[Row]:
     ]
 
 
-def _disk_row(folder: Path) -> Row:
+def _full_disk_row(work_folder: Path) -> Row:
     """Row: number of moments at which a full disk leaves an incomplete file or is not reported."""
     return Observed(
         "guards.full_disk",
         SYSTEM,
         f"number of moments (of {full_disk.MOMENTS_TRIED}) at which a full disk leaves an incomplete "
         "file or is not reported",
-        full_disk.damaged_moments(folder),
+        full_disk.damaged_moments(work_folder),
         "",
     ).at_most(0.0, "files are written whole or not at all", "none")
 
 
-def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
+def _unstable_step_rows(engine_name: str, run_endings: Saved, quick: bool) -> list[Row]:
     """Rows: no run at an unstable step gives a silent wrong result; if the check before the run is bypassed, the guard
     after the run raises an error."""
-    checked = unstable_run_counts(engine, setups.run, quick)
-    past = unstable_run_counts(engine, setups.unchecked_run, quick)
-    endings[engine] = {"checked": checked, "unchecked": past}
+    checked = unstable_run_counts(engine_name, setups.run, quick)
+    past = unstable_run_counts(engine_name, setups.unchecked_run, quick)
+    run_endings[engine_name] = {"checked": checked, "unchecked": past}
     total = sum(checked.values())
     return [
         Observed(
-            f"guards.unstable.{engine}",
+            f"guards.unstable.{engine_name}",
             SYSTEM,
-            f"silent wrong answers of {total} runs at 2 to 10 ms with every fixed-step integrator, {engine}",
+            f"silent wrong answers of {total} runs at 2 to 10 ms with every fixed-step integrator, {engine_name}",
             checked["SILENT"],
             "runs",
         ).at_most(0.0, "a step beyond the stability limit is refused with the limit named", "native"),
         behaviour_row(
-            f"guards.unstable.{engine}.unchecked",
+            f"guards.unstable.{engine_name}.unchecked",
             SYSTEM,
-            f"RK4 at 5 ms over 2 s with the step check bypassed, {engine}",
-            ending(lambda: setups.unchecked_run(engine, road_assembly(), 5e-3, 2.0)),
+            f"RK4 at 5 ms over 2 s with the step check bypassed, {engine_name}",
+            run_ending(lambda: setups.unchecked_run(engine_name, study_road_assembly(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
         ),
     ]
 
 
-def _input_rows(engine: str) -> list[Row]:
-    numbers = nan_force_endings(engine)
+def _wrong_input_rows(engine_name: str) -> list[Row]:
+    """Rows: NaN among the forces, and steps that do not divide the sampling period or the duration, are detected."""
+    numbers = nan_force_endings(engine_name)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = ending(lambda: sampled_input.damaged_file(engine, Path(files_folder)))
+        file = run_ending(lambda: sampled_input.damaged_file(engine_name, Path(files_folder)))
     return [
         behaviour_row(
-            f"guards.nan-file.{engine}",
+            f"guards.nan-file.{engine_name}",
             SYSTEM,
-            f"a force file that holds NaN, {engine}",
+            f"a force file that holds NaN, {engine_name}",
             file,
             "refused",
             "the reader names the line",
         ),
         behaviour_row(
-            f"guards.nan.{engine}",
+            f"guards.nan.{engine_name}",
             SYSTEM,
-            f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine}",
+            f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine_name}",
             _unexpected_endings(caught, "caught"),
             "caught",
             "Exudyn's explicit solvers return True with NaN",
         ),
         behaviour_row(
-            f"guards.step-sampling.{engine}",
+            f"guards.step-sampling.{engine_name}",
             SYSTEM,
-            f"a step that does not divide the sampling period, {engine}",
-            ending(lambda: sampled_input.uneven_steps(engine, Path())),
+            f"a step that does not divide the sampling period, {engine_name}",
+            run_ending(lambda: sampled_input.uneven_steps(engine_name, Path())),
             "refused",
             "a held sample would change in a step",
         ),
         behaviour_row(
-            f"guards.step-duration.{engine}",
+            f"guards.step-duration.{engine_name}",
             SYSTEM,
-            f"a step that does not divide the duration, {engine}",
-            ending(lambda: setups.run(engine, setups.vehicle(), 3e-4, 1.0)),
+            f"a step that does not divide the duration, {engine_name}",
+            run_ending(lambda: setups.run(engine_name, setups.vehicle(), 3e-4, 1.0)),
             "refused",
             "the run would end elsewhere",
         ),
     ]
 
 
-def _explicit_solver_row(engine: str) -> Row:
+def _explicit_solver_row(engine_name: str) -> Row:
     """Row: error of the enforced moment by an explicit solver in the hand-written reference and in MuJoCo, where the
     pitch is an input and no constraint."""
-    error = prescribed_pitch.explicit_error(engine, Path())
+    error = prescribed_pitch.explicit_error(engine_name, Path())
     return Observed(
-        f"guards.constraint.{engine}",
+        f"guards.constraint.{engine_name}",
         SYSTEM,
-        f"error of the enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
+        f"error of the enforced moment by an explicit solver, {engine_name}: the pitch is an input, no constraint is "
+        "active",
         error,
         "of its rms",
     ).at_most(1e-4, "the project's bound at 1 ms", "closed form")
@@ -269,8 +280,10 @@ def tables(case_data: Saved) -> list[Table]:
         for how, counts in both.items()
     )
     note = (
-        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in UNSTABLE_STEPS)} ms over "
-        f"{', '.join(f'{duration:g}' for duration in DURATIONS)} s on the study road. Silent: a complete run that is "
+        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in UNSTABLE_TIME_STEPS)} ms "
+        "over "
+        f"{', '.join(f'{duration:g}' for duration in RUN_DURATIONS)} s on the study road. Silent: a complete run "
+        "that is "
         "wrong by more than the motion itself. Past the check, short unstable runs are finite, small and wrong."
     )
     return [Table("Runs at too long steps", note, ("engine", "", *words), rows)]

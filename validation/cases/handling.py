@@ -30,32 +30,34 @@ from validation.spatial.cars import cornering_error, mirrored_coordinates
 
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"
-R19 = load_vehicle("r19_free")
-R19_WITHOUT_DRAG = replace(R19, drags=())
-WHEELS = ("fl", "fr", "rl", "rr")
-LANE_CHANGE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
-SMALL_LANE_CHANGE = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE_CHANGE.steer))
+R19_CAR = load_vehicle("r19_free")
+R19_CAR_WITHOUT_DRAG = replace(R19_CAR, drags=())
+WHEEL_NAMES = ("fl", "fr", "rl", "rr")
+LANE_CHANGE_CONTROLS = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
+SMALL_LANE_CHANGE_CONTROLS = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE_CHANGE_CONTROLS.steer))
 ROAD_LEVEL, SEED, SPEED = 4e-6, 3, 25.0
 SLOPE, GENTLE_FRICTION = 0.1, 0.05
 TIMING_ROUNDS = 60
 
 
-def lane_change(**changes: Any) -> Handling:
+def car_in_lane_change(**setting_changes: Any) -> Handling:
     """The car in a lane change on a rough road; keyword arguments replace its settings."""
-    return Handling(R19, controls=LANE_CHANGE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**changes)
+    return Handling(R19_CAR, controls=LANE_CHANGE_CONTROLS, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(
+        **setting_changes
+    )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on tyre forces, engines and mirror image; a full run also has turns, stops, slopes, energy, planted faults
     and computing time."""
     duration = 0.3 if quick else 1.0
-    drives = {engine: drive_run(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
+    drives = {engine: drive_run(engine, car_in_lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
     rows = [
-        _engines_row(drives),
-        *_tyre_rows(),
+        _engine_agreement_row(drives),
+        *_single_tyre_rows(),
         _friction_power_row(drives["mujoco"]),
         _mirror_row(duration),
-        _threads_row(),
+        _equal_bits_in_threads_row(),
     ]
     if not quick:
         rows += [
@@ -64,7 +66,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             *_load_transfer_rows(),
             _slope_standstill_row(),
             *_energy_rows(),
-            *_fault_rows(),
+            *_planted_fault_rows(),
             _tyre_cost_row(),
         ]
     return rows, {}
@@ -80,12 +82,13 @@ def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
     )
 
 
-def _engines_row(drives: dict[str, Drive]) -> Row:
+def _engine_agreement_row(drives_by_engine: dict[str, Drive]) -> Row:
+    """Row: largest difference between Exudyn and MuJoCo in a lane change on a rough road."""
     return Observed(
         "handling.engines",
         SYSTEM,
         "lane change on a rough road: positions and rates of the two engines",
-        _drive_difference(drives["mujoco"], drives["exudyn"]),
+        _drive_difference(drives_by_engine["mujoco"], drives_by_engine["exudyn"]),
         "m, rad, m/s, rad/s",
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
 
@@ -100,13 +103,14 @@ def locked_wheel_error() -> float:
     return float(np.abs(forces / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
 
 
-def _tyre_rows() -> list[Row]:
+def _single_tyre_rows() -> list[Row]:
+    """Rows: cornering stiffness at small slip, and force on locked wheels, compared with closed forms."""
     return [
         Observed(
             "handling.cornering",
             SYSTEM,
             "cornering stiffness at small slip / that of the ride vehicle - 1",
-            cornering_error(Handling(R19)),
+            cornering_error(Handling(R19_CAR)),
             "",
         ).at_most(1e-3, "the bristles are those of the ride vehicle's tyres", "closed form"),
         Observed(
@@ -119,30 +123,32 @@ def _tyre_rows() -> list[Row]:
     ]
 
 
-def _friction_power_row(drive: Drive) -> Row:
+def _friction_power_row(simulated_drive: Drive) -> Row:
+    """Row: friction of the tyres never feeds energy into the car."""
     return behaviour_row(
         "handling.power",
         SYSTEM,
         "power of each tyre's contact at every step of the lane change",
-        "never positive" if drive["power"].max() <= 0.0 else "positive",
+        "never positive" if simulated_drive["power"].max() <= 0.0 else "positive",
         "never positive",
         "friction takes energy out",
     )
 
 
-def mirror_difference(handling: Handling, duration: float) -> float:
+def mirror_difference(handling_car: Handling, duration: float) -> float:
     """Largest difference between a steer step to the left and the mirror image of a steer step to the right."""
     left, right = (
         drive_run(
-            "mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration
+            "mujoco", handling_car.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration
         )
         for side in (1.0, -1.0)
     )
-    return float(np.abs(left.run.positions - mirrored_coordinates(handling, right.run.positions)).max())
+    return float(np.abs(left.run.positions - mirrored_coordinates(handling_car, right.run.positions)).max())
 
 
 def _mirror_row(duration: float) -> Row:
-    inclined = Handling(R19, Tyres(inclination=-0.02))
+    """Row: a steer step to the left compared with the mirror image of one to the right."""
+    inclined = Handling(R19_CAR, Tyres(inclination=-0.02))
     return Observed(
         "handling.mirror",
         SYSTEM,
@@ -156,7 +162,7 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
     """Relative error of the yaw gain in a steady turn with small slip, compared with the closed form. ``plant_fault``
     may change the table of the vehicle first."""
     steer = 2e-5
-    handling = Handling(R19_WITHOUT_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
+    handling = Handling(R19_CAR_WITHOUT_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
     gain = steady_turn(handling, speed).yaw_gain
     if plant_fault is not None:
         plant_fault(handling)
@@ -164,7 +170,8 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
 
 
 def _steady_turn_rows() -> list[Row]:
-    turn = steady_turn(Handling(R19_WITHOUT_DRAG), 20.0)
+    """Rows: yaw gain of a steady turn compared with the single-track vehicle, and the understeer gradient."""
+    turn = steady_turn(Handling(R19_CAR_WITHOUT_DRAG), 20.0)
     return [
         Observed(
             "handling.turn",
@@ -180,8 +187,9 @@ def _steady_turn_rows() -> list[Row]:
 
 
 def _locked_stop_rows() -> list[Row]:
+    """Rows: braking force and distance of a stop with locked wheels, compared with Coulomb friction."""
     mu, speed = 0.7, 15.0
-    handling = Handling(R19_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEELS))
+    handling = Handling(R19_CAR_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEEL_NAMES))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.grip()
@@ -208,7 +216,7 @@ def _load_transfer_rows() -> list[Row]:
     """Rows: load transfer of the car, and of a box on four springs, compared with the balance of moments of all
     bodies."""
     rows = []
-    for name, vehicle in (("car", R19_WITHOUT_DRAG), ("box", box().handling.given)):
+    for name, vehicle in (("car", R19_CAR_WITHOUT_DRAG), ("box", box().handling.given)):
         braking = braked_error(drive_run("mujoco", sliding_car(vehicle, GENTLE_FRICTION), 10.0, 2.0), GENTLE_FRICTION)
         turn = turning_error(drive_run("mujoco", turning_car(vehicle, 2e-3), SPEED, 3.0))
         rows += [
@@ -232,7 +240,8 @@ def _load_transfer_rows() -> list[Row]:
 
 
 def _slope_standstill_row() -> Row:
-    handling = Handling(R19, Tyres(fixed=WHEELS), slope=SLOPE)
+    """Row: drift of a car that stands on a slope with locked wheels."""
+    handling = Handling(R19_CAR, Tyres(fixed=WHEEL_NAMES), slope=SLOPE)
     drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
     drift = float(np.abs(drive["slip_x"][last].mean(axis=0)).max())
@@ -242,11 +251,15 @@ def _slope_standstill_row() -> Row:
 
 
 def _energy_rows() -> list[Row]:
+    """Rows: error of the energy balance of a lane change, and its order in the step."""
     gaps = {}
-    for name, friction, controls in (("held", 20.0, SMALL_LANE_CHANGE), ("sliding", 0.9, LANE_CHANGE)):
+    for name, friction, controls in (
+        ("held", 20.0, SMALL_LANE_CHANGE_CONTROLS),
+        ("sliding", 0.9, LANE_CHANGE_CONTROLS),
+    ):
         for step in (1e-3, 5e-4):
             drive = drive_run(
-                "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
+                "mujoco", car_in_lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
             )
             gaps[name, step] = float(np.abs(unaccounted_energy(drive)).max())
     start_energy = drive_energy(drive)[0]
@@ -276,20 +289,21 @@ def _energy_rows() -> list[Row]:
     ]
 
 
-def _swap_axles(handling: Handling) -> None:
+def _swap_axles(handling_car: Handling) -> None:
     """Plant a fault: the bristle stiffnesses of front and rear tyres are exchanged."""
     for front, rear in ((0, 2), (1, 3)):
-        ahead, behind = handling.tyre_numbers(front), handling.tyre_numbers(rear)
+        ahead, behind = handling_car.tyre_numbers(front), handling_car.tyre_numbers(rear)
         ahead[at.BRISTLES], behind[at.BRISTLES] = float(behind[at.BRISTLES]), float(ahead[at.BRISTLES])
 
 
-def _reverse_steer(handling: Handling) -> None:
+def _reverse_steer(handling_car: Handling) -> None:
     """Plant a fault: one front wheel is steered in the opposite direction."""
-    handling.tyre_numbers(1)[at.STEERED] *= -1.0
+    handling_car.tyre_numbers(1)[at.STEERED] *= -1.0
 
 
-def _fault_rows() -> list[Row]:
-    soft, rough = Handling(R19), lane_change()
+def _planted_fault_rows() -> list[Row]:
+    """Rows: small faults planted in tyres, steering and friction are caught by the other checks."""
+    soft, rough = Handling(R19_CAR), car_in_lane_change()
     soft.tyre_numbers(0)[at.BRISTLES] *= 1.01
     rough.tyre_numbers(2)[at.GRIP] *= 1.0 + 1e-6
     seen = {
@@ -297,7 +311,7 @@ def _fault_rows() -> list[Row]:
         "bristles of front and rear swapped, by the steady turn": abs(yaw_gain_error(_swap_axles)) > 1e-3,
         "one wheel steered the other way, by the steady turn": abs(yaw_gain_error(_reverse_steer)) > 1e-3,
         "friction of one tyre 1e-6 off in one engine, by the engines": _drive_difference(
-            drive_run("mujoco", rough, SPEED, 1.0), drive_run("exudyn", lane_change(), SPEED, 1.0)
+            drive_run("mujoco", rough, SPEED, 1.0), drive_run("exudyn", car_in_lane_change(), SPEED, 1.0)
         )
         > 1e-10,
     }
@@ -315,7 +329,8 @@ def _fault_rows() -> list[Row]:
 
 
 def _tyre_cost_row() -> Row:
-    steps, (car, bare) = 50, (lane_change(waves=np.empty((0, 4))) for _ in range(2))
+    """Row: cost of MuJoCo's step with four tyres beyond the bare step and the tyres' own kernel."""
+    steps, (car, bare) = 50, (car_in_lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
     jobs = _timed_march(car, steps), _timed_march(bare, steps), lambda: _repeat_four_tyres(4 * steps)
     full, none, kernel = interleave(jobs, TIMING_ROUNDS, 0.001, clock=time.process_time)
@@ -330,9 +345,9 @@ def _tyre_cost_row() -> Row:
     ).aim(0.3, "seconds of the processor, median of interleaved rounds")
 
 
-def _threads_row() -> Row:
+def _equal_bits_in_threads_row() -> Row:
     """Row: lane changes at three speeds give the same bits in two threads of MuJoCo as in one."""
-    handling = lane_change()
+    handling = car_in_lane_change()
     built = FreeMujoco(driven_by(handling))
     built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
@@ -350,11 +365,11 @@ def _threads_row() -> Row:
     )
 
 
-def _timed_march(handling: Handling, step_count: int) -> Callable[[], Any]:
+def _timed_march(handling_car: Handling, step_count: int) -> Callable[[], Any]:
     """Function that runs a number of steps in MuJoCo's own loop, without preparation or output channels."""
-    built = FreeMujoco(driven_by(handling))
+    built = FreeMujoco(driven_by(handling_car))
     built.model.opt.timestep = 1e-4
-    start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
+    start, marcher = np.concatenate(handling_car.straight(SPEED))[None], Marcher(built.model)
 
     def job() -> None:
         with installed(built.law):
@@ -363,18 +378,18 @@ def _timed_march(handling: Handling, step_count: int) -> Callable[[], Any]:
     return job
 
 
-def _repeat_four_tyres(repeats: int) -> None:
+def _repeat_four_tyres(repeat_count: int) -> None:
     """Evaluate the forces of four slightly slipping tyres a number of times."""
     of = net(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST_FLEXIBILITY:] = 2e-8
     _repeat_tyre_forces(
-        contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats
+        contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeat_count
     )
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
-    for _ in range(repeats):
-        tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces)
+def _repeat_tyre_forces(tyre_contacts, sliding_velocities, strips, cells, middle_cells, forces, repeat_count):
+    for _ in range(repeat_count):
+        tyre_forces(tyre_contacts, sliding_velocities, strips, cells, middle_cells, forces)

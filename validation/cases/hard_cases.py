@@ -1,6 +1,6 @@
 """Hard cases: outcome of each implementation, and of a straightforward model without the guard or rule in question.
 
-A full run has every case; a quick run has the last case of each family and every QUICK_SPACING-th before it.
+A full run has every case; a quick run has the last case of each family and every QUICK_CASE_SPACING-th before it.
 """
 
 from collections import Counter
@@ -17,18 +17,18 @@ from validation.hard_cases.catalogue import COVERED_CLASSES, cases_beyond_catalo
 
 TITLE = "Hard cases"
 SYSTEM: System = "hard-cases"
-FEWEST_CASES = 80
+FEWEST_CASE_COUNT = 80
 """Least number of hard cases asked for; files of measurements count as one, since there are many."""
-FILE_FAMILIES = ("measured_files",)
-QUICK_SPACING = 24
+FAMILIES_OF_FILES = ("measured_files",)
+QUICK_CASE_SPACING = 24
 
 
 @allowing_breaches("hard cases go beyond what is taken for granted: that they stay stable, or say so, is judged")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for each case and implementation; a quick run has the last case of each family and every twenty-fourth
     before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
-    for family, case in quick_cases(known) if quick else known:
+    for family, case in cases_of_quick_run(known) if quick else known:
         with TemporaryDirectory() as files_folder:
             outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
             naive = case.naive(Path(files_folder)) if case.naive else ""
@@ -38,7 +38,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         sentence = {name: asdict(outcome) for name, outcome in outcomes.items()}
         data.append({"family": family, **case_texts, "outcomes": sentence, "naive": naive})
     words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
-    counted = sum(family not in FILE_FAMILIES for family, _ in known)
+    counted = sum(family not in FAMILIES_OF_FILES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
     rows += [
         Observed(
@@ -59,27 +59,38 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "hard.count",
             SYSTEM,
             "shortfall of the number of hard cases from 80, all measurement files counted once",
-            max(0, FEWEST_CASES - counted - 1),
+            max(0, FEWEST_CASE_COUNT - counted - 1),
             "cases",
         ).at_most(0.0, f"{counted} cases without measurement files", "none"),
     ]
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
-def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
-    """Cases of a quick run: the last case of each family, and every QUICK_SPACING-th before it."""
-    families = dict.fromkeys(family for family, _ in cases)
-    return [pair for name in families for pair in [case for case in cases if case[0] == name][::-QUICK_SPACING]]
+def cases_of_quick_run(cases_with_family: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
+    """Cases of a quick run: the last case of each family, and every QUICK_CASE_SPACING-th before it."""
+    families = dict.fromkeys(family for family, _ in cases_with_family)
+    return [
+        pair
+        for name in families
+        for pair in [case for case in cases_with_family if case[0] == name][::-QUICK_CASE_SPACING]
+    ]
 
 
-def _outcome_row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
+def _outcome_row(hard_case: Case, implementation_name: str, case_outcome: CaseOutcome) -> Row:
     """Row of a hard case: its error if a result is expected and given, else its outcome."""
-    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.without_engine else implementation}"
-    quantity = f"{case.name}{'' if case.without_engine else f', {implementation}'}: {case.exact_answer}"
-    if case.wanted(implementation) == "right" and outcome.error is not None:
-        error, judged = outcome.error, case.independence(implementation)
-        return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.tolerance_reason, judged)
-    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.difficulty)
+    name = hard_case.name.replace(",", "").replace(" ", "-")
+    id = f"hard.{name}.{'any' if hard_case.without_engine else implementation_name}"
+    quantity = (
+        f"{hard_case.name}{'' if hard_case.without_engine else f', {implementation_name}'}: {hard_case.exact_answer}"
+    )
+    if hard_case.wanted(implementation_name) == "right" and case_outcome.error is not None:
+        error, judged = case_outcome.error, hard_case.independence(implementation_name)
+        return Observed(id, SYSTEM, quantity, error, hard_case.unit).at_most(
+            hard_case.tolerance, hard_case.tolerance_reason, judged
+        )
+    return behaviour_row(
+        id, SYSTEM, quantity, case_outcome.word, hard_case.wanted(implementation_name), hard_case.difficulty
+    )
 
 
 def tables(case_data: Saved) -> list[Table]:
@@ -127,7 +138,7 @@ def _family_table(case_data: Saved) -> Table:
     )
 
 
-def _case_table(entries: list[Saved]) -> Table:
+def _case_table(case_entries: list[Saved]) -> Table:
     """Table of all cases: what is hard, the check, and the outcome in each implementation."""
     rows = tuple(
         (
@@ -140,7 +151,7 @@ def _case_table(entries: list[Saved]) -> Table:
             ),
             entry["naive"],
         )
-        for entry in entries
+        for entry in case_entries
     )
     note = (
         "Each implementation is right (its error is beside the word), refuses before the run, or raises after it. "
@@ -150,9 +161,13 @@ def _case_table(entries: list[Saved]) -> Table:
     return Table(TITLE, note, ("case", "what is hard", "checked against", *IMPLEMENTATIONS, "without the guard"), rows)
 
 
-def _tolerance_text(saved_entry: Saved) -> str:
-    return f" (allowed {saved_entry['tolerance']:.0e} {saved_entry['unit']})" if saved_entry["unit"] else ""
+def _tolerance_text(case_entry: Saved) -> str:
+    return f" (allowed {case_entry['tolerance']:.0e} {case_entry['unit']})" if case_entry["unit"] else ""
 
 
-def _outcome_text(outcome: Saved) -> str:
-    return outcome["word"] if outcome["error"] is None else f"{outcome['word']}, {outcome['error']:.1e}"
+def _outcome_text(case_outcome: Saved) -> str:
+    return (
+        case_outcome["word"]
+        if case_outcome["error"] is None
+        else f"{case_outcome['word']}, {case_outcome['error']:.1e}"
+    )

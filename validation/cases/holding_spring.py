@@ -31,7 +31,7 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
 SEED = 13
-DURATION, STEP, ALLOWED_PITCH_ERROR = 60.0, 1e-3, 0.2
+DURATION, TIME_STEP, ALLOWED_PITCH_ERROR = 60.0, 1e-3, 0.2
 """Length and step (s) of the runs, and largest pitch error (rad) of a run that the spring holds."""
 FORCE_NOISE = 30.7
 """Standard deviation (N) of the noise on each force sample at 1 kHz."""
@@ -41,14 +41,16 @@ BISECTION_COUNT = 7
 
 @dataclass(frozen=True)
 class SpringSetting:
-    """One setting of the holding spring. damping : ratio to the spring's critical damping with the inertia I + J;
-    disturbed : whether there is noise and a perturbed model."""
+    """One setting of the holding spring. damping_ratio : ratio to the spring's critical damping with the inertia I + J;
+    is_disturbed : whether there is noise and a perturbed model."""
 
-    damping: float
-    disturbed: bool
+    damping_ratio: float
+    is_disturbed: bool
 
     def __str__(self) -> str:
-        return f"{'noise, perturbed model' if self.disturbed else 'undisturbed'}, damping ratio {self.damping:g}"
+        return (
+            f"{'noise, perturbed model' if self.is_disturbed else 'undisturbed'}, damping ratio {self.damping_ratio:g}"
+        )
 
 
 JUDGED_SETTINGS = (
@@ -61,68 +63,95 @@ REPORTED_SETTINGS = (SpringSetting(1.0, False), SpringSetting(0.0, True))
 
 
 @dataclass(frozen=True)
-class FreeRuns:
-    """True pitch (n,) in rad, a run without the spring that starts in the true state for each value of ``disturbed``,
-    and the predicted stiffness (N m/rad)."""
+class RunsWithoutSpring:
+    """True pitch (n,) in rad, a run without the spring that starts in the true state for each value of
+    ``is_disturbed``, and the predicted stiffness (N m/rad)."""
 
-    pitch: np.ndarray
-    runs: dict[bool, Assembly]
+    true_pitch: np.ndarray
+    assemblies: dict[bool, Assembly]
     predicted_stiffness: float
 
 
 @allowing_breaches("a spring that is too soft lets the run drift off, which is what is shown", "upright")
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: in each setting, a spring of 0.6 of the predicted stiffness fails and one of 1.2 holds; a full run also has
     the smallest stiffness by bisection. A quick run has one setting."""
-    measured = _prepared_runs(folder)
+    measured = _runs_without_spring(work_folder)
     settings = JUDGED_SETTINGS[2:3] if quick else JUDGED_SETTINGS
-    rows = [row for setting in settings for row in _limit_rows(setting, measured, "reference")]
+    rows = [row for setting in settings for row in _holding_stiffness_rows(setting, measured, "reference")]
     smallest: list[Any] = []
     if not quick:
-        rows += [row for engine in ("exudyn", "mujoco") for row in _limit_rows(JUDGED_SETTINGS[3], measured, engine)]
+        rows += [
+            row
+            for engine in ("exudyn", "mujoco")
+            for row in _holding_stiffness_rows(JUDGED_SETTINGS[3], measured, engine)
+        ]
         smallest = [
             (str(setting), _smallest_stiffness(setting, measured)) for setting in (*JUDGED_SETTINGS, *REPORTED_SETTINGS)
         ]
         rows += [
-            _stiffness_row(i, name, stiffness, measured.predicted_stiffness)
+            _smallest_stiffness_row(i, name, stiffness, measured.predicted_stiffness)
             for i, (name, stiffness) in enumerate(smallest)
         ]
     return rows, {"law": measured.predicted_stiffness, "found": smallest}
 
 
-def _prepared_runs(folder: Path) -> FreeRuns:
-    true = virtual_drive(folder, DURATION, STEP, STEP)
+def _runs_without_spring(work_folder: Path) -> RunsWithoutSpring:
+    """The virtual measurement, the runs without a spring, and the stiffness predicted from the wheel forces."""
+    true = virtual_drive(work_folder, DURATION, TIME_STEP, TIME_STEP)
     noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
-    quiet = assembly_of_scene(force_scene(folder, step=STEP, duration=DURATION))
+    quiet = assembly_of_scene(force_scene(work_folder, step=TIME_STEP, duration=DURATION))
     noisy = assembly_of_scene(
-        force_scene(folder, step=STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise)
+        force_scene(
+            work_folder, step=TIME_STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise
+        )
     )
     predicted_stiffness = holding_stiffness(quiet.parameters, pitch_error_growth(quiet).rate)
-    return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness)
+    return RunsWithoutSpring(
+        true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness
+    )
 
 
 def _largest_pitch_error(
-    setting: SpringSetting, stiffness: float, free_runs: FreeRuns, engine: str = "reference"
+    spring_setting: SpringSetting,
+    stiffness: float,
+    runs_without_spring: RunsWithoutSpring,
+    engine_name: str = "reference",
 ) -> float:
     """Largest pitch error (rad) of a run with a holding spring of a given stiffness (N m/rad)."""
-    free = free_runs.runs[setting.disturbed]
-    damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
+    free = runs_without_spring.assemblies[spring_setting.is_disturbed]
+    damping = (
+        2
+        * spring_setting.damping_ratio
+        * math.sqrt(stiffness * rigid_pitch(runs_without_spring.assemblies[False].parameters).total_inertia)
+    )
     held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    return float(np.abs(simulate(free.scene, engine, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
+    return float(
+        np.abs(
+            simulate(free.scene, engine_name, assembly=held_assembly)["pitch"] - runs_without_spring.true_pitch
+        ).max()
+    )
 
 
-def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine: str) -> list[Row]:
+def _holding_stiffness_rows(
+    spring_setting: SpringSetting, runs_without_spring: RunsWithoutSpring, engine_name: str
+) -> list[Row]:
     """Rows: a spring of 0.6 of the predicted stiffness fails to hold the pitch, and one of 1.2 holds the pitch."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
-        off = _largest_pitch_error(setting, factor * free_runs.predicted_stiffness, free_runs, engine)
-        key = f"holding_spring.{expected}.{engine}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
+        off = _largest_pitch_error(
+            spring_setting, factor * runs_without_spring.predicted_stiffness, runs_without_spring, engine_name
+        )
+        disturbance = ".disturbed" if spring_setting.is_disturbed else ""
+        key = f"holding_spring.{expected}.{engine_name}.{spring_setting.damping_ratio:g}{disturbance}"
         rows.append(
             behaviour_row(
                 key,
                 SYSTEM,
-                f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
+                f"spring of {factor} of the predicted {runs_without_spring.predicted_stiffness:.1f} N m/rad, "
+                f"{spring_setting}, "
+                f"{engine_name}",
                 "holds" if off <= ALLOWED_PITCH_ERROR else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {ALLOWED_PITCH_ERROR} allowed",
@@ -132,25 +161,28 @@ def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine: str) -> lis
     return rows
 
 
-def _smallest_stiffness(setting: SpringSetting, free_runs: FreeRuns) -> float:
+def _smallest_stiffness(spring_setting: SpringSetting, runs_without_spring: RunsWithoutSpring) -> float:
     """Smallest stiffness (N m/rad) that holds the pitch, by bisection; NaN if even the upper end of the range fails."""
-    low, high = 0.5 * free_runs.predicted_stiffness, 1.3 * free_runs.predicted_stiffness
-    if _largest_pitch_error(setting, high, free_runs) > ALLOWED_PITCH_ERROR:
+    low, high = 0.5 * runs_without_spring.predicted_stiffness, 1.3 * runs_without_spring.predicted_stiffness
+    if _largest_pitch_error(spring_setting, high, runs_without_spring) > ALLOWED_PITCH_ERROR:
         return math.nan
     for _ in range(BISECTION_COUNT):
         middle = 0.5 * (low + high)
         low, high = (
-            (low, middle) if _largest_pitch_error(setting, middle, free_runs) <= ALLOWED_PITCH_ERROR else (middle, high)
+            (low, middle)
+            if _largest_pitch_error(spring_setting, middle, runs_without_spring) <= ALLOWED_PITCH_ERROR
+            else (middle, high)
         )
     return high
 
 
-def _stiffness_row(index: int, setting_name: str, stiffness: float, predicted_stiffness: float) -> Row:
+def _smallest_stiffness_row(setting_index: int, setting_name: str, stiffness: float, predicted_stiffness: float) -> Row:
+    """Row: ratio of the predicted stiffness to the smallest that holds the pitch."""
     key, what = (
-        f"holding_spring.found.{index + 1}",
+        f"holding_spring.found.{setting_index + 1}",
         f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {setting_name}",
     )
-    if index >= len(JUDGED_SETTINGS):
+    if setting_index >= len(JUDGED_SETTINGS):
         return Observed(key, SYSTEM, what, predicted_stiffness / stiffness, "").beside(
             "1 for little damping and no noise", "said, not judged"
         )

@@ -30,34 +30,34 @@ from validation.spatial.cars import hub_forces_by_jacobians, r19, random_states,
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"
-SEED, PATH_COUNT, NOISE_SECONDS = 31, 48, 4.0
+SEED, NOISE_PATH_COUNT, NOISE_SECONDS = 31, 48, 4.0
 """Seed, number of paths and their length (s) in the ensemble."""
 TILT_ANGLE = 0.1
 """Roll angle (rad) with which the effect of gravity on a tilted vehicle is tested."""
-STEP = 1e-3
+TIME_STEP = 1e-3
 
 
 @allowing_breaches("runs that nothing holds drift off, which is what is shown")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of engines and closed forms; a full run also has measurements, error growth, stabilisers, the asymmetric
     twin and planted faults."""
     car = r19()
     rows = [
         *_acceleration_rows("r19_free", car),
-        _wrench_row(car),
-        *_gravity_rows(car),
-        _toppling_row(car),
+        _hub_wrench_row(car),
+        *_tilted_vehicle_rows(car),
+        _toppling_rate_row(car),
         _noisy_engines_row(car, 0.2 if quick else 2.0),
         *hub_inputs.rows(car, quick),
     ]
     if quick:
         return rows, {}
-    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduction_rows(car), *_growth_rows(car)]
-    scenes = {frame: _study_scene(frame) for frame in ("hub", "inertial")}
+    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduced_motion_rows(car), *_noise_growth_rows(car)]
+    scenes = {frame: _hub_force_study_scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
         rows += [*_stabilised_rows(frame, comparison), _prescribed_angles_row(frame, comparison)]
-    return rows + _fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
+    return rows + _planted_fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
 
 
 def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
@@ -67,13 +67,13 @@ def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
     for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
         q, v = random_states(vehicle, i)
         written, *engines = (
-            build(engine, vehicle, random_wrenches(vehicle, frame, guide), STEP, STEP).acceleration(0.0, q, v)
+            build(engine, vehicle, random_wrenches(vehicle, frame, guide), TIME_STEP, TIME_STEP).acceleration(0.0, q, v)
             for engine in ENGINES
         )
         worst = max(worst, *(float(np.abs(a - written).max() / np.abs(written).max()) for a in engines))
     q, v = random_states(vehicle, 7)
     bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
-    written = build("reference", bare, static_forces(bare, 3), STEP, STEP).acceleration(0.0, q, v)
+    written = build("reference", bare, static_forces(bare, 3), TIME_STEP, TIME_STEP).acceleration(0.0, q, v)
     slack = SpringDamper("none", vehicle.chassis, vehicle.uncut.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
     expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(0.0, q, v)
     expected -= GRAVITY * np.eye(len(q))[Z]
@@ -97,14 +97,14 @@ def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _wrench_row(vehicle: CutVehicle) -> Row:
+def _hub_wrench_row(vehicle: CutVehicle) -> Row:
     """Row: generalised forces of the hub wrenches by the compiled kernel, compared with those by MuJoCo's own
     Jacobians."""
     (q, _), worst = random_states(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
         hub_inputs = random_wrenches(vehicle, frame, has_guide=False)
         built, bare = (
-            build("mujoco", vehicle, replace(hub_inputs, hubs=force_factor * hub_inputs.hubs), STEP, STEP)
+            build("mujoco", vehicle, replace(hub_inputs, hubs=force_factor * hub_inputs.hubs), TIME_STEP, TIME_STEP)
             for force_factor in (1.0, 0.0)
         )
         expected = hub_forces_by_jacobians(built, q, hub_inputs.hubs[0], frame)
@@ -119,15 +119,16 @@ def _wrench_row(vehicle: CutVehicle) -> Row:
     ).at_most(1e-12, "places, axes, frames", "native")
 
 
-def _tilted_run(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
-    steps, start = round(duration / STEP), np.zeros(2 * vehicle.size)
-    start[ROLL] = tilt
-    return build("mujoco", vehicle, static_forces(vehicle, 2 * steps + 1, frame), STEP, duration).run(
+def _tilted_run(vehicle: CutVehicle, force_frame: str, roll_angle: float, duration: float) -> HubRun:
+    """Run of a vehicle that starts at a roll angle (rad) under constant static hub forces."""
+    steps, start = round(duration / TIME_STEP), np.zeros(2 * vehicle.size)
+    start[ROLL] = roll_angle
+    return build("mujoco", vehicle, static_forces(vehicle, 2 * steps + 1, force_frame), TIME_STEP, duration).run(
         *np.split(start, 2)
     )
 
 
-def _gravity_rows(vehicle: CutVehicle) -> list[Row]:
+def _tilted_vehicle_rows(vehicle: CutVehicle) -> list[Row]:
     """Rows: a tilted vehicle under body-fixed static forces moves sideways as a rigid body, and its section forces do
     not change."""
     run = _tilted_run(vehicle, "hub", TILT_ANGLE, 1.0)
@@ -156,7 +157,7 @@ def _gravity_rows(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _toppling_row(vehicle: CutVehicle) -> Row:
+def _toppling_rate_row(vehicle: CutVehicle) -> Row:
     """Row: under forces that keep their directions in space, the vehicle topples like an inverted pendulum."""
     run, expected = _tilted_run(vehicle, "inertial", 1e-6, 2.0), float(rigid_vehicle(vehicle).toppling_rates()[0])
     late = np.abs(run.states[[1000, 2000], ROLL])
@@ -172,10 +173,12 @@ def _toppling_row(vehicle: CutVehicle) -> Row:
 
 def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
     """Row: difference between the runs of all engines under the same noisy forces, without a stabiliser."""
-    steps = round(duration / STEP)
+    steps = round(duration / TIME_STEP)
     hub_inputs = static_forces(vehicle, steps + 1)
-    noisy = HubForces(hub_inputs.hubs, STEP, "hub").with_noise(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
-    paths = [hub_model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
+    noisy = HubForces(hub_inputs.hubs, TIME_STEP, "hub").with_noise(
+        np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED
+    )
+    paths = [hub_model(engine, vehicle, noisy, TIME_STEP, duration).run().states for engine in ENGINES]
     return Observed(
         "hub_forces.engines_on_noise",
         SYSTEM,
@@ -186,23 +189,23 @@ def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
     ).at_most(1e-9, "same tableau, same step", "shared kernel")
 
 
-def _road_input(vehicle: CutVehicle, duration: float) -> HubInputs:
+def _hub_inputs_on_road(vehicle: CutVehicle, duration: float) -> HubInputs:
     """Input of the vehicle on a class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
-    return two_tracks(vehicle, left, right, 20.0, STEP, round(duration / STEP))
+    return two_tracks(vehicle, left, right, 20.0, TIME_STEP, round(duration / TIME_STEP))
 
 
-def _reproduction_rows(vehicle: CutVehicle) -> list[Row]:
+def _reproduced_motion_rows(vehicle: CutVehicle) -> list[Row]:
     """Rows: hub forces recorded on a road without noise reproduce the motion, up to interpolation errors between the
     samples."""
     duration = 2.0
-    true = true_run("mujoco", vehicle, _road_input(vehicle, duration), "hub", STEP, duration)
+    true = true_run("mujoco", vehicle, _hub_inputs_on_road(vehicle, duration), "hub", TIME_STEP, duration)
     off = {}
     readings: tuple[Interpolation, ...] = ("linear", "smooth")
     for interpolation in readings:
         for every in (4, 2):
             measured, _ = recorded_measurement(true, "hub", every)
-            run = hub_model("mujoco", vehicle, measured, STEP, duration, interpolation).run()
+            run = hub_model("mujoco", vehicle, measured, TIME_STEP, duration, interpolation).run()
             off[interpolation, every] = float(np.abs((run.states - true.states)[:, [ROLL, PITCH]]).max())
     order = np.log2(off["linear", 4] / off["linear", 2])
     return [
@@ -223,7 +226,7 @@ def _reproduction_rows(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _growth_rows(vehicle: CutVehicle) -> list[Row]:
+def _noise_growth_rows(vehicle: CutVehicle) -> list[Row]:
     """Rows: mean squares of an ensemble under white noise divided by their laws. They follow a chi-square distribution
     with as many degrees of freedom as paths."""
     steps, step = round(NOISE_SECONDS / 2e-3), 2e-3
@@ -232,20 +235,20 @@ def _growth_rows(vehicle: CutVehicle) -> list[Row]:
     ends = np.array(
         [
             hub_model("mujoco", vehicle, still.with_noise(deviation, SEED, path), step, NOISE_SECONDS).run().states[-1]
-            for path in range(PATH_COUNT)
+            for path in range(NOISE_PATH_COUNT)
         ]
     )
     body, at = rigid_vehicle(vehicle), np.array([NOISE_SECONDS])
     law = body.angle_variance(deviation, step, at)[0]
     sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
-    low, high = chi2.ppf([5e-4, 1 - 5e-4], PATH_COUNT) / PATH_COUNT
+    low, high = chi2.ppf([5e-4, 1 - 5e-4], NOISE_PATH_COUNT) / NOISE_PATH_COUNT
     named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
     return [
         Observed(
             f"hub_forces.growth_{name}",
             SYSTEM,
             f"ratio of the mean square of {name} after {NOISE_SECONDS:g} s of white noise to its law, "
-            f"{PATH_COUNT} paths",
+            f"{NOISE_PATH_COUNT} paths",
             float(np.mean(ends[:, i] ** 2) / variance),
             "1",
         ).within(
@@ -258,87 +261,90 @@ def _growth_rows(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _study_scene(frame: str) -> HubScene:
+def _hub_force_study_scene(force_frame: str) -> HubScene:
     """Scene of the hub force study, 8 s long."""
-    tables = {"vehicle": {"file": "r19_free"}, "run": {"duration": 8.0}, "road": {}, "forces": {"frame": frame}}
+    tables = {"vehicle": {"file": "r19_free"}, "run": {"duration": 8.0}, "road": {}, "forces": {"frame": force_frame}}
     return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 
 
-def _stabilised_rows(frame: str, comparison: Comparison) -> list[Row]:
+def _stabilised_rows(force_frame: str, run_comparison: Comparison) -> list[Row]:
     """Rows: difference between the engines before drift-off, errors of roll and pitch with the tilt filter, and damage
     that each run predicts."""
-    off = np.abs(comparison.errors(comparison.runs[FILTERED_RUN])).max(axis=0)
+    off = np.abs(run_comparison.errors(run_comparison.runs[FILTERED_RUN])).max(axis=0)
     rows = [
         Observed(
-            f"hub_forces.engines_{frame}",
+            f"hub_forces.engines_{force_frame}",
             SYSTEM,
-            f"largest difference between the engines before drift-off, noisy road run of 8 s, frame {frame!r}",
-            comparison.largest_engine_difference(),
+            f"largest difference between the engines before drift-off, noisy road run of 8 s, frame {force_frame!r}",
+            run_comparison.largest_engine_difference(),
             "m, rad, 1/s",
         ).at_most(1e-9, "same tableau, same step", "shared kernel"),
         *(
             Observed(
-                f"hub_forces.filter_{name}_{frame}",
+                f"hub_forces.filter_{name}_{force_frame}",
                 SYSTEM,
-                f"largest error of {name} with the filter, frame {frame!r}",
+                f"largest error of {name} with the filter, frame {force_frame!r}",
                 float(off[i]),
                 "rad",
             ).at_most(0.01, "demanded", "none")
             for i, name in enumerate(("roll", "pitch"))
         ),
         Observed(
-            f"hub_forces.drift_off_{frame}",
+            f"hub_forces.drift_off_{force_frame}",
             SYSTEM,
-            f"time at which the free run leaves the true roll or pitch by 0.05 rad (8 s: never), frame {frame!r}",
-            min(comparison.drift_off(comparison.runs["free, mujoco"]), 8.0),
+            f"time at which the free run leaves the true roll or pitch by 0.05 rad (8 s: never), frame {force_frame!r}",
+            min(run_comparison.drift_off(run_comparison.runs["free, mujoco"]), 8.0),
             "s",
         ).beside("", "stated"),
     ]
-    for name in (name for name in comparison.runs if "exudyn" not in name):
-        ratios = comparison.damages(comparison.runs[name]["section_force"]).values()
+    for name in (name for name in run_comparison.runs if "exudyn" not in name):
+        ratios = run_comparison.damages(run_comparison.runs[name]["section_force"]).values()
         for end, value in (("least", min(ratios)), ("most", max(ratios))):
             what = (
                 f"{end} ratio of the damage of {len(ratios)} springs, mounts and bars to the "
-                f"true damage; {name}, frame {frame!r}"
+                f"true damage; {name}, frame {force_frame!r}"
             )
             rows.append(
-                Observed(f"hub_forces.damage_{end}_{name.split(',')[0]}_{frame}", SYSTEM, what, value, "1").beside(
-                    1.0, "body-frame section forces, slope 5"
-                )
+                Observed(
+                    f"hub_forces.damage_{end}_{name.split(',')[0]}_{force_frame}", SYSTEM, what, value, "1"
+                ).beside(1.0, "body-frame section forces, slope 5")
             )
     return rows
 
 
-def _prescribed_angles_row(frame: str, comparison: Comparison) -> Row:
+def _prescribed_angles_row(force_frame: str, run_comparison: Comparison) -> Row:
     """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
-    measurement = comparison.measurement
+    measurement = run_comparison.measurement
     assert measurement.truth is not None
     steps = measurement.scene.step_count
     hub_inputs = inputs_with_angles(
-        measurement.forces.hub_inputs(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP
+        measurement.forces.hub_inputs(TIME_STEP, steps),
+        measurement.truth.states[:, [ROLL, PITCH]],
+        TIME_STEP,
+        TIME_STEP,
     )
-    run = build("mujoco", measurement.vehicle, hub_inputs, STEP, steps * STEP).run()
-    ratios = np.array([*comparison.damages(run.elements).values()])
+    run = build("mujoco", measurement.vehicle, hub_inputs, TIME_STEP, steps * TIME_STEP).run()
+    ratios = np.array([*run_comparison.damages(run.elements).values()])
     return Observed(
-        f"hub_forces.prescribed_{frame}",
+        f"hub_forces.prescribed_{force_frame}",
         SYSTEM,
-        f"largest deviation of a damage ratio from 1 with the true roll and pitch prescribed, frame {frame!r}",
+        f"largest deviation of a damage ratio from 1 with the true roll and pitch prescribed, frame {force_frame!r}",
         float(np.abs(ratios - 1).max()),
         "1",
     ).at_most(0.1, "force noise of 0.2 % alone changes lightly loaded bushes by some per cent", "none")
 
 
-def _fault_rows(scene: HubScene) -> list[Row]:
+def _planted_fault_rows(study_scene: HubScene) -> list[Row]:
     """Rows: hub forces in a wrong frame, or of exchanged hubs, are refused because they contradict the measured angles.
 
     The runs take 5 s: in 2 s, another frame cannot be distinguished from an offset of 30 N at a wheel, which is no
     contradiction.
     """
     vehicle, duration = r19(), 5.0
-    hub_inputs = _road_input(vehicle, duration)
-    clean, angles = recorded_measurement(true_run("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
+    hub_inputs = _hub_inputs_on_road(vehicle, duration)
+    clean, angles = recorded_measurement(true_run("mujoco", vehicle, hub_inputs, "hub", TIME_STEP, duration), "hub", 2)
     in_space, _ = recorded_measurement(
-        true_run("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2
+        true_run("mujoco", vehicle, hub_inputs, "inertial", TIME_STEP, duration), "inertial", 2
     )
     parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
@@ -353,7 +359,7 @@ def _fault_rows(scene: HubScene) -> list[Row]:
     for i, (name, samples) in enumerate(planted.items()):
         faulty, outcome = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
-            estimate(vehicle, faulty, angles, Deviations(scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
+            estimate(vehicle, faulty, angles, Deviations(study_scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
         except InputError:
             outcome = "refused"
         expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"

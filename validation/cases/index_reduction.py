@@ -23,7 +23,7 @@ from validation.hard_cases.prescribed_pitch import UncheckedExudyn
 
 TITLE = "Drift by index reduction, and drift by noise"
 SYSTEM: System = "drift"
-STEP = 1e-3
+TIME_STEP = 1e-3
 START_ERROR, START_RATE_ERROR = 1e-4, 1e-4
 """Error of the initial angle (rad) and rate (rad/s), of the size that a measured start has or that rounding accumulates
 in a long run."""
@@ -36,8 +36,8 @@ PITCH_BANDWIDTH = 5.0
 """Bandwidth (Hz) of the pitch angle that is integrated from such a gyro."""
 HAND_WRITTEN_FORMULATIONS: dict[str, Saved] = {
     "index 1": {},
-    "index 1, Baumgarte": {"alpha": BAUMGARTE_RATE},
-    "index 1, projection": {"projected": True},
+    "index 1, Baumgarte": {"baumgarte_rate": BAUMGARTE_RATE},
+    "index 1, projection": {"with_projection": True},
 }
 EXUDYN_INTEGRATORS = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
 MISSING_FORMULATIONS = (
@@ -60,39 +60,39 @@ MISSING_FORMULATIONS = (
 
 
 @dataclass(frozen=True)
-class MeasuredDrive:
+class MeasuredPitchDrive:
     """Virtual measurement on the study road: folder with its files, duration (s), and true pitch (n,) in rad."""
 
-    folder: Path
+    work_folder: Path
     duration: float
-    pitch: np.ndarray
+    true_pitch: np.ndarray
 
-    def scene(self, **effects: Any) -> Scene:
+    def scene(self, **effect_tables: Any) -> Scene:
         """Scene of the vehicle under the measured forces, which are interpolated linearly."""
-        return force_scene(self.folder, step=STEP, duration=self.duration, effects=effects)
+        return force_scene(self.work_folder, step=TIME_STEP, duration=self.duration, effects=effect_tables)
 
-    def prescribed_assembly(self, file: str = "pitch.csv", **values: Any) -> Assembly:
+    def prescribed_assembly(self, file_name: str = "pitch.csv", **effect_values: Any) -> Assembly:
         """Assembly of the vehicle whose pitch is prescribed by one of the files."""
-        return assembly_of_scene(self.scene(prescribed_pitch={"file": file, **values}))
+        return assembly_of_scene(self.scene(prescribed_pitch={"file": file_name, **effect_values}))
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of pitch gaps after a start off the constraint, by formulation, and of drift by noise with and without
     prescribed pitch. A quick run has short runs."""
     with TemporaryDirectory() as name:
         drive = _measured_drive(Path(name), 0.2 if quick else 4.0)
-        gaps, laws = _pitch_gaps(drive), _gap_laws(drive)
+        gaps, laws = _pitch_gaps(drive), _pitch_gap_laws(drive)
         walked = _pitch_errors(
             drive.prescribed_assembly("gyro.csv", bandwidth=PITCH_BANDWIDTH), drive
         )  # from a start on the constraint
         loose = _unguided_pitch_errors(_measured_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
-        *_gap_rows(gaps, laws, drive.duration),
-        *_noise_rows(walked, loose),
+        *_pitch_gap_rows(gaps, laws, drive.duration),
+        *_noise_drift_rows(walked, loose),
         *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in MISSING_FORMULATIONS),
     ]
-    times = STEP * np.arange(len(next(iter(gaps.values()))))
+    times = TIME_STEP * np.arange(len(next(iter(gaps.values()))))
     return rows, {
         "times": times.tolist(),
         "gaps": {name: gap.tolist() for name, gap in gaps.items()},
@@ -101,84 +101,98 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _measured_drive(folder: Path, duration: float) -> MeasuredDrive:
+def _measured_drive(work_folder: Path, duration: float) -> MeasuredPitchDrive:
     """Make a virtual measurement on the study road; write its forces, its pitch, and the pitch integrated from a noisy
     gyro."""
-    measured = virtual_drive(folder, duration, STEP, STEP)
-    walk = RATE_WALK * np.sqrt(STEP) * np.cumsum(normal_samples(SEED, 0, len(measured.times), 1)[:, 0])
-    write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
-    return MeasuredDrive(folder, duration, measured["pitch"])
+    measured = virtual_drive(work_folder, duration, TIME_STEP, TIME_STEP)
+    walk = RATE_WALK * np.sqrt(TIME_STEP) * np.cumsum(normal_samples(SEED, 0, len(measured.times), 1)[:, 0])
+    write_time_series(work_folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, TIME_STEP)
+    return MeasuredPitchDrive(work_folder, duration, measured["pitch"])
 
 
-def _pitch_errors(assembly: Assembly, drive: MeasuredDrive) -> dict[str, np.ndarray]:
+def _pitch_errors(assembly: Assembly, measured_drive: MeasuredPitchDrive) -> dict[str, np.ndarray]:
     """Difference (n,) in rad between the run's pitch and the true pitch for every constraint formulation, from the
     assembly's initial state."""
-    duration = drive.duration
+    duration = measured_drive.duration
     paths = {
-        name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND_WRITTEN_FORMULATIONS.items()
+        name: IndexOneVehicle(assembly, **values).run(TIME_STEP, duration)
+        for name, values in HAND_WRITTEN_FORMULATIONS.items()
     }
     for name, integrator in EXUDYN_INTEGRATORS.items():
-        paths[name] = UncheckedExudyn(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
+        paths[name] = (
+            UncheckedExudyn(assembly, Settings(integrator, TIME_STEP, duration, spectral_radius=0.6)).run().states
+        )
     paths |= {
-        f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
+        f"eliminated, {engine}": build(engine, assembly, Settings("RK4", TIME_STEP, duration)).run().states
         for engine in ("reference", "mujoco")
     }
-    return {name: states[:, 3] - drive.pitch for name, states in paths.items()}
+    return {name: states[:, 3] - measured_drive.true_pitch for name, states in paths.items()}
 
 
-def _pitch_gaps(drive: MeasuredDrive) -> dict[str, np.ndarray]:
+def _pitch_gaps(measured_drive: MeasuredPitchDrive) -> dict[str, np.ndarray]:
     """Difference (n,) in rad between the run's pitch and the prescribed pitch for every constraint formulation, if the
     start is wrong by START_ERROR and START_RATE_ERROR."""
-    prescribed_assembly = drive.prescribed_assembly()
+    prescribed_assembly = measured_drive.prescribed_assembly()
     start = prescribed_assembly.initial.copy()
     start[[3, 7]] += START_ERROR, START_RATE_ERROR
-    return _pitch_errors(replace(prescribed_assembly, initial=start), drive)
+    return _pitch_errors(replace(prescribed_assembly, initial=start), measured_drive)
 
 
-def _unguided_pitch_errors(drive: MeasuredDrive) -> dict[str, np.ndarray]:
+def _unguided_pitch_errors(measured_drive: MeasuredPitchDrive) -> dict[str, np.ndarray]:
     """Difference (n,) in rad between the run's pitch and the true pitch under noisy forces and without a prescribed
     pitch, for several solvers."""
-    noisy = assembly_of_scene(drive.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
+    noisy = assembly_of_scene(measured_drive.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {
         "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
         "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"),
         "Runge-Kutta": ("reference", "RK4"),
     }
     return {
-        name: build(engine, noisy, Settings(integrator, STEP, drive.duration, spectral_radius=0.6)).run().states[:, 3]
-        - drive.pitch
+        name: build(engine, noisy, Settings(integrator, TIME_STEP, measured_drive.duration, spectral_radius=0.6))
+        .run()
+        .states[:, 3]
+        - measured_drive.true_pitch
         for name, (engine, integrator) in solvers.items()
     }
 
 
-def _gap_laws(drive: MeasuredDrive) -> dict[str, tuple[np.ndarray, str]]:
+def _pitch_gap_laws(measured_drive: MeasuredPitchDrive) -> dict[str, tuple[np.ndarray, str]]:
     """For each formulation, the closed form of the pitch error (n,) in rad after the wrong start, and the reason for
     this form."""
-    times = STEP * np.arange(len(drive.pitch))
+    times = TIME_STEP * np.arange(len(measured_drive.true_pitch))
     return {
-        "index 1": (gap_law(times, START_ERROR, START_RATE_ERROR), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
+        "index 1": (
+            pitch_gap_law(times, START_ERROR, START_RATE_ERROR),
+            "g'' = 0 keeps both errors: g = g(0) + g'(0) t",
+        ),
         "index 1, Baumgarte": (
-            gap_law(times, START_ERROR, START_RATE_ERROR, BAUMGARTE_RATE),
+            pitch_gap_law(times, START_ERROR, START_RATE_ERROR, BAUMGARTE_RATE),
             "g'' + 2 alpha g' + alpha^2 g = 0",
         ),
         "index 2": (
-            np.append(START_ERROR, START_ERROR + STEP / 2 * START_RATE_ERROR + _quadrature_error(drive)[1:]),
+            np.append(
+                START_ERROR,
+                START_ERROR + TIME_STEP / 2 * START_RATE_ERROR + _prescribed_pitch_quadrature_error(measured_drive)[1:],
+            ),
             "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate",
         ),
     }
 
 
-def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str]], duration: float) -> list[Row]:
+def _pitch_gap_rows(
+    pitch_gaps: dict[str, np.ndarray], gap_laws: dict[str, tuple[np.ndarray, str]], duration: float
+) -> list[Row]:
+    """Rows: difference of each formulation's pitch gap from its closed law."""
     start = f"from a start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s"
     rows = [
         Observed(
-            f"index_reduction.law.{_row_id(name)}",
+            f"index_reduction.law.{_formulation_in_row_id(name)}",
             SYSTEM,
             f"{name}: difference of the gap {start} from its law",
-            float(np.abs(gaps[name] - law).max() / START_ERROR),
+            float(np.abs(pitch_gaps[name] - law).max() / START_ERROR),
             "of the start's",
         ).at_most(1e-3, why, "closed form")
-        for name, (law, why) in laws.items()
+        for name, (law, why) in gap_laws.items()
     ]
     none = {
         "index 1, projection": "each step ends on the constraint",
@@ -188,10 +202,10 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
     }
     rows += [
         Observed(
-            f"index_reduction.none.{_row_id(name)}",
+            f"index_reduction.none.{_formulation_in_row_id(name)}",
             SYSTEM,
             f"{name}: gap after the first step {start}",
-            float(np.abs(gaps[name][1:]).max()),
+            float(np.abs(pitch_gaps[name][1:]).max()),
             "rad",
         ).at_most(1e-12, why, "closed form")
         for name, why in none.items()
@@ -201,23 +215,23 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
             "index_reduction.gain",
             SYSTEM,
             f"index 1: ratio of the gap after {duration:g} s to the gap at the start",
-            float(gaps["index 1"][-1] / START_ERROR),
+            float(pitch_gaps["index 1"][-1] / START_ERROR),
             "",
         ).beside(1 + START_RATE_ERROR / START_ERROR * duration, "it never stops", "none")
     )
-    return [*rows, _index_two_row()]
+    return [*rows, _exudyn_index_two_row()]
 
 
-def _quadrature_error(drive: MeasuredDrive) -> np.ndarray:
+def _prescribed_pitch_quadrature_error(measured_drive: MeasuredPitchDrive) -> np.ndarray:
     """Error (n,) in rad of the prescribed pitch if its rate is integrated by the trapezoidal rule."""
-    signal = drive.prescribed_assembly().input
+    signal = measured_drive.prescribed_assembly().input
     assert signal is not None
-    angle, rate = signal.sample(0.0, STEP, len(drive.pitch))[:, 2:4].T
-    summed = np.concatenate(([0.0], np.cumsum(0.5 * STEP * (rate[1:] + rate[:-1]))))
+    angle, rate = signal.sample(0.0, TIME_STEP, len(measured_drive.true_pitch))[:, 2:4].T
+    summed = np.concatenate(([0.0], np.cumsum(0.5 * TIME_STEP * (rate[1:] + rate[:-1]))))
     return summed - (angle - angle[0])
 
 
-def _index_two_row() -> Row:
+def _exudyn_index_two_row() -> Row:
     """Row: outcome of Exudyn's generalised-alpha solver with its flag for index 2."""
     import exudyn as exu
 
@@ -242,7 +256,7 @@ def _index_two_row() -> Row:
     )
 
 
-def _noise_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str, np.ndarray]) -> list[Row]:
+def _noise_drift_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str, np.ndarray]) -> list[Row]:
     """Rows: the drift by noise, with and without prescribed pitch, is the same in all formulations."""
     rows = []
     guided = "guided by the integrated rate of a noisy gyro"
@@ -269,8 +283,9 @@ def _noise_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str,
     return rows
 
 
-def _row_id(name: str) -> str:
-    return name.replace(", ", ".").replace(" ", "_")
+def _formulation_in_row_id(formulation_name: str) -> str:
+    """Part of a row id for a constraint formulation."""
+    return formulation_name.replace(", ", ".").replace(" ", "_")
 
 
 def draw(case_data: Saved) -> Drawn:
@@ -290,7 +305,7 @@ def draw(case_data: Saved) -> Drawn:
     )
     left.legend(title="projection, index 3, eliminated: 0", title_fontsize=8)
     for i, (name, error) in enumerate(case_data["loose"].items()):
-        right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
+        right.plot([10 * TIME_STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
     right.set(xlabel="time [s]", ylabel="pitch - true pitch [rad]", title="No guidance, noise on the forces")
     right.legend()
     add_heading(figure, "Drift of a reduced constraint can be cured, drift by noise cannot")
@@ -307,14 +322,14 @@ CONSTRAINT_JACOBIAN = np.array([[0.0, 0.0, 0.0, 1.0]])
 """Constraint matrix G (1, 4): the pitch alone is prescribed."""
 
 
-class IndexOne:
+class IndexOneVehicle:
     """The vehicle with prescribed pitch, its constraint differentiated twice (index 1).
 
-    alpha : Baumgarte's rate in 1/s, 0 for none; projected : whether each step ends on the constraint
+    baumgarte_rate : Baumgarte's rate in 1/s, 0 for none; with_projection : whether each step ends on the constraint
     """
 
-    def __init__(self, assembly: Assembly, alpha: float = 0.0, projected: bool = False) -> None:
-        self.assembly, self.alpha, self.projected = assembly, alpha, projected
+    def __init__(self, assembly: Assembly, baumgarte_rate: float = 0.0, with_projection: bool = False) -> None:
+        self.assembly, self.alpha, self.with_projection = assembly, baumgarte_rate, with_projection
         self._mass = matrices(assembly.vehicle)[0]
         self._solve = np.linalg.inv(
             np.block([[self._mass, -CONSTRAINT_JACOBIAN.T], [CONSTRAINT_JACOBIAN, np.zeros((1, 1))]])
@@ -322,12 +337,12 @@ class IndexOne:
         self._free = derivative_of("force", assembly.vehicle.geometry)
         self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
-    def run(self, step: float, duration: float) -> np.ndarray:
+    def run(self, time_step: float, duration: float) -> np.ndarray:
         """States (n + 1, 8) by classical Runge-Kutta from the assembly's initial state, which may be off the
         constraint."""
         assert self.assembly.input is not None
-        count = round(duration / step)
-        inputs = self.assembly.input.sample(0.0, step / 2, 2 * count + 1)
+        count = round(duration / time_step)
+        inputs = self.assembly.input.sample(0.0, time_step / 2, 2 * count + 1)
         states = np.empty((count + 1, 8))
         y = states[0] = self.assembly.initial
         acting = dict[float, np.ndarray]()
@@ -336,25 +351,31 @@ class IndexOne:
             return self._derivative(y, acting[time])
 
         for i in range(count):
-            acting |= zip((0.0, 0.5 * step, step), inputs[2 * i : 2 * i + 3], strict=True)
-            y = runge_kutta_step(rate, 0.0, y, step)
-            states[i + 1] = y = self._projection(y, acting[step]) if self.projected else y
+            acting |= zip((0.0, 0.5 * time_step, time_step), inputs[2 * i : 2 * i + 3], strict=True)
+            y = runge_kutta_step(rate, 0.0, y, time_step)
+            states[i + 1] = y = self._projection(y, acting[time_step]) if self.with_projection else y
         return states
 
-    def _derivative(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def _derivative(self, state: np.ndarray, prescribed_input: np.ndarray) -> np.ndarray:
         """Derivative y' (8,) of the state under the input u = (f1, f2, beta, beta', beta'')."""
-        dy = self._free(y, u[:2].copy(), self._p)
-        wanted = u[4] - 2 * self.alpha * (y[7] - u[3]) - self.alpha**2 * (y[3] - u[2])
+        dy = self._free(state, prescribed_input[:2].copy(), self._p)
+        wanted = (
+            prescribed_input[4]
+            - 2 * self.alpha * (state[7] - prescribed_input[3])
+            - self.alpha**2 * (state[3] - prescribed_input[2])
+        )
         dy[4:] = (self._solve @ np.append(self._mass @ dy[4:], wanted))[:4]
         return dy
 
-    def _projection(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def _projection(self, state: np.ndarray, prescribed_input: np.ndarray) -> np.ndarray:
         """Projection of a state onto the constraint: the nearest state by the metric of the kinetic energy."""
         along = self._solve[:4, 4]
-        return y - np.concatenate((along * (y[3] - u[2]), along * (y[7] - u[3])))
+        return state - np.concatenate(
+            (along * (state[3] - prescribed_input[2]), along * (state[7] - prescribed_input[3]))
+        )
 
 
-def gap_law(times: np.ndarray, start_gap: float, start_rate: float, alpha: float = 0.0) -> np.ndarray:
+def pitch_gap_law(times: np.ndarray, start_gap: float, start_rate: float, alpha: float = 0.0) -> np.ndarray:
     """Solution g (n,) in rad of g'' + 2 alpha g' + alpha^2 g = 0 from g(0) = start_gap (rad) and g'(0) = start_rate
     (rad/s)."""
     return (start_gap + (start_rate + alpha * start_gap) * times) * np.exp(-alpha * times)

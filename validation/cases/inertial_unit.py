@@ -48,30 +48,30 @@ from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-MEAN_BAND = 3.3
+STANDARD_ERRORS_OF_BAND = 3.3
 """Number of standard errors within which a mean lies 999 times in 1,000."""
-UNEQUAL_WALKS = np.array([0.1, 0.3, 0.6])
+UNEQUAL_ANGLE_WALKS = np.array([0.1, 0.3, 0.6])
 """Angle random walk of each axis, rad per sqrt(s)."""
-EQUAL_WALK = 0.5
+EQUAL_ANGLE_WALK = 0.5
 """Angle random walk, rad per sqrt(s), where all axes have the same."""
 SAMPLE_PERIOD, RUN_SECONDS = 5e-3, 2.0
 """Sampling period and length (s) of the Monte Carlo runs; one step contributes some 1e-4 of the law's value."""
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for exact rates, the laws, the ten-minute example, gyro bias and the recording; a full run also has the
     section forces."""
     paths = 200 if quick else 4000
     rows = [
         *_exact_rate_rows(),
-        *_one_axis_rows(paths),
-        *_three_axes_rows(paths),
-        *_norm_rows(paths),
-        *_bias_rows(paths),
+        *_one_axis_noise_rows(paths),
+        *_three_axis_noise_rows(paths),
+        *_quaternion_norm_rows(paths),
+        *_gyro_bias_rows(paths),
     ]
-    example, data = _ten_minute_rows(0 if quick else 60)
-    recorded, seen = _recording_rows(paths)
+    example, data = _ten_minute_drive_rows(0 if quick else 60)
+    recorded, seen = _real_car_recording_rows(paths)
     return [*rows, *example, *recorded, *([] if quick else _section_force_rows())], {
         "ten minutes": data,
         "recording": seen,
@@ -104,21 +104,21 @@ def _exact_rate_rows() -> list[Row]:
 
 
 def _closed_form_row(
-    row_name: str, quantity: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+    row_name: str, quantity_name: str, error_value: float, unit: str, tolerance_reason: str, error_bound: float = 1e-12
 ) -> Row:
     """Row for an error relative to a closed form."""
-    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity, error_value, unit).at_most(
-        bound, tolerance_reason, "closed form"
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, error_value, unit).at_most(
+        error_bound, tolerance_reason, "closed form"
     )
 
 
-def _one_axis_rows(path_count: int) -> list[Row]:
+def _one_axis_noise_rows(noise_path_count: int) -> list[Row]:
     """Rows on eqs (27) to (30): with noise on one gyro axis and no rotation, the angle about this axis is a Brownian
     motion."""
     rows = []
     for axis in range(3):
-        deviation = EQUAL_WALK / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
-        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, path_count))
+        deviation = EQUAL_ANGLE_WALK / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
+        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, noise_path_count))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
@@ -129,9 +129,9 @@ def _one_axis_rows(path_count: int) -> list[Row]:
                     float(np.mean(turns[:, axis] ** 2)),
                     "rad^2",
                 ),
-                EQUAL_WALK**2 * 200 * SAMPLE_PERIOD,
-                path_count,
-                f"s^2 t; {path_count:,} paths, seed {SEED}",
+                EQUAL_ANGLE_WALK**2 * 200 * SAMPLE_PERIOD,
+                noise_path_count,
+                f"s^2 t; {noise_path_count:,} paths, seed {SEED}",
             ),
             _closed_form_row(
                 f"one_axis.{axis + 1}.spill",
@@ -144,57 +144,61 @@ def _one_axis_rows(path_count: int) -> list[Row]:
     return rows
 
 
-def _mean_row(row_name: str, quantity: str, samples: np.ndarray, expected_mean: float, tolerance_reason: str) -> Row:
-    """Row for a mean that must lie within MEAN_BAND standard errors of its theoretical value."""
-    error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
-    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity, float(samples.mean()), "").within(
+def _mean_value_row(
+    row_name: str, quantity_name: str, simulated_values: np.ndarray, expected_mean: float, tolerance_reason: str
+) -> Row:
+    """Row for a mean that must lie within STANDARD_ERRORS_OF_BAND standard errors of its theoretical value."""
+    error = float(simulated_values.std(ddof=1) / math.sqrt(len(simulated_values)))
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity_name, float(simulated_values.mean()), "").within(
         expected_mean,
-        MEAN_BAND * error,
-        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {MEAN_BAND} standard errors of {error:.2g}",
+        STANDARD_ERRORS_OF_BAND * error,
+        f"{tolerance_reason}; {len(simulated_values):,} paths, seed {SEED}, within {STANDARD_ERRORS_OF_BAND} "
+        "standard errors "
+        f"of {error:.2g}",
         "closed form",
     )
 
 
-def _three_axes_rows(path_count: int) -> list[Row]:
+def _three_axis_noise_rows(noise_path_count: int) -> list[Row]:
     """Rows on noise about three axes. Equal noise: mean trace of the error matrix; unequal noise on a turning body:
     mean error matrix and mean quaternion."""
     count = round(RUN_SECONDS / SAMPLE_PERIOD)
     rates, root = turning_rates(count, SAMPLE_PERIOD), SAMPLE_PERIOD**0.5
-    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_WALK / root * np.ones(3), path_count)
-    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_WALKS / root, path_count)
+    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_ANGLE_WALK / root * np.ones(3), noise_path_count)
+    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_ANGLE_WALKS / root, noise_path_count)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
-        mean_error(UNEQUAL_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
+        mean_error(UNEQUAL_ANGLE_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
     )
-    resting = mean_error(UNEQUAL_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
-    all_equal = np.full(3, EQUAL_WALK)
+    resting = mean_error(UNEQUAL_ANGLE_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
+    all_equal = np.full(3, EQUAL_ANGLE_WALK)
     same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
-        _mean_row(
+        _mean_value_row(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
-            mean_trace(EQUAL_WALK, RUN_SECONDS),
+            mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
-        _mean_row(
+        _mean_value_row(
             "scalar",
             "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
             mean_scalar(all_equal, RUN_SECONDS),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
-        _mean_row(
+        _mean_value_row(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
-            mean_scalar(UNEQUAL_WALKS, RUN_SECONDS),
+            mean_scalar(UNEQUAL_ANGLE_WALKS, RUN_SECONDS),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
-            abs(same - mean_trace(EQUAL_WALK, RUN_SECONDS)),
+            abs(same - mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS)),
             "",
             "both are exact",
         ),
@@ -203,9 +207,9 @@ def _three_axes_rows(path_count: int) -> list[Row]:
             "error of the mean rotation matrix with unequal noise, turning body, worst entry over its standard error",
             standard_errors(wandered, exact),
             "",
-            f"{path_count:,} paths, seed {SEED}; entries differ from the identity by "
+            f"{noise_path_count:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
-            MEAN_BAND,
+            STANDARD_ERRORS_OF_BAND,
         ),
         Observed(
             "inertial_unit.matrix.resting",
@@ -214,27 +218,27 @@ def _three_axes_rows(path_count: int) -> list[Row]:
             "rest, worst entry over its standard error",
             standard_errors(wandered, resting),
             "",
-        ).beside(f"far beyond {MEAN_BAND}", "the rows above can tell the laws apart", "closed form"),
+        ).beside(f"far beyond {STANDARD_ERRORS_OF_BAND}", "the rows above can tell the laws apart", "closed form"),
     ]
 
 
-STRATONOVICH_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
+STRATONOVICH_LAW_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
-def _norm_rows(path_count: int) -> list[Row]:
+def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
     """Rows on Ito's theory: the norm of a quaternion that is never normalised grows by a law, and the mean quaternion
     is the true one."""
     rows, steps, span = [], 100, 4.0
     period = span / steps
     for axes in (1, 3):
-        noise = np.zeros((steps, path_count, 3))
-        noise[:, :, :axes] = normal_samples(SEED, axes, steps * path_count, axes, source=GYRO).reshape(
-            steps, path_count, axes
+        noise = np.zeros((steps, noise_path_count, 3))
+        noise[:, :, :axes] = normal_samples(SEED, axes, steps * noise_path_count, axes, source=GYRO).reshape(
+            steps, noise_path_count, axes
         )
-        q = euler_quaternions(EQUAL_WALK * period**0.5 * noise, START_ATTITUDE)
+        q = euler_quaternions(EQUAL_ANGLE_WALK * period**0.5 * noise, START_ATTITUDE)
         square = np.sum(q**2, axis=1)
-        law = euler_mean_square(EQUAL_WALK, axes, period, steps)
-        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL_WALK), span), q[:, 0], f"{axes} noisy axes"
+        law = euler_mean_square(EQUAL_ANGLE_WALK, axes, period, steps)
+        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL_ANGLE_WALK), span), q[:, 0], f"{axes} noisy axes"
         means = (
             (
                 "norm",
@@ -255,23 +259,25 @@ def _norm_rows(path_count: int) -> list[Row]:
                 f"mean scalar part q1 by explicit Euler, normalised at the end, {noisy}",
                 true / square**0.5,
                 scalar,
-                STRATONOVICH_REASON,
+                STRATONOVICH_LAW_REASON,
             ),
         )
         rows += [
-            *(_mean_row(f"{id}.{axes}", *figures) for id, *figures in means),
+            *(_mean_value_row(f"{id}.{axes}", *figures) for id, *figures in means),
             Observed(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the explicit Euler law at 4e6 steps, {axes} noisy axes",
-                euler_mean_square(EQUAL_WALK, axes, 1e-6, 4_000_000) ** 0.5,
+                euler_mean_square(EQUAL_ANGLE_WALK, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
-            ).within(ito_norm(np.full(axes, EQUAL_WALK), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
+            ).within(
+                ito_norm(np.full(axes, EQUAL_ANGLE_WALK), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"
+            ),
         ]
     return rows
 
 
-def _ten_minute_rows(path_count: int) -> CaseAnswer:
+def _ten_minute_drive_rows(noise_path_count: int) -> CaseAnswer:
     """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
     gyro sample."""
     walk = angle_random_walk_of(RATE_DEVIATION, SAMPLING_RATE)
@@ -301,13 +307,13 @@ def _ten_minute_rows(path_count: int) -> CaseAnswer:
             )
         ),
     ]
-    if not path_count:
+    if not noise_path_count:
         return rows, {}
     every = round(SAMPLING_RATE)
     t = np.arange(round(TEN_MINUTES * SAMPLING_RATE)) / SAMPLING_RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
     true = true_attitude(rates, 1 / SAMPLING_RATE, START_ATTITUDE)[::every]
-    wandered = np.array([_error_angles(path, rates, true) for path in range(path_count)])
+    wandered = np.array([_error_angles(path, rates, true) for path in range(noise_path_count)])
     rows.append(
         mean_square(
             Observed(
@@ -318,29 +324,34 @@ def _ten_minute_rows(path_count: int) -> CaseAnswer:
                 "deg^2",
             ),
             axis**2,
-            3 * path_count,
-            f"{path_count} paths of 600,000 steps, seed {SEED}",
+            3 * noise_path_count,
+            f"{noise_path_count} paths of 600,000 steps, seed {SEED}",
         )
     )
     return rows, {
         "paths": wandered[:8].tolist(),
         "rms": np.sqrt(np.mean(wandered**2, axis=(0, 2))).tolist(),
-        "count": path_count,
+        "count": noise_path_count,
     }
 
 
-def _error_angles(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
+def _error_angles(noise_path: int, body_rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true_attitudes``
     (601, 4)."""
     attitudes = measured_attitude(
-        rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(path, path + 1), SEED
+        body_rates,
+        1 / SAMPLING_RATE,
+        RATE_DEVIATION * np.ones(3),
+        START_ATTITUDE,
+        range(noise_path, noise_path + 1),
+        SEED,
     )
     return np.degrees(
-        rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true_attitudes) - 1), 0], true_attitudes))
+        rotation_vector(error_rotation(attitudes[:: len(body_rates) // (len(true_attitudes) - 1), 0], true_attitudes))
     )
 
 
-def _bias_rows(path_count: int) -> list[Row]:
+def _gyro_bias_rows(noise_path_count: int) -> list[Row]:
     """Rows: mean square angle error by simulated gyro biases, constant and wandering, compared with its law."""
     rows, grade, tau = [], 10.0 * DEGREES_PER_HOUR, 100.0
     for name, turn_on, instability, span in (
@@ -349,7 +360,7 @@ def _bias_rows(path_count: int) -> list[Row]:
         ("forgetful", 0.0, grade, 600),
     ):
         angles = np.array(
-            [bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(path_count)]
+            [bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(noise_path_count)]
         )
         law = float(angle_variance(np.array(float(span)), 0.0, turn_on, instability, tau))
         rows.append(
@@ -362,8 +373,9 @@ def _bias_rows(path_count: int) -> list[Row]:
                     "rad^2",
                 ),
                 law,
-                path_count,
-                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {path_count:,} paths, seed {SEED}",
+                noise_path_count,
+                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {noise_path_count:,} paths, seed "
+                f"{SEED}",
             )
         )
     return rows
@@ -397,7 +409,7 @@ def _section_force_rows() -> list[Row]:
     ]
 
 
-def _recording_rows(path_count: int) -> CaseAnswer:
+def _real_car_recording_rows(noise_path_count: int) -> CaseAnswer:
     """Rows and data from a recording of a minute in a real car: gyro compared with camera, and the noise law on the
     car's motion."""
     path = recording.find_recording()
@@ -411,7 +423,7 @@ def _recording_rows(path_count: int) -> CaseAnswer:
     off = np.degrees(recording.gyro_error(recorded))
     rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
-    wandered = attitude_errors(rates, period, deviation, path_count)
+    wandered = attitude_errors(rates, period, deviation, noise_path_count)
     law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
     return [
         Observed(
@@ -427,7 +439,7 @@ def _recording_rows(path_count: int) -> CaseAnswer:
             "error of the mean rotation matrix of noise on the car's motion, worst entry over its standard error",
             standard_errors(wandered, law),
             "",
-            f"the recorded rates, read each 50 ms, as the true motion; {path_count:,} paths, seed {SEED}",
-            MEAN_BAND,
+            f"the recorded rates, read each 50 ms, as the true motion; {noise_path_count:,} paths, seed {SEED}",
+            STANDARD_ERRORS_OF_BAND,
         ),
     ], {"off": off[::20].tolist()}

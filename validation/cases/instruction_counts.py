@@ -27,7 +27,7 @@ from validation.price.tables import curve_name
 
 TITLE = "Instructions per step"
 SYSTEM: System = "cost"
-METHODS = {
+INTEGRATION_METHODS = {
     "exudyn": (
         "GeneralizedAlpha",
         "TrapezoidalIndex2",
@@ -40,23 +40,28 @@ METHODS = {
     ),
     "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
 }
-ENGINE_METHODS = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
-STEP_COUNTS = (40, 120)
+METHODS_OF_ENGINES = tuple(
+    f"{engine} {method}" for engine, methods in INTEGRATION_METHODS.items() for method in methods
+)
+COUNTED_STEP_COUNTS = (40, 120)
 """Numbers of steps of the two runs that are differenced."""
 COUNT_TOLERANCE = 1e-6
 PROCESS_TIMEOUT = 900
 """Time (s) after which a counting process is given up."""
-CASE_ID, CASE_QUANTITY = "instruction_counts", f"instructions of {len(ENGINE_METHODS)} methods counted in two processes"
+CASE_ID, CASE_QUANTITY = (
+    "instruction_counts",
+    f"instructions of {len(METHODS_OF_ENGINES)} methods counted in two processes",
+)
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of instruction counts of every method in two processes under valgrind; a quick run has none."""
     if quick:
         return [], {"instructions": {}}
     if shutil.which("valgrind") is None:
         return [not_run(CASE_ID, SYSTEM, CASE_QUANTITY, "valgrind is not installed")], {"instructions": {}}
     try:
-        first, second = _instruction_counts(folder / "instructions")
+        first, second = _instruction_counts(work_folder / "instructions")
     except (subprocess.SubprocessError, OSError) as error:
         reason = f"valgrind failed: {str(error).splitlines()[0][:120]}"
         return [not_run(CASE_ID, SYSTEM, CASE_QUANTITY, reason)], {"instructions": {}}
@@ -74,22 +79,24 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "number of threads are set, and no clock's reading is printed while they are counted",
             "none",
         )
-        for engine, largest in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)
+        for engine, largest in zip(
+            INTEGRATION_METHODS, np.split(off, [len(INTEGRATION_METHODS["exudyn"])]), strict=True
+        )
     ]
-    per_step = np.diff(first, axis=1)[:, 0] / (STEP_COUNTS[1] - STEP_COUNTS[0])
-    return rows, {"instructions": dict(zip(ENGINE_METHODS, per_step.tolist(), strict=True))}
+    per_step = np.diff(first, axis=1)[:, 0] / (COUNTED_STEP_COUNTS[1] - COUNTED_STEP_COUNTS[0])
+    return rows, {"instructions": dict(zip(METHODS_OF_ENGINES, per_step.tolist(), strict=True))}
 
 
-def _instruction_counts(folder: Path) -> np.ndarray:
+def _instruction_counts(work_folder: Path) -> np.ndarray:
     """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler writes them between the runs."""
-    folder.mkdir()
+    work_folder.mkdir()
     mass, damping, stiffness, *_ = linearised(assembly_of_scene(road_scene()).vehicle)
     march = {
         "masses": np.diag(mass).tolist(),
         "damping": damping.tolist(),
         "stiffness": stiffness.tolist(),
-        "methods": METHODS,
-        "steps": STEP_COUNTS,
+        "methods": INTEGRATION_METHODS,
+        "steps": COUNTED_STEP_COUNTS,
     }
     settled = {**os.environ, "PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     command = [
@@ -97,25 +104,25 @@ def _instruction_counts(folder: Path) -> np.ndarray:
         "--tool=callgrind",
         "--instr-atstart=no",
         f"--dump-before={instructions_run.MARKING_SYSTEM_CALL}",
-        f"--callgrind-out-file={folder}/count.%p",
+        f"--callgrind-out-file={work_folder}/count.%p",
         sys.executable,
         instructions_run.__file__,
         json.dumps(march),
     ]
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PROCESS_TIMEOUT)
-    marches = len(ENGINE_METHODS) * len(STEP_COUNTS)
+    marches = len(METHODS_OF_ENGINES) * len(COUNTED_STEP_COUNTS)
     counts = [
-        [_count_of_dump(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
-        for path in folder.glob("count.*")
+        [_instructions_in_dump_file(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
+        for path in work_folder.glob("count.*")
         if path.with_name(f"{path.name}.{marches + 1}").exists()
     ]
-    shutil.rmtree(folder)
-    return np.array(counts, float).reshape(2, -1, len(STEP_COUNTS))
+    shutil.rmtree(work_folder)
+    return np.array(counts, float).reshape(2, -1, len(COUNTED_STEP_COUNTS))
 
 
-def _count_of_dump(dump_file: Path) -> int:
+def _instructions_in_dump_file(dump_path: Path) -> int:
     """Number of instructions in one dump file of the profiler."""
-    matched = re.search(r"^totals: (\d+)", dump_file.read_text(errors="replace"), re.MULTILINE)
+    matched = re.search(r"^totals: (\d+)", dump_path.read_text(errors="replace"), re.MULTILINE)
     assert matched is not None
     return int(matched[1])
 

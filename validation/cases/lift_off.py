@@ -33,39 +33,49 @@ from validation.common.scenes import STUDY_ROAD, VEHICLE_SETS, largest_differenc
 
 TITLE = "Tyres that only push"
 SYSTEM: System = "pitch-plane"
-ENGINES = ("exudyn", "mujoco")
-IMPLEMENTATIONS = ("reference", *ENGINES)
+ENGINE_NAMES = ("exudyn", "mujoco")
+IMPLEMENTATIONS = ("reference", *ENGINE_NAMES)
 STATE_UNITS = "m, rad, m/s, rad/s"
 START_MOTION = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
 """Initial displacements (m) and pitch (rad): both wheels are in the air, one higher than the other."""
-STEP, SEED, SPEED = 1e-4, 7, 20.0
+TIME_STEP, SEED, SPEED = 1e-4, 7, 20.0
 ROUNDING_REASON = "the same tableau and laws; sums are taken in another order"
-NO_DAMPING = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
+ZERO_DAMPING_OVERRIDES = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows: accelerations, bounces, energy and wheel loads of vehicles whose tyres lift off. A quick run has one
     vehicle, half a second of bounces, short runs on roads, and no hub forces."""
     vehicles = VEHICLE_SETS[-1:] if quick else VEHICLE_SETS
-    rows = [row for name in vehicles for row in (*_acceleration_rows(name), *_path_rows(name, 1.5 if quick else 20.0))]
-    rows += [*_bounce_rows(0.5 if quick else 2.0), _order_row(4 if quick else 6), *_energy_rows(0.5 if quick else 2.0)]
-    return [*rows, *_pull_rows(quick), *_spatial_rows(quick), *([] if quick else _hub_force_rows())], {}
+    rows = [
+        row for name in vehicles for row in (*_acceleration_rows(name), *_study_road_rows(name, 1.5 if quick else 20.0))
+    ]
+    rows += [
+        *_bounce_rows(0.5 if quick else 2.0),
+        _convergence_order_row(4 if quick else 6),
+        *_energy_rows(0.5 if quick else 2.0),
+    ]
+    return [*rows, *_tyre_pull_rows(quick), *_ride_vehicle_rows(quick), *([] if quick else _hub_force_rows())], {}
 
 
-def scene(
+def lift_off_scene(
     parameter_set_name: str = VEHICLE_SETS[-1],
-    geometry: str = "exact",
+    geometry_name: str = "exact",
     duration: float = 1.0,
-    step: float = STEP,
+    time_step: float = TIME_STEP,
     on_study_road: bool = False,
-    override: dict[str, float] | None = None,
+    parameter_overrides: dict[str, float] | None = None,
 ) -> Scene:
     """Scene of the half car on tyres that can lift off: on the study road from rest, or dropped onto a flat road."""
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameter_set_name, "geometry": geometry, "override": override or {}},
-            "run": {"duration": duration, "step": step},
+            "vehicle": {
+                "parameters": parameter_set_name,
+                "geometry": geometry_name,
+                "override": parameter_overrides or {},
+            },
+            "run": {"duration": duration, "step": time_step},
             "start": {} if on_study_road else START_MOTION,
             "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if on_study_road else {})},
         }
@@ -77,9 +87,9 @@ def _acceleration_rows(parameter_set_name: str) -> list[Row]:
     wheels in the air."""
     rows = []
     for geometry in ("exact", "linear"):
-        lifting = scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
+        lifting = lift_off_scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
         assembly = assembly_of_scene(lifting)
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
@@ -95,10 +105,10 @@ def _acceleration_rows(parameter_set_name: str) -> list[Row]:
     return rows
 
 
-def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
+def _study_road_rows(parameter_set_name: str, duration: float) -> list[Row]:
     """Rows: largest difference of the engines' states from the reference's on the study road at the same step, and the
     least wheel load, which must be 0."""
-    lifting = scene(parameter_set_name, duration=duration, step=5e-4, on_study_road=True)
+    lifting = lift_off_scene(parameter_set_name, duration=duration, time_step=5e-4, on_study_road=True)
     runs = {engine: simulate(lifting, engine) for engine in IMPLEMENTATIONS}
     rows = [
         Observed(
@@ -109,9 +119,9 @@ def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
             largest_difference(runs[engine], runs["reference"]),
             STATE_UNITS,
         ).at_most(1e-11, f"{ROUNDING_REASON}; each landing makes the difference some times as large", "native")
-        for engine in ENGINES
+        for engine in ENGINE_NAMES
     ]
-    least = min(_wheel_loads(run).min() for run in runs.values())
+    least = min(_tyre_forces_of_run(run).min() for run in runs.values())
     return [
         *rows,
         Observed(
@@ -124,8 +134,9 @@ def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
     ]
 
 
-def _wheel_loads(run: Result) -> np.ndarray:
-    return np.array([run["f1"], run["f2"]])
+def _tyre_forces_of_run(lift_off_run: Result) -> np.ndarray:
+    """Forces (2, n) in N of the front and of the rear tyre."""
+    return np.array([lift_off_run["f1"], lift_off_run["f2"]])
 
 
 @allowing_breaches(
@@ -139,9 +150,9 @@ def _bounce_rows(duration: float) -> list[Row]:
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
-        lifting = scene(geometry="linear", duration=duration, override=override)
+        lifting = lift_off_scene(geometry_name="linear", duration=duration, parameter_overrides=override)
         assembly = assembly_of_scene(lifting)
-        exact = BouncingVehicle(assembly, STEP).path(assembly.initial, round(duration / STEP))
+        exact = BouncingVehicle(assembly, TIME_STEP).path(assembly.initial, round(duration / TIME_STEP))
         for engine in IMPLEMENTATIONS:
             error = float(np.abs(simulate(lifting, engine).states - exact).max())
             name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
@@ -163,9 +174,9 @@ def _bounce_rows(duration: float) -> list[Row]:
     "springs compressed",
     "tyres not flat",
 )
-def _order_row(halving_count: int) -> Row:
+def _convergence_order_row(halving_count: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
-    lifting = scene(geometry="linear")
+    lifting = lift_off_scene(geometry_name="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halving_count), 1e-3
     exact = BouncingVehicle(assembly_of_scene(lifting), coarse).path(
         assembly_of_scene(lifting).initial, round(1.0 / coarse)
@@ -190,7 +201,7 @@ def _energy_rows(duration: float) -> list[Row]:
     tyres alone."""
     rows = []
     for engine in IMPLEMENTATIONS:
-        undamped = scene(duration=duration, override=NO_DAMPING)
+        undamped = lift_off_scene(duration=duration, parameter_overrides=ZERO_DAMPING_OVERRIDES)
         states = simulate(undamped, engine).states
         energies = bounce_energy(assembly_of_scene(undamped), states)
         size = energies[0] - bounce_energy(assembly_of_scene(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
@@ -203,7 +214,9 @@ def _energy_rows(duration: float) -> list[Row]:
                 "of the fall's",
             ).at_most(1e-4, "the error of the step", "closed form")
         )
-        damped = scene(duration=duration, override=NO_DAMPING | {"d1": 2e3, "d2": 500.0})
+        damped = lift_off_scene(
+            duration=duration, parameter_overrides=ZERO_DAMPING_OVERRIDES | {"d1": 2e3, "d2": 500.0}
+        )
         energies = bounce_energy(assembly_of_scene(damped), simulate(damped, engine).states)
         gain = float((energies - np.minimum.accumulate(energies)).max() / size)
         rows.append(
@@ -219,16 +232,16 @@ def _energy_rows(duration: float) -> list[Row]:
 
 
 @allowing_breaches("what the linear tyre does is what is shown")
-def _pull_rows(quick: bool) -> list[Row]:
+def _tyre_pull_rows(quick: bool) -> list[Row]:
     """Rows: how strongly and how often the paper's linear tyre pulls on the study road, and the ratio of the dynamic
     wheel loads with tyres that lift off to those of linear tyres."""
-    lifting_scene = scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, step=5e-4, on_study_road=True)
+    lifting_scene = lift_off_scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, time_step=5e-4, on_study_road=True)
     lifting, linear = (
         simulate(lifting_scene, "reference"),
         simulate(scene_without(lifting_scene, "lift_off"), "reference"),
     )
-    loads = _wheel_loads(linear)
-    deviations = [root_mean_square(_wheel_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
+    loads = _tyre_forces_of_run(linear)
+    deviations = [root_mean_square(_tyre_forces_of_run(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {lifting_scene.run.duration:g} s"
     share = 100.0 * float((loads < 0.0).any(axis=0).mean())
     words = "ratio of the rms of the dynamic wheel loads with tyres that lift to that of linear tyres"
@@ -251,7 +264,7 @@ def _pull_rows(quick: bool) -> list[Row]:
     ]
 
 
-def _spatial_rows(quick: bool) -> list[Row]:
+def _ride_vehicle_rows(quick: bool) -> list[Row]:
     """Rows on the R19-ride vehicle with tyres that lift off: accelerations compared with hand-written equations, and
     Exudyn and MuJoCo compared on a random road."""
     ride = build_ride(
@@ -264,10 +277,10 @@ def _spatial_rows(quick: bool) -> list[Row]:
             "effects": {"lift_off": {}},
         }
     )
-    car, random, worst = vehicle_of(ride), np.random.default_rng(SEED), dict.fromkeys(ENGINES, 0.0)
+    car, random, worst = vehicle_of(ride), np.random.default_rng(SEED), dict.fromkeys(ENGINE_NAMES, 0.0)
     damped = replace(car, tyres=tuple(replace(tyre, damping=300.0 + i) for i, tyre in enumerate(car.tyres)))
     written, n, w = SpatialReference(damped), len(car.coordinates()), len(car.tyres)
-    models = {engine: build_in_space(engine, damped) for engine in ENGINES}
+    models = {engine: build_in_space(engine, damped) for engine in ENGINE_NAMES}
     for _ in range(30 if quick else 100):
         q, v = random.uniform(-0.08, 0.08, n), random.uniform(-3.0, 3.0, n)
         road = np.concatenate([random.uniform(-0.1, 0.1, w), random.uniform(-3.0, 3.0, w)])
@@ -277,7 +290,7 @@ def _spatial_rows(quick: bool) -> list[Row]:
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
     first, two = (
-        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINES
+        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINE_NAMES
     )
     apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [
@@ -290,7 +303,7 @@ def _spatial_rows(quick: bool) -> list[Row]:
                 worst[engine],
                 "of the largest",
             ).at_most(1e-12, "each has the law in its code", "native")
-            for engine in ENGINES
+            for engine in ENGINE_NAMES
         ),
         Observed(
             "lift_off.ride",
@@ -309,7 +322,7 @@ def _hub_force_rows() -> list[Row]:
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
     runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in IMPLEMENTATIONS}
-    apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
+    apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINE_NAMES)
     loads = runs["reference"].wrenches[:, :, 2]
     return [
         Observed(

@@ -31,24 +31,26 @@ TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
 POSITION_TOLERANCE, FORCE_TOLERANCE = 0.3, 2.0
 """Tolerances asked for, of contact positions (mm) and of forces (%)."""
-QUICK_SHIFTS = (1.0, 6.5)
+QUICK_LATERAL_SHIFTS = (1.0, 6.5)
 """Lateral displacements (mm) of case A-2 in a quick run."""
-FILE_SHIFTS = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
+PROFILE_FILE_SHIFTS = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
 """Lateral displacements (mm) at which the built-in profiles are compared with the benchmark's files."""
 PUBLISHED_REASON = (
     "CONTACT's reference output of case A-2.2, exact theory on one plane, cells of 0.2 mm; the bound asked for"
 )
-FIRST_COLUMNS = {"right": 2, "left": 5}
+FIRST_COLUMN_OF_WHEEL = {"right": 2, "left": 5}
 """First column of each wheel in the published table."""
 
 
 @allowing_breaches("the benchmark takes elastic steel, as its codes do", "elastic")
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 compared with the published results; a full run also has case A-1 at every mm, searches, profile
     files, and computing times."""
-    published = PUBLISHED_CONTACT[np.isin(PUBLISHED_CONTACT[:, 0], QUICK_SHIFTS)] if quick else PUBLISHED_CONTACT
+    published = (
+        PUBLISHED_CONTACT[np.isin(PUBLISHED_CONTACT[:, 0], QUICK_LATERAL_SHIFTS)] if quick else PUBLISHED_CONTACT
+    )
     placed, position_seconds = _timed_positions("A-2", published[:, 0])
-    rows = [row for wheel in FIRST_COLUMNS for row in _published_rows(wheel, placed, published)]
+    rows = [row for wheel in FIRST_COLUMN_OF_WHEEL for row in _published_rows(wheel, placed, published)]
     rows.append(
         Observed(
             "manchester.two_patches",
@@ -68,49 +70,58 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [
             *_first_contact_rows(static),
             *_load_share_rows(placed[10]),
-            *_file_rows(placed),
-            _load_row(static),
-            _axle_row(placed[0]),
-            *_time_rows({"A-1": each_still, "A-2": position_seconds}),
+            *_profile_file_rows(placed),
+            _wheel_load_row(static),
+            _free_axle_row(placed[0]),
+            *_computing_time_rows({"A-1": each_still, "A-2": position_seconds}),
         ]
     return rows, data
 
 
-def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
+def _timed_positions(benchmark_case: str, lateral_shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
     """Contacts of the wheelset at every lateral displacement (mm), and the processor time (s) per displacement.
     Wall time would count other cases that run at the same time."""
-    positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
-    placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
-    return placed_run.detail.placed, placed_run.seconds / len(shifts)
+    positions = Positions(
+        start=1e-3 * float(lateral_shifts[0]), stop=1e-3 * float(lateral_shifts[-1]), count=len(lateral_shifts)
+    )
+    placed_run = run(SCENE.model_copy(update={"positions": positions}), case=benchmark_case)
+    return placed_run.detail.placed, placed_run.seconds / len(lateral_shifts)
 
 
-def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:
-    published_sums = published[:, FIRST_COLUMNS[wheel] : FIRST_COLUMNS[wheel] + 3]
-    off = np.abs(np.array([wheel_sums(position, wheel) for position in placements]) - published_sums)
+def _published_rows(
+    wheel_side: str, wheelset_placements: list[WheelsetPlacement], published_results: np.ndarray
+) -> list[Row]:
+    """Rows: contact position, force and peak pressure of one wheel compared with the published results."""
+    published_sums = published_results[:, FIRST_COLUMN_OF_WHEEL[wheel_side] : FIRST_COLUMN_OF_WHEEL[wheel_side] + 3]
+    off = np.abs(np.array([wheel_sums(position, wheel_side) for position in wheelset_placements]) - published_sums)
     patch, _, _ = off.max(axis=0).tolist()
     _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
     rows = [
         Observed(
-            f"manchester.places.{wheel}",
+            f"manchester.places.{wheel_side}",
             SYSTEM,
-            f"largest difference of the {wheel} wheel's mean place of contact",
+            f"largest difference of the {wheel_side} wheel's mean place of contact",
             patch,
             "mm",
         ).at_most(POSITION_TOLERANCE, PUBLISHED_REASON, "published"),
         Observed(
-            f"manchester.forces.{wheel}", SYSTEM, f"largest difference of the {wheel} wheel's normal force", force, "%"
+            f"manchester.forces.{wheel_side}",
+            SYSTEM,
+            f"largest difference of the {wheel_side} wheel's normal force",
+            force,
+            "%",
         ).at_most(FORCE_TOLERANCE, PUBLISHED_REASON, "published"),
         Observed(
-            f"manchester.peaks.{wheel}",
+            f"manchester.peaks.{wheel_side}",
             SYSTEM,
-            f"largest difference of the {wheel} wheel's largest pressure",
+            f"largest difference of the {wheel_side} wheel's largest pressure",
             peak,
             "%",
         ).beside(0.0, "CONTACT's cells of 0.2 mm; a flange's patch has four of them"),
     ]
-    if wheel == "right":
+    if wheel_side == "right":
         why = "CONTACT's input, which another code found; on the flange its wheels do not stand equally low"
-        roll = np.abs(np.array([1e3 * position.roll for position in placements]) - published[:, 1])
+        roll = np.abs(np.array([1e3 * position.roll for position in wheelset_placements]) - published_results[:, 1])
         rows.append(
             Observed("manchester.roll", SYSTEM, "largest difference of the roll", float(roll.max()), "mrad").beside(
                 0.0, why
@@ -119,11 +130,11 @@ def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: 
     return rows
 
 
-def _first_contact_rows(placements: list[WheelsetPlacement]) -> list[Row]:
+def _first_contact_rows(wheelset_placements: list[WheelsetPlacement]) -> list[Row]:
     """Rows: first contact points compared with a search over surface points, and contact compared with its mirror
     image."""
     contact, gaps = contact_of("A-1"), []
-    for position in placements:
+    for position in wheelset_placements:
         for sign, patches_of_wheel in ((1.0, position.right), (-1.0, position.left)):
             for patch in patches_of_wheel:
                 y, u, angle = first_touch(contact.side, position, sign, patch.wheel_y)
@@ -159,14 +170,14 @@ def _first_contact_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     ]
 
 
-def _axle_row(placement: WheelsetPlacement) -> Row:
+def _free_axle_row(wheelset_placement: WheelsetPlacement) -> Row:
     """Row: the axle turns freely, so that the creep forces of each wheel must have no moment about the axle in the
     middle of the track."""
     moments = [
         sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel)
-        for wheel in (placement.right, placement.left)
+        for wheel in (wheelset_placement.right, wheelset_placement.left)
     ]
-    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placement.right[0].rolling_radius
+    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * wheelset_placement.right[0].rolling_radius
     return Observed(
         "manchester.axle",
         SYSTEM,
@@ -180,12 +191,15 @@ def _axle_row(placement: WheelsetPlacement) -> Row:
     )
 
 
-def _load_share_rows(placement: WheelsetPlacement) -> list[Row]:
+def _load_share_rows(wheelset_placement: WheelsetPlacement) -> list[Row]:
     """Rows: shares of the wheel load on two patches at a displacement of 5 mm, in case A-2."""
-    forces = [patch.normal for patch in placement.right]
+    forces = [patch.normal for patch in wheelset_placement.right]
     total = sum(forces)
     contact = contact_of("A-2")
-    alone, (mean, _, plane) = patch_forces(contact, placement), exact_on_contact_plane(contact, placement)
+    alone, (mean, _, plane) = (
+        patch_forces(contact, wheelset_placement),
+        exact_on_contact_plane(contact, wheelset_placement),
+    )
     far = {
         name: 100.0 * max(abs(a - b) for a, b in zip(forces, other_contact, strict=True)) / total
         for name, other_contact in (("apart", alone), ("one plane", plane))
@@ -211,7 +225,8 @@ def _load_share_rows(placement: WheelsetPlacement) -> list[Row]:
     ]
 
 
-def _load_row(static_placements: list[WheelsetPlacement]) -> Row:
+def _wheel_load_row(static_placements: list[WheelsetPlacement]) -> Row:
+    """Row: vertical forces of each wheel's patches add up to the wheel load."""
     off = max(
         abs(sum(patch.vertical for patch in wheel) / SCENE.wheelset.load - 1.0)
         for placement in static_placements
@@ -226,7 +241,7 @@ def _load_row(static_placements: list[WheelsetPlacement]) -> Row:
     ).at_most(1e-5, "patches share the load to the precision of the shares", "none")
 
 
-def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
+def _profile_file_rows(wheelset_placements: list[WheelsetPlacement]) -> list[Row]:
     """Rows: contact with the built-in profiles, compared with the benchmark's profile files, in which the rail is
     already inclined."""
     names = {"places": ("mm", POSITION_TOLERANCE, 0), "forces": ("%", FORCE_TOLERANCE, 1)}
@@ -240,13 +255,13 @@ def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     other_contact = replace(contact_of("A-2"), side=side)
     chosen = [
         (placement, other_contact.at(placement.shift, placement.yaw))
-        for placement in placements
-        if round(1e3 * placement.shift, 6) in FILE_SHIFTS
+        for placement in wheelset_placements
+        if round(1e3 * placement.shift, 6) in PROFILE_FILE_SHIFTS
     ]
     pairs = [
         (wheel_sums(placement, wheel), wheel_sums(theirs, wheel))
         for placement, theirs in chosen
-        for wheel in FIRST_COLUMNS
+        for wheel in FIRST_COLUMN_OF_WHEEL
     ]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [
@@ -261,7 +276,8 @@ def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     ]
 
 
-def _time_rows(seconds_by_case: dict[str, float]) -> list[Row]:
+def _computing_time_rows(seconds_by_case: dict[str, float]) -> list[Row]:
+    """Rows: processor time of a position of both wheels, for each case."""
     why = "geometry, roll, exact normal contact; rolling also the speed of spin"
     return [
         Observed(
@@ -275,15 +291,15 @@ def _time_rows(seconds_by_case: dict[str, float]) -> list[Row]:
     ]
 
 
-def _table_of_patches(placement: WheelsetPlacement) -> dict[str, Any]:
+def _table_of_patches(wheelset_placement: WheelsetPlacement) -> dict[str, Any]:
     """Displacement (mm), and for each patch: contact position on rail and wheel (mm), angle (deg), force (kN) and peak
     pressure (MPa)."""
-    return {"shift": 1e3 * placement.shift} | {
+    return {"shift": 1e3 * wheelset_placement.shift} | {
         wheel: [
             [1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
-            for p in getattr(placement, wheel)
+            for p in getattr(wheelset_placement, wheel)
         ]
-        for wheel in FIRST_COLUMNS
+        for wheel in FIRST_COLUMN_OF_WHEEL
     }
 
 
@@ -307,7 +323,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
             tuple(
                 (f"{position_row['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
                 for position_row in case_data[name]
-                for wheel in FIRST_COLUMNS
+                for wheel in FIRST_COLUMN_OF_WHEEL
                 for patch in position_row[wheel]
             ),
         )

@@ -37,15 +37,20 @@ from validation.spatial.cars import r19
 
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"
-ROADS: tuple[Ride, ...] = (("A", 1, 30.0, 15.0), ("B", 2, 20.0, 5.0), ("C", 3, 20.0, 20.0), ("D", 5, 10.0, 15.0))
+ROADS_OF_CLEAN_RECORDINGS: tuple[Ride, ...] = (
+    ("A", 1, 30.0, 15.0),
+    ("B", 2, 20.0, 5.0),
+    ("C", 3, 20.0, 20.0),
+    ("D", 5, 10.0, 15.0),
+)
 """ISO class, seed, speed (m/s) and duration (s) of the roads of clean recordings."""
 NOISE_SAMPLE_COUNT = 4
-SIZE_TOLERANCE = 0.2
+FAULT_SIZE_TOLERANCE = 0.2
 """Relative tolerance of the size that a check states for a planted fault."""
 VERTICAL_FORCE_CHANNELS = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 DEGREES_PER_RADIAN = 180 / np.pi
 PLANTED_DELAY = 3e-3
-QUICK_FAULTS = (
+FAULTS_OF_QUICK_RUN = (
     PlantedMeasurementFault(
         "3 ms late, one force", "shift", "fl_fz", PLANTED_DELAY, "s", faults={"delay": {"fl_fz": PLANTED_DELAY}}
     ),
@@ -113,7 +118,7 @@ LEVER_FAULTS = {
     "moments about the contact patch, one wheel": (-0.34, ("rr",)),
     "moments referred to the hub twice, one axle": (0.3, ("fl", "fr")),
 }
-FULL_FAULTS = (
+FURTHER_FAULTS = (
     *(
         PlantedMeasurementFault(name, check, place, size, unit, faults={key: amounts})
         for name, check, place, size, unit, key, amounts in TRANSDUCER_FAULTS
@@ -143,99 +148,112 @@ FULL_FAULTS = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of single faults on one road; a full run also has clean recordings on four roads, several faults at once,
     and other noise samples."""
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, finding_texts = [], dict[str, str]()
-    for fault in QUICK_FAULTS if quick else QUICK_FAULTS + FULL_FAULTS:
-        findings = planted_findings(virtual, folder, fault.spoil, **fault.faults)
-        rows += _fault_rows(fault, findings)
+    for fault in FAULTS_OF_QUICK_RUN if quick else FAULTS_OF_QUICK_RUN + FURTHER_FAULTS:
+        findings = planted_findings(virtual, work_folder, fault.spoil, **fault.faults)
+        rows += _planted_fault_rows(fault, findings)
         finding_texts[fault.name] = findings[0].text if findings else "nothing"
-    rows.append(_clean_recordings_row("quick", [planted_findings(virtual, folder)]))
+    rows.append(_clean_recordings_row("quick", [planted_findings(virtual, work_folder)]))
     if not quick:
         rows += [
-            *_clean_recording_rows(folder),
-            *_wrong_vehicle_rows(folder),
-            *_three_faults_rows(virtual, folder),
-            _mean_delay_row(virtual, folder),
+            *_clean_recording_rows(work_folder),
+            *_wrong_vehicle_rows(work_folder),
+            *_three_faults_at_once_rows(virtual, work_folder),
+            _mean_delay_row(virtual, work_folder),
         ]
-        size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, folder), "drift")
+        size = 1e6 * _stated_fault_size(drifting_findings(virtual, 5e-4, work_folder), "drift")
         rows += [
-            _size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
-            *_moving_car_rows(folder),
+            _stated_size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
+            *_moving_car_check_rows(work_folder),
         ]
     return rows, {"said": finding_texts}
 
 
-def _stated_size(findings: Sequence[Finding], check: str, finding_place: str = "") -> float:
+def _stated_fault_size(findings: Sequence[Finding], check_name: str, finding_location: str = "") -> float:
     """Size that the first finding of a check states at a place; NaN if there is no such finding."""
-    sizes = [finding.size for finding in findings if finding.check == check and finding_place in finding.place]
+    sizes = [finding.size for finding in findings if finding.check == check_name and finding_location in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _size_row(row_name: str, quantity: str, stated_size: float, unit: str, planted_size: float) -> Row:
+def _stated_size_row(row_name: str, quantity_name: str, stated_size: float, unit: str, planted_size: float) -> Row:
     """Row that compares the size that a check states with the size of the planted fault."""
     id, why = f"measured_checks.{row_name}", "what was planted, 20 %"
-    return Observed(id, SYSTEM, quantity, stated_size, unit).within(
-        planted_size, SIZE_TOLERANCE * abs(planted_size), why, "closed form"
+    return Observed(id, SYSTEM, quantity_name, stated_size, unit).within(
+        planted_size, FAULT_SIZE_TOLERANCE * abs(planted_size), why, "closed form"
     )
 
 
-def _no_findings_row(row_name: str, quantity: str, finding_texts: list[str], tolerance_reason: str) -> Row:
+def _no_findings_row(row_name: str, quantity_name: str, finding_texts: list[str], tolerance_reason: str) -> Row:
     """Row that passes if there are no findings."""
     id, finding_text = f"measured_checks.{row_name}", "; ".join(finding_texts) or tolerance_reason
-    return Observed(id, SYSTEM, quantity, len(finding_texts), "").within(0, 0, finding_text, "closed form")
+    return Observed(id, SYSTEM, quantity_name, len(finding_texts), "").within(0, 0, finding_text, "closed form")
 
 
-def _fault_rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
+def _planted_fault_rows(planted_fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
     """Rows on one planted fault: the right check names the fault at the right place, no other fault is named, and the
     size is right."""
-    key = fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
-    named = any(finding.check == fault.check and fault.place in finding.place for finding in findings)
-    alone = all(finding.check == fault.check for finding in findings)
+    key = planted_fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
+    named = any(finding.check == planted_fault.check and planted_fault.place in finding.place for finding in findings)
+    alone = all(finding.check == planted_fault.check for finding in findings)
     word = "named" if named and alone else f"{[finding.check for finding in findings]}"
-    why = f"'{fault.check}' at {fault.place or 'the vehicle'}, and nothing else"
+    why = f"'{planted_fault.check}' at {planted_fault.place or 'the vehicle'}, and nothing else"
     rows = [
         behaviour_row(
-            f"measured_checks.{key}.named", SYSTEM, f"the planted fault is named: {fault.name}", word, "named", why
+            f"measured_checks.{key}.named",
+            SYSTEM,
+            f"the planted fault is named: {planted_fault.name}",
+            word,
+            "named",
+            why,
         )
     ]
-    if fault.check != "swapped":
-        size = _stated_size(findings, fault.check, fault.place)
-        rows.append(_size_row(f"{key}.size", f"{fault.name}: its size", size, fault.unit, fault.size))
+    if planted_fault.check != "swapped":
+        size = _stated_fault_size(findings, planted_fault.check, planted_fault.place)
+        rows.append(
+            _stated_size_row(
+                f"{key}.size", f"{planted_fault.name}: its size", size, planted_fault.unit, planted_fault.size
+            )
+        )
     return rows
 
 
-def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
+def _clean_recordings_row(recording_set: str, findings_of_recordings: list[tuple[Finding, ...]]) -> Row:
     """Row: the checks report no error and no doubt for recordings without a fault."""
-    what = f"errors and doubts in {len(recordings)} clean recordings"
+    what = f"errors and doubts in {len(findings_of_recordings)} clean recordings"
     return _no_findings_row(
-        f"clean.{name}",
+        f"clean.{recording_set}",
         what,
-        [finding.text for findings in recordings for finding in findings],
+        [finding.text for findings in findings_of_recordings for finding in findings],
         "noise as stated, nothing planted",
     )
 
 
-def _clean_recording_rows(folder: Path) -> list[Row]:
+def _clean_recording_rows(work_folder: Path) -> list[Row]:
     """Rows: no errors or doubts for clean recordings of 5 to 20 s, from four roads, two vehicles and two noise samples
     each."""
     return [
         _clean_recordings_row(
             vehicle,
-            [planted_findings(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)],
+            [
+                planted_findings(measurement(vehicle, road), work_folder, seed=seed)
+                for road in roads
+                for seed in range(2)
+            ],
         )
-        for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
+        for vehicle, roads in (("r19_free", ROADS_OF_CLEAN_RECORDINGS), ("twin", ROADS_OF_CLEAN_RECORDINGS[1::2]))
     ]
 
 
-def _wrong_vehicle_rows(folder: Path) -> list[Row]:
+def _wrong_vehicle_rows(work_folder: Path) -> list[Row]:
     """Rows on recordings of a car that differs from its vehicle file R19-free: heavier, with stiffer springs, or with
     weaker dampers."""
     findings_by_car = {
         name: errors_and_doubts(
-            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder
+            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), work_folder
         )
         for name, of_recording in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
     }
@@ -246,21 +264,21 @@ def _wrong_vehicle_rows(folder: Path) -> list[Row]:
         if finding.weight == "error"
     ]
     what = "80 kg more on board than in the file: excess of weight"
-    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _stated_size(findings_by_car["loaded"], "weight")
+    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _stated_fault_size(findings_by_car["loaded"], "weight")
     id, why = "measured_checks.loaded", "what was loaded, 20 %"
     quantity = (
         "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     )
     return [
-        Observed(id, SYSTEM, what, excess, "%").within(wanted, SIZE_TOLERANCE * 6.6, why, "closed form"),
+        Observed(id, SYSTEM, what, excess, "%").within(wanted, FAULT_SIZE_TOLERANCE * 6.6, why, "closed form"),
         _no_findings_row("strangers", quantity, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
 
-def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) -> list[Row]:
+def _three_faults_at_once_rows(virtual_measurement: VirtualMeasurement, work_folder: Path) -> list[Row]:
     """Rows: three faults at once are all named, and the size of one of them is right."""
     spoil = exchanged_hubs(("fl", "fr")), scaled_channels(1e-3, "rr_fz")
-    findings = planted_findings(virtual_measurement, folder, *spoil, delay={"rl_fz": PLANTED_DELAY})
+    findings = planted_findings(virtual_measurement, work_folder, *spoil, delay={"rl_fz": PLANTED_DELAY})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
         ", ".join(sorted({f.check for f in findings})),
@@ -269,28 +287,32 @@ def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) ->
     last = [finding for finding in findings if finding.check == "shift"][-1:]
     return [
         behaviour_row(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
-        _size_row(
-            "together.size", "size of the delay among several faults", _stated_size(last, "shift"), "s", PLANTED_DELAY
+        _stated_size_row(
+            "together.size",
+            "size of the delay among several faults",
+            _stated_fault_size(last, "shift"),
+            "s",
+            PLANTED_DELAY,
         ),
     ]
 
 
-def _mean_delay_row(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
+def _mean_delay_row(virtual_measurement: VirtualMeasurement, work_folder: Path) -> Row:
     """Row: mean over several noise samples of the delay that the check states for one channel, as a test of its
     bias."""
     samples = [
-        planted_findings(virtual_measurement, folder, seed=seed, **QUICK_FAULTS[0].faults)
+        planted_findings(virtual_measurement, work_folder, seed=seed, **FAULTS_OF_QUICK_RUN[0].faults)
         for seed in range(NOISE_SAMPLE_COUNT)
     ]
     late = 1e3 * float(
-        np.mean([_stated_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
+        np.mean([_stated_fault_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
     )
     what = f"3 ms late, one force: mean over {NOISE_SAMPLE_COUNT} samples of noise"
     why = "5 %: the response is linear, the vehicle is not"
     return Observed("measured_checks.spread", SYSTEM, what, late, "ms").within(3.0, 0.15, why, "closed form")
 
 
-def _moving_car_rows(folder: Path) -> list[Row]:
+def _moving_car_check_rows(work_folder: Path) -> list[Row]:
     """Rows: inertial checks of a telephone recording in a real car, if the recording is available."""
     path = car.find_recording()
     if path is None:
@@ -302,7 +324,7 @@ def _moving_car_rows(folder: Path) -> list[Row]:
     degrees[:, 4] *= DEGREES_PER_RADIAN
     down[:, :6] *= np.tile(measured_car.TELEPHONE_TO_CAR, 2)
     findings = {
-        name: check(measured_car.phone_recording(values, folder / f"{name}.columns"), None)
+        name: check(measured_car.phone_recording(values, work_folder / f"{name}.columns"), None)
         for name, values in (("clean", clean), ("degrees", degrees), ("down", down))
     }
     errors = {
@@ -329,7 +351,7 @@ def _moving_car_rows(folder: Path) -> list[Row]:
             "az, q and pitch",
             "gravity and the turning of the pose tell",
         ),
-        _size_row(
+        _stated_size_row(
             "car.degrees",
             "moving car with degrees for radians in pitch: size of the fault",
             size,
@@ -340,7 +362,7 @@ def _moving_car_rows(folder: Path) -> list[Row]:
             "measured_checks.car.ratio",
             SYSTEM,
             "ratio of the gyro's pitch rate to that of the camera's pose, moving car",
-            _stated_size(findings["clean"], "turning", "pitch"),
+            _stated_fault_size(findings["clean"], "turning", "pitch"),
             "1",
         ).beside(1.0, "a telephone beside a camera at 20 Hz"),
     ]

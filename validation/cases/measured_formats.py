@@ -30,92 +30,95 @@ SINGLE_PRECISION = 2.0**-24
 """Relative rounding error of 32-bit floating-point numbers."""
 RELATIVE_RESOLUTION = {".csv": 0.0, ".mf4": 0.0, ".rsp": SINGLE_PRECISION, ".tdms": 0.0}
 """Largest relative change of a value that is written and read, by format."""
-FORMATS = {".csv": "CSV", ".mf4": "MDF 4", ".rsp": "RPC III", ".tdms": "TDMS"}
-START_DATE = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
-COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
+FORMAT_NAMES = {".csv": "CSV", ".mf4": "MDF 4", ".rsp": "RPC III", ".tdms": "TDMS"}
+MEASUREMENT_START = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
+FILE_COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
 CHANNEL_NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
-UNITS = ("kN", "°", "m/s^2")
-COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
-SAMPLE_COUNT, SAMPLE_PERIOD, BLOCK_SAMPLES = 5000, 1e-3, 1234
+CHANNEL_UNITS = ("kN", "°", "m/s^2")
+CHANNEL_COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
+SAMPLE_COUNT, SAMPLE_PERIOD, SAMPLES_PER_BLOCK = 5000, 1e-3, 1234
 """Number of samples, sampling period (s), and samples in a block that is read."""
 
 
-def sample_values() -> np.ndarray:
+def written_values() -> np.ndarray:
     """Values (SAMPLE_COUNT, 3) of widely different sizes, with a gap."""
     values = normal_samples(SEED, 0, SAMPLE_COUNT, 3) * np.array([1e3, 1e-6, 1.0])
     values[100:200, 1] = np.nan
     return values
 
 
-def write_in_blocks(path: Path, values: np.ndarray) -> Path:
+def write_in_blocks(file_path: Path, measured_values: np.ndarray) -> Path:
     """Write the values to a file in blocks of 700 samples; returns the file's path."""
-    blocks = (values[i : i + 700] for i in range(0, len(values), 700))
+    blocks = (measured_values[i : i + 700] for i in range(0, len(measured_values), 700))
     return write(
-        path, [ChannelGroup(CHANNEL_NAMES, UNITS, COMMENTS, SAMPLE_PERIOD, len(values), blocks)], START_DATE, COMMENT
+        file_path,
+        [ChannelGroup(CHANNEL_NAMES, CHANNEL_UNITS, CHANNEL_COMMENTS, SAMPLE_PERIOD, len(measured_values), blocks)],
+        MEASUREMENT_START,
+        FILE_COMMENT,
     )
 
 
-def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
+def largest_relative_difference(read_values: np.ndarray, true_values: np.ndarray) -> float:
     """Largest relative difference of the values from the true ones; infinite if other values are missing than should
     be."""
-    if not np.array_equal(np.isnan(values), np.isnan(truth)):
+    if not np.array_equal(np.isnan(read_values), np.isnan(true_values)):
         return float("inf")
-    return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
+    return float(np.nanmax(np.abs(read_values - true_values) / np.abs(true_values)))
 
 
-def preserved_texts(measurement_source: Source) -> dict[str, bool]:
+def preserved_metadata(measurement_source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {
         "names": tuple(channel.name for channel in measurement_source.channels) == CHANNEL_NAMES,
-        "units": tuple(channel.unit for channel in measurement_source.channels) == UNITS,
-        "comments": tuple(channel.comment for channel in measurement_source.channels) == COMMENTS
-        and measurement_source.comment == COMMENT,
-        "start": measurement_source.start == START_DATE,
+        "units": tuple(channel.unit for channel in measurement_source.channels) == CHANNEL_UNITS,
+        "comments": tuple(channel.comment for channel in measurement_source.channels) == CHANNEL_COMMENTS
+        and measurement_source.comment == FILE_COMMENT,
+        "start": measurement_source.start == MEASUREMENT_START,
         "quiet": measurement_source.findings == (),
     }
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of round trips through each format, of two sampling rates in one file, and of the choice of number format; a
     full run also measures memory."""
     rows: list[Row] = []
     lines: list[dict[str, Any]] = []
     with TemporaryDirectory() as name:
-        for extension in FORMATS:
+        for extension in FORMAT_NAMES:
             format_rows, line = round_trip_rows(Path(name) / f"trip{extension}", extension)
             rows += format_rows
             lines.append(line)
-        rows += [two_rates_row(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
-        rows += resolution_rows(Path(name))
-        rows += form_rows(Path(name))
+        rows += [two_sampling_rates_row(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
+        rows += sample_resolution_rows(Path(name))
+        rows += file_form_rows(Path(name))
         if not quick:
             rows += [
                 row
                 for extension in (".mf4", ".rsp", ".tdms")
-                for row in memory_rows(Path(name) / f"long{extension}", extension)
+                for row in peak_memory_rows(Path(name) / f"long{extension}", extension)
             ]
     return rows, {"formats": lines}
 
 
-def round_trip_rows(path: Path, file_extension: str) -> tuple[list[Row], dict[str, Any]]:
+def round_trip_rows(file_path: Path, file_extension: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data: a file is written, read back block by block, and read with the format's own library."""
-    truth, form = sample_values(), FORMATS[file_extension]
+    truth, form = written_values(), FORMAT_NAMES[file_extension]
     began = time.perf_counter()
-    source = open_source(write_in_blocks(path, truth))
-    blocks = list(source.blocks(CHANNEL_NAMES, BLOCK_SAMPLES))
+    source = open_source(write_in_blocks(file_path, truth))
+    blocks = list(source.blocks(CHANNEL_NAMES, SAMPLES_PER_BLOCK))
     seconds = time.perf_counter() - began
     values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
     library, reading = LIBRARIES[file_extension]
-    foreign = reading(path)
-    same = [foreign.get(name, (None, ""))[1] for name in CHANNEL_NAMES] == list(UNITS)
+    foreign = reading(file_path)
+    same = [foreign.get(name, (None, ""))[1] for name in CHANNEL_NAMES] == list(CHANNEL_UNITS)
     there = np.column_stack([foreign[name][0] for name in CHANNEL_NAMES]) if same else np.full_like(truth, np.inf)
     error, off, by_library = (
-        largest_difference(values, truth),
+        largest_relative_difference(values, truth),
         float(np.abs(times - SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)).max()),
-        largest_difference(there, truth),
+        largest_relative_difference(there, truth),
     )
-    lost = ", ".join(what for what, good in preserved_texts(source).items() if not good)
+    lost = ", ".join(what for what, good in preserved_metadata(source).items() if not good)
     key, why = f"measured_formats.{file_extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
         Observed(
@@ -146,7 +149,7 @@ def round_trip_rows(path: Path, file_extension: str) -> tuple[list[Row], dict[st
     ], {
         "format": form,
         "library": library,
-        "size": path.stat().st_size,
+        "size": file_path.stat().st_size,
         "values": error,
         "times": off,
         "own": by_library,
@@ -154,18 +157,18 @@ def round_trip_rows(path: Path, file_extension: str) -> tuple[list[Row], dict[st
     }
 
 
-def two_rates_row(path: Path, file_extension: str) -> Row:
+def two_sampling_rates_row(file_path: Path, file_extension: str) -> Row:
     """Row: largest change of times and values of two groups with different sampling rates, written to one file and read
     back."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
     write(
-        path,
+        file_path,
         [
             ChannelGroup(names, ("N",), ("",), period, len(values_of), [values_of[:, None]])
             for names, (period, values_of) in values.items()
         ],
     )
-    channels = read_channels(open_source(path))
+    channels = read_channels(open_source(file_path))
     errors = [
         np.abs(channels[name][k] - truth).max()
         for (name,), (period, values_of) in values.items()
@@ -174,17 +177,17 @@ def two_rates_row(path: Path, file_extension: str) -> Row:
     return Observed(
         f"measured_formats.{file_extension[1:]}.rates",
         SYSTEM,
-        f"{FORMATS[file_extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
+        f"{FORMAT_NAMES[file_extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
         max(errors),
         "s or N",
     ).at_most(1e-12, "each group has a clock of its own", "closed form")
 
 
-def form_rows(folder: Path) -> list[Row]:
+def file_form_rows(work_folder: Path) -> list[Row]:
     """Rows: CSV files in the forms that loggers, spreadsheets and scripts write, and files of other kinds, are read
     exactly or refused."""
     files = (*csv_forms.FILES, *kinds.FILES)
-    ends = [_difference_or_error(odd, folder / f"form {i}") for i, odd in enumerate(files)]
+    ends = [_difference_or_error(odd, work_folder / f"form {i}") for i, odd in enumerate(files)]
     crashed = sorted({odd.name for odd, end in zip(files, ends, strict=True) if isinstance(end, str)})
     readable = [(odd, end) for odd, end in zip(files, ends, strict=True) if odd.expected_outcome != "refused"]
     errors = [end if isinstance(end, float) else float("inf") for _, end in readable]
@@ -217,18 +220,18 @@ def form_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _difference_or_error(odd_file: OddFile, folder: Path) -> float | str | None:
+def _difference_or_error(odd_file: OddFile, work_folder: Path) -> float | str | None:
     """Error of the values read from a file; None if the file is refused with a reason; text of any other error that is
     raised."""
     try:
-        return odd_file.error(folder)
+        return odd_file.error(work_folder)
     except InputError:
         return None
     except Exception as error:
         return f"{type(error).__name__}: {error}"
 
 
-def wheel_force() -> np.ndarray:
+def wheel_force_with_pothole() -> np.ndarray:
     """A wheel force (N) of ten seconds at 1 kHz, with one pothole whose force is forty times that of the normal
     road."""
     load = np.convolve(normal_samples(SEED, 1, 10_000, 1)[:, 0], np.ones(20) / 20.0, mode="same") * 450.0
@@ -236,11 +239,11 @@ def wheel_force() -> np.ndarray:
     return load
 
 
-def resolution_rows(folder: Path) -> list[Row]:
+def sample_resolution_rows(work_folder: Path) -> list[Row]:
     """Rows: change of the damage of the road without its pothole by integer and by floating-point samples. RPC III
     files are written in floating point for this reason."""
-    load = wheel_force()
-    path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
+    load = wheel_force_with_pothole()
+    path = write(work_folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read_channels(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
     rounded_load = step * np.round(load / step)
@@ -266,30 +269,30 @@ def resolution_rows(folder: Path) -> list[Row]:
     ]
 
 
-STATUS_FILE = Path("/proc/self/status")
-MEMORY_SCRIPT = f"""
+PROCESS_STATUS_FILE = Path("/proc/self/status")
+PEAK_MEMORY_SCRIPT = f"""
 import sys
 from models.measured.formats import open_source
 source = open_source(sys.argv[1])
 count = sum(len(block.times) for block in source.blocks([one.name for one in source.channels]))
-print(count, next(line for line in open("{STATUS_FILE}") if line.startswith("VmHWM")).split()[1])
+print(count, next(line for line in open("{PROCESS_STATUS_FILE}") if line.startswith("VmHWM")).split()[1])
 """
 
 
-def memory_rows(path: Path, file_extension: str) -> list[Row]:
+def peak_memory_rows(file_path: Path, file_extension: str) -> list[Row]:
     """Rows: peak memory of a fresh process that reads five minutes of sixty channels block by block."""
-    key, form = f"measured_formats.{file_extension[1:]}.memory", FORMATS[file_extension]
-    if not STATUS_FILE.exists():
+    key, form = f"measured_formats.{file_extension[1:]}.memory", FORMAT_NAMES[file_extension]
+    if not PROCESS_STATUS_FILE.exists():
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
     count, base = 300_000, 1e3 * normal_samples(SEED, 2, 60_000, 60)
     blocks: Iterator[np.ndarray] = (base + i for i in range(count // len(base)))
-    write(path, [ChannelGroup(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
+    write(file_path, [ChannelGroup(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
     out = subprocess.run(
-        [sys.executable, "-c", MEMORY_SCRIPT, str(path)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", PEAK_MEMORY_SCRIPT, str(file_path)], capture_output=True, text=True, check=True
     ).stdout
     sample_total, peak = (int(word) for word in out.split())
-    size = path.stat().st_size / 1e6
-    path.unlink()
+    size = file_path.stat().st_size / 1e6
+    file_path.unlink()
     return [
         Observed(
             f"{key}.samples", SYSTEM, f"{form}: samples of five minutes that are read by block", sample_total, ""

@@ -30,31 +30,31 @@ from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"
 SYSTEM: System = "measured"
-ASTM_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
-"""The load of figure 6 of ASTM E1049-85; ASTM_COUNTS has the printed counts for ranges 3, 4, 6, 8 and 9."""
-ASTM_COUNTS = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+ASTM_EXAMPLE_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+"""The load of figure 6 of ASTM E1049-85; ASTM_CYCLE_COUNTS has the printed counts for ranges 3, 4, 6, 8 and 9."""
+ASTM_CYCLE_COUNTS = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
 PATTERN_SECONDS = 2.5
 """Length (s) of the pattern that a long recording repeats."""
 LONG_DURATION = 24.0
 """Length (s) of the run whose memory is measured."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of section forces, of counting, and of a run in blocks in MuJoCo; a full run also has all engines, a killed
     run, memory, and exported files."""
-    rows = [*_guide_rows(quick), *_counting_rows()]
+    rows = [*_guide_force_rows(quick), *_cycle_counting_rows()]
     if quick:
-        return [*rows, _equal_blocks_row(folder, "mujoco", "kalman", 0.3)], {}
+        return [*rows, _equal_blocks_row(work_folder, "mujoco", "kalman", 0.3)], {}
     lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.2}
     rows += [
-        _equal_blocks_row(folder, engine, method, seconds)
+        _equal_blocks_row(work_folder, engine, method, seconds)
         for engine, seconds in lasting.items()
         for method in ("none", "kalman", "prescribed")
     ]
-    return [*rows, _killed_row(folder), *_memory_rows(folder), *_export_rows(folder)], {}
+    return [*rows, _killed_run_row(work_folder), *_peak_memory_rows(work_folder), *_export_rows(work_folder)], {}
 
 
-def _guide_rows(quick: bool) -> list[Row]:
+def _guide_force_rows(quick: bool) -> list[Row]:
     """Rows: forces and moments of the suspension guides in a turning, shaken car without symmetry, compared with the
     engines' own sensors."""
     car, worst = cut(twin(), "body"), 0.0
@@ -95,10 +95,10 @@ def _guide_rows(quick: bool) -> list[Row]:
     ]
 
 
-def _guide_forces(sections: Sections, table: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _guide_forces(sections: Sections, parameter_table: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Forces and moments (guides, 6) that the suspension guides transmit (N, N m); components along which a guide lets
     its body slide are 0."""
-    read = sections.read(table, np.concatenate((q, v))[None], 2)[0]
+    read = sections.read(parameter_table, np.concatenate((q, v))[None], 2)[0]
     values = {answer.name: value for answer, value in zip(sections.answers, read, strict=True)}
     return np.array(
         [
@@ -108,9 +108,9 @@ def _guide_forces(sections: Sections, table: np.ndarray, q: np.ndarray, v: np.nd
     )
 
 
-def _counting_rows() -> list[Row]:
+def _cycle_counting_rows() -> list[Row]:
     """Rows: rainflow counting of the standard's example, and damage and counts of a sine, which are known exactly."""
-    spans, _, counts = rainflow_cycles(ASTM_LOAD)
+    spans, _, counts = rainflow_cycles(ASTM_EXAMPLE_LOAD)
     by_span = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
     sine = np.sin(2 * np.pi * np.arange(100 * 64 + 1) / 64)  # 100 periods from 0: half cycles of 1, whole ones of 2
     counted = counted_load(sine, (5.0,))
@@ -123,7 +123,7 @@ def _counting_rows() -> list[Row]:
             SYSTEM,
             "rainflow counts of the example of ASTM E1049-85",
             str(by_span),
-            str(ASTM_COUNTS),
+            str(ASTM_CYCLE_COUNTS),
             "the standard's own table",
             "published",
         ),
@@ -146,32 +146,34 @@ def _counting_rows() -> list[Row]:
     ]
 
 
-def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float) -> Row:
+def _equal_blocks_row(work_folder: Path, engine_name: str, stabiliser: str, recording_seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
-    run_folder = folder / f"blocks {seconds}"
+    run_folder = work_folder / f"blocks {recording_seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
+    hold = AttitudeHold(stabiliser)  # type: ignore[arg-type]
+    job = section_run_of_recording(run_folder, recording_seconds, PATTERN_SECONDS, engine_name, hold)
     bits = []
     for block in (60.0, 0.073):
-        name = f"{engine} {stabiliser} {block}"
+        name = f"{engine_name} {stabiliser} {block}"
         run(job, run_folder / name, block=block)
         bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
-        f"measured_long.blocks_{engine}_{stabiliser}",
+        f"measured_long.blocks_{engine_name}_{stabiliser}",
         SYSTEM,
-        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser "
+        f"channels in {engine_name} whose bits change if {recording_seconds:g} s are run in blocks of 0.073 s, "
+        "stabiliser "
         f"{stabiliser}",
         changed,
         "1",
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
 
 
-def _killed_row(folder: Path) -> Row:
+def _killed_run_row(work_folder: Path) -> Row:
     """Row: number of channels that differ between a run that was killed twice and a run that was not."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):
-        run_folder = folder / f"killed {times}"
+        run_folder = work_folder / f"killed {times}"
         run_folder.mkdir()
         job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS)
         if times:
@@ -190,10 +192,10 @@ def _killed_row(folder: Path) -> Row:
     ).at_most(0.0, "a checkpoint is written whole or not at all", "closed form")
 
 
-def _memory_rows(folder: Path) -> list[Row]:
+def _peak_memory_rows(work_folder: Path) -> list[Row]:
     """Rows: peak memory for an hour of recording, extrapolated from a shorter recording, and speed of the run."""
-    section_run_of_recording(folder, LONG_DURATION, PATTERN_SECONDS)
-    words = map(str, (folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))
+    section_run_of_recording(work_folder, LONG_DURATION, PATTERN_SECONDS)
+    words = map(str, (work_folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     output_lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in output_lines], float)  # of every block: seconds, memory, processor
@@ -218,9 +220,9 @@ def _memory_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _export_rows(folder: Path) -> list[Row]:
+def _export_rows(work_folder: Path) -> list[Row]:
     """Rows: section forces written in every format and read back; a measured check channel compared with the run."""
-    run_folder = folder / "handed on"
+    run_folder = work_folder / "handed on"
     run_folder.mkdir()
     job = section_run_of_recording(run_folder, 2.0, PATTERN_SECONDS)
     outcome = run(job, run_folder / "run")

@@ -36,7 +36,7 @@ TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
 SEED = 30
 CLOSED_FORM_BOUND = 1e-12
-GAINS_BY_HEIGHT = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
+NOISE_GAINS_BY_HEIGHT = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
 """Height (m) of the fifth sensor above a floor of 2 m by 1.2 m, with the known noise gain relative to the last sensor
 (1/m)."""
 NOISE_DEVIATION = 0.3
@@ -55,12 +55,12 @@ LOOSE_SENSOR = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "da
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of clean motions in space, noise, each engine's simulated readings, and drift; a quick run has few paths and
     runs of 1 s."""
-    rows = [row for name in SENSOR_ARRANGEMENTS for row in _exact_rows(name)]
-    rows += [_printed_formula_row(), _order_row(), _tilt_error_row()]
-    gains, gain_rows = _gain_rows(4000 if quick else 40_000)
+    rows = [row for name in SENSOR_ARRANGEMENTS for row in _clean_reading_rows(name)]
+    rows += [_formula_as_printed_row(), _convergence_order_row(), _tilt_error_row()]
+    gains, gain_rows = _noise_gain_rows(4000 if quick else 40_000)
     rows += gain_rows
     for engine in IMPLEMENTATIONS:
         rows += _engine_rows(engine, 1.0 if quick else 5.0)
@@ -68,14 +68,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*rows, *walked, *_symmetric_part_rows(curves, quick)], {"gains": gains, "curves": curves}
 
 
-def _exact_rows(arrangement: str) -> list[Row]:
+def _clean_reading_rows(arrangement_name: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
-    array = sensor_array(SENSOR_ARRANGEMENTS[arrangement])
+    array = sensor_array(SENSOR_ARRANGEMENTS[arrangement_name])
     clean = readings_on_path(array.positions)
-    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement.replace(',', '').replace(' ', '-')}"
+    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement_name.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
-    what = f"sensors: {arrangement}{', formula for a plane' if array.planar else ''}"
+    what = f"sensors: {arrangement_name}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
         ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),
@@ -93,7 +93,7 @@ def _exact_rows(arrangement: str) -> list[Row]:
     ]
 
 
-def _printed_formula_row() -> Row:
+def _formula_as_printed_row() -> Row:
     """Row: angular acceleration by eq. (18) exactly as printed, which is wrong if all sensors lie in a plane."""
     floor = np.array(list(SENSOR_ARRANGEMENTS["5 in a plane"].values()))
     relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
@@ -113,7 +113,7 @@ def _printed_formula_row() -> Row:
     )
 
 
-def _order_row() -> Row:
+def _convergence_order_row() -> Row:
     """Row: order of convergence in the sampling period of the position recovered from the readings."""
     array = sensor_array(SENSOR_ARRANGEMENTS["5 in a tilted plane"])
     clean = readings_on_path(array.positions)
@@ -133,6 +133,7 @@ def _order_row() -> Row:
 
 
 def _tilt_error_row() -> Row:
+    """Row: false displacement by an error of the initial tilt, compared with its law."""
     array, tilt, count = sensor_array(SENSOR_ARRANGEMENTS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
     drift = -recovered_motion(array, still, 1e-3, StartState.pitched(tilt)).position[:, 0]
@@ -147,11 +148,11 @@ def _tilt_error_row() -> Row:
     )
 
 
-def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
+def _noise_gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     """Table and rows: noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth
     sensor."""
     rows, lines = [], []
-    for i, height in enumerate((*GAINS_BY_HEIGHT, 0.0)):
+    for i, height in enumerate((*NOISE_GAINS_BY_HEIGHT, 0.0)):
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
@@ -176,7 +177,7 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
                 )
             )
             line += [law**0.5, variance**0.5]
-        if height in GAINS_BY_HEIGHT:
+        if height in NOISE_GAINS_BY_HEIGHT:
             rows.append(
                 Observed(
                     f"motion.known_gain.{height:g}",
@@ -185,8 +186,8 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
                     line[1],
                     "1/m",
                 ).within(
-                    GAINS_BY_HEIGHT[height],
-                    0.04 * GAINS_BY_HEIGHT[height],
+                    NOISE_GAINS_BY_HEIGHT[height],
+                    0.04 * NOISE_GAINS_BY_HEIGHT[height],
                     "figures relative to the last sensor; relative to the mean up to 3 % less",
                     "published",
                 )
@@ -195,7 +196,7 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     return lines, rows
 
 
-def _engine_rows(engine: str, duration: float) -> list[Row]:
+def _engine_rows(engine_name: str, duration: float) -> list[Row]:
     """Rows: motion recovered from five rigid sensors in an engine's run on the study road, and detection of a loose
     sixth sensor."""
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID_SENSORS.items()} | {
@@ -212,7 +213,7 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
             },
         }
     )
-    run, p = simulate(scene, engine), scene.effects["accelerometers"]
+    run, p = simulate(scene, engine_name), scene.effects["accelerometers"]
     readings, array = readings_of(run, p), sensor_array(RIGID_SENSORS)
     felt = readings[:, :5]
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
@@ -221,24 +222,24 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = fit_quality(sensor_array(p.positions()), readings)
     return [
-        *_recovery_rows("accelerometers", engine, array, felt, run.states, None),
-        *_recovery_rows("gyro", engine, array, felt, run.states, turning),
+        *_recovered_motion_rows("accelerometers", engine_name, array, felt, run.states, None),
+        *_recovered_motion_rows("gyro", engine_name, array, felt, run.states, turning),
         Observed(
-            f"motion.pitch_acceleration.{engine}",
+            f"motion.pitch_acceleration.{engine_name}",
             SYSTEM,
-            f"largest difference of the pitch acceleration from {engine}'s readings from the paper's "
+            f"largest difference of the pitch acceleration from {engine_name}'s readings from the paper's "
             "equations, over the largest value",
             float(np.abs(acceleration - true).max() / np.abs(true).max()),
             "",
         ).at_most(
             CLOSED_FORM_BOUND,
             "the engine's acceleration beside eq. (38), as in the build audit",
-            "shared kernel" if engine == "reference" else "native",
+            "shared kernel" if engine_name == "reference" else "native",
         ),
         behaviour_row(
-            f"motion.bracket.{engine}",
+            f"motion.bracket.{engine_name}",
             SYSTEM,
-            f"six sensors, of which a bracket of 30 Hz carries one, {engine}: {100 * loose.share:.2g} "
+            f"six sensors, of which a bracket of 30 Hz carries one, {engine_name}: {100 * loose.share:.2g} "
             "% fits no rigid body",
             f"loose: {loose.suspect}" if not loose.rigid else "rigid",
             "loose: battery",
@@ -246,38 +247,43 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
             "closed form",
         ),
         Observed(
-            f"motion.rigid.{engine}",
+            f"motion.rigid.{engine_name}",
             SYSTEM,
-            f"share of the readings that no rigid body explains, five rigid mounts, {engine}",
+            f"share of the readings that no rigid body explains, five rigid mounts, {engine_name}",
             fit_quality(array, felt).share,
             "",
         ).at_most(CLOSED_FORM_BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
     ]
 
 
-def _recovery_rows(
+def _recovered_motion_rows(
     integration_rule: str,
-    engine: str,
-    array: SensorArray,
+    engine_name: str,
+    sensor_arrangement: SensorArray,
     specific_forces: np.ndarray,
     states: np.ndarray,
-    rates: np.ndarray | None,
+    gyro_rates: np.ndarray | None,
 ) -> list[Row]:
     """Rows: errors of pitch and heave recovered from noise-free readings of a run, with or without its gyro, compared
     with its states (n, 8)."""
     followed = recovered_motion(
-        array, specific_forces, 1e-3, StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates
+        sensor_arrangement,
+        specific_forces,
+        1e-3,
+        StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()),
+        rates=gyro_rates,
     )
     errors = (
         ("pitch", followed.angles()[:, 1] - states[:, 3], "rad", 1e-6),
         ("heave", followed.position[:, 2] - states[:, 2], "m", 1e-5),
     )
-    words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
+    words = "accelerometers alone" if gyro_rates is None else "accelerometers and a gyro"
     return [
         Observed(
-            f"motion.recovered.{integration_rule}.{what}.{engine}",
+            f"motion.recovered.{integration_rule}.{what}.{engine_name}",
             SYSTEM,
-            f"error of the {what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
+            f"error of the {what} recovered from {words}, {engine_name}, {len(states) / 1e3:.0f} s at 1 kHz without "
+            "noise",
             float(np.abs(error).max()),
             unit,
         ).at_most(bound, "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")
@@ -299,20 +305,21 @@ def _turning_body(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarra
     )
 
 
-def _noise_samples(path: int, sample_count: int) -> np.ndarray:
-    return NOISE_DEVIATION * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(
+def _noise_samples(noise_path: int, sample_count: int) -> np.ndarray:
+    """Noise (n, 5, 3) in m/s^2 on the readings of five sensors."""
+    return NOISE_DEVIATION * normal_samples(SEED + 1, noise_path, sample_count, 15, source=ACCELEROMETERS).reshape(
         sample_count, 5, 3
     )
 
 
-def _random_walk_rows(path_count: int) -> tuple[list[Row], dict[str, list[float]]]:
+def _random_walk_rows(noise_path_count: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Row and curves: if angular rates are only integrated from noisy readings, their error grows with the square root
     of time."""
     count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
     errors = np.array(
         [
             integrate_rates(spin_from_readings(array, _noise_samples(path, count)), SAMPLE_PERIOD, np.zeros(3))
-            for path in range(path_count)
+            for path in range(noise_path_count)
         ]
     )
     row = mean_square(
@@ -324,8 +331,9 @@ def _random_walk_rows(path_count: int) -> tuple[list[Row], dict[str, list[float]
             "m^2/s^2",
         ),
         NOISE_DEVIATION**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
-        3 * path_count,
-        f"{path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
+        3 * noise_path_count,
+        f"{noise_path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period "
+        "time",
     )
     curves = {
         "time": SAMPLE_PERIOD * np.arange(count),
@@ -335,7 +343,7 @@ def _random_walk_rows(path_count: int) -> tuple[list[Row], dict[str, list[float]
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
 
-def _symmetric_part_rows(curves: Saved, quick: bool) -> list[Row]:
+def _symmetric_part_rows(error_curves: Saved, quick: bool) -> list[Row]:
     """Rows: if the symmetric part of the angular matrix serves as a measurement, the rate error stays bounded."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _turning_body(count)
@@ -347,7 +355,7 @@ def _symmetric_part_rows(curves: Saved, quick: bool) -> list[Row]:
     ]
     squares = np.mean([np.mean((held_rates - rates) ** 2, axis=1) for held_rates, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
-    curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
+    error_curves["held"], error_curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
     walked = (
         NOISE_DEVIATION * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
     )

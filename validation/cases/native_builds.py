@@ -25,7 +25,7 @@ TIMING_ROUNDS, TIMED_STEP_COUNT = 5, 1000
 """Number of interleaved timing rounds for the ratio of computing times, and number of steps of each timed run."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of three cars; a quick run has the shipped car and a tenth of the states."""
     cars = {"r19_free": r19()} if quick else {"r19_free": r19(), "twin": cut(twin(), "body"), "rough": rough_car()}
     rows = [row for name, car in cars.items() for row in _agreement_rows(name, car, quick)]
@@ -66,18 +66,19 @@ def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
                 trajectory_difference(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
-            _native_count_row(car_name, car, engine),
+            _native_element_count_row(car_name, car, engine),
         ]
     return rows
 
 
-def _native_count_row(car_name: str, car: CutVehicle, engine: str) -> Row:
-    share = native_share(engine, car)
+def _native_element_count_row(car_name: str, car: CutVehicle, engine_name: str) -> Row:
+    """Row: number of springs, mounts and bars that are native elements of an engine."""
+    share = native_share(engine_name, car)
     shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
     return Observed(
-        f"native_builds.count_{car_name}_{engine}",
+        f"native_builds.count_{car_name}_{engine_name}",
         SYSTEM,
-        f"number of springs, mounts and bars of {car_name} that are native elements in {engine}",
+        f"number of springs, mounts and bars of {car_name} that are native elements in {engine_name}",
         len(share.elements),
         "elements",
     ).within(len(car.elements), 0, f"all have stiffness and damping that every engine has; shared: {shared}", "native")

@@ -19,32 +19,33 @@ SPEED = 22.0
 """Speed (m/s) of the lane change."""
 DIFFERENCE_TOLERANCE = 1e-10
 """Largest difference allowed, divided by the largest value."""
-STATE_COUNTS = {True: 10, False: 100}
+RANDOM_STATE_COUNTS = {True: 10, False: 100}
 """Number of random states, for a quick run (True) and a full run (False)."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of energies and of a lane change, which takes 0.5 s in a quick run and 1.5 s in a full one."""
-    path = folder / "saloon.xml"
+    path = work_folder / "saloon.xml"
     path.write_text(SALOON, encoding="utf-8")
     handling = Handling(vehicle_of_file(path), controls=LANE_CHANGE_CONTROLS)
     return [_energy_row(handling, quick), *_lane_change_rows(handling, 0.5 if quick else 1.5)], {}
 
 
-def _energy_row(handling: Handling, quick: bool) -> Row:
+def _energy_row(handling_car: Handling, quick: bool) -> Row:
+    """Row: kinetic and potential energy at random states, compared with MuJoCo's own model of the file."""
     return Observed(
         "own_car.energy",
         SYSTEM,
         "largest difference of kinetic and potential energy from MuJoCo's own model of the file, at random states",
-        largest_energy_difference(handling, STATE_COUNTS[quick]),
+        largest_energy_difference(handling_car, RANDOM_STATE_COUNTS[quick]),
         "of the largest",
     ).at_most(1e-11, "rounding, and rotors that weigh 1e-9 kg more; equal energies make equal equations", "native")
 
 
-def _lane_change_rows(handling: Handling, duration: float) -> list[Row]:
+def _lane_change_rows(handling_car: Handling, duration: float) -> list[Row]:
     """Rows: difference between Exudyn and MuJoCo over a lane change, and of each engine's accelerations at its end from
     independently written equations."""
-    drives = {engine: drive_run(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
+    drives = {engine: drive_run(engine, handling_car, SPEED, duration) for engine in ("exudyn", "mujoco")}
     states = [drive.run.states for drive in drives.values()]
     rows = [
         Observed(
@@ -57,9 +58,9 @@ def _lane_change_rows(handling: Handling, duration: float) -> list[Row]:
     ]
     run = drives["mujoco"].run
     last = run.times[-1], run.positions[-1], run.rates[-1]
-    plain = build(REFERENCE, handling).acceleration(*last)
+    plain = build(REFERENCE, handling_car).acceleration(*last)
     for engine in drives:
-        apart = np.abs(build(engine, handling).acceleration(*last) - plain).max() / np.abs(plain).max()
+        apart = np.abs(build(engine, handling_car).acceleration(*last) - plain).max() / np.abs(plain).max()
         rows.append(
             Observed(
                 f"own_car.plain_{engine}",

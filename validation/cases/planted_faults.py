@@ -27,7 +27,7 @@ from validation.faults.campaign import FAULT_SYSTEM
 from validation.faults.planting import CONTROLS_WITHOUT_FAULT, DESCRIPTION_FAULTS, EQUATIONS_FAULTS
 
 TITLE = "Planted faults: what each check sees"
-CAMPAIGNS = (
+FAULT_CAMPAIGNS = (
     contact.CAMPAIGN,
     ride.CAMPAIGN,
     wheelset.CAMPAIGN,
@@ -42,11 +42,11 @@ CAMPAIGNS = (
     advice.CAMPAIGN,
 )
 QUICK_FAULTS = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
-QUICK_SPACING, FEWEST_FAULTS = 16, 40
+QUICK_FAULT_SPACING, FEWEST_FAULT_COUNT = 16, 40
 """Every so many faults of a campaign are planted in a quick run; and the least number of faults that must be caught."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on planted faults by system; a full run also has a row over all systems. A quick run plants every sixteenth
     fault of each system."""
     plane = (
@@ -56,35 +56,39 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     )
     data: Saved = {
         "pitch-plane": plane,
-        **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in CAMPAIGNS},
+        **{campaign.id: campaign.measure(QUICK_FAULT_SPACING if quick else 1) for campaign in FAULT_CAMPAIGNS},
     }
-    rows = [*pitch_plane.rows(plane), *(row for campaign in CAMPAIGNS for row in campaign.rows(data[campaign.id]))]
+    rows = [
+        *pitch_plane.rows(plane),
+        *(row for campaign in FAULT_CAMPAIGNS for row in campaign.rows(data[campaign.id])),
+    ]
     return [*rows, *([] if quick else [_fault_count_row(data)])], data
 
 
 def _fault_count_row(case_data: Saved) -> Row:
-    caught = sum(line[3] != "none" for line in _fault_lines(case_data))
+    """Row: by how much the number of detected faults falls short of the number asked for."""
+    caught = sum(line[3] != "none" for line in _fault_table_lines(case_data))
     return Observed(
         "planted.count",
         FAULT_SYSTEM,
-        f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
-        max(0, FEWEST_FAULTS - caught),
+        f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULT_COUNT}",
+        max(0, FEWEST_FAULT_COUNT - caught),
         "faults",
-    ).at_most(0, f"{caught} of {len(_fault_lines(case_data))} are", "native")
+    ).at_most(0, f"{caught} of {len(_fault_table_lines(case_data))} are", "native")
 
 
-def _fault_lines(case_data: Saved) -> list[tuple[str, ...]]:
+def _fault_table_lines(case_data: Saved) -> list[tuple[str, ...]]:
     """Table lines, one for each fault: system, component with the fault, fault, checks that detect it, and checks that
     alone would have missed it."""
     return [
         *pitch_plane.lines(case_data["pitch-plane"]),
-        *(line for campaign in CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
+        *(line for campaign in FAULT_CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
     ]
 
 
 def tables(case_data: Saved) -> list[Table]:
     """Tables of all faults, and for each system of the errors and descriptions of the checks."""
-    lines = _fault_lines(case_data)
+    lines = _fault_table_lines(case_data)
     systems = len({line[0] for line in lines})
     note = (
         f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
@@ -95,7 +99,7 @@ def tables(case_data: Saved) -> list[Table]:
     return [
         overview,
         *pitch_plane.tables(case_data["pitch-plane"]),
-        *(campaign.table(case_data[campaign.id]) for campaign in CAMPAIGNS),
+        *(campaign.table(case_data[campaign.id]) for campaign in FAULT_CAMPAIGNS),
     ]
 
 

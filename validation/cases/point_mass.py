@@ -15,7 +15,7 @@ TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
 SEED = 20
 DECIMAL_DIGITS = 60
-DEVIATION, STEP, MASS = 32.0, 1e-3, 780.0
+FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS = 32.0, 1e-3, 780.0
 """Standard deviation of the force noise (N), step (s) and mass (kg) of the paper's vehicle."""
 DAMPING_PRODUCTS = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
 """Products of the damping rate and the time, dimensionless."""
@@ -23,19 +23,19 @@ STEP_COUNTS = (10, 1_000_000)
 END_TIME = 10.0
 RELATIVE_TOLERANCE = 1e-10
 
-Matrix = list[list[Decimal]]
+DecimalMatrix = list[list[Decimal]]
 BOUND_REASON = (
     "the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
     "integral and no digit shared with the closed form"
 )
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for both covariances compared with 60-digit arithmetic, for their difference, and for Monte Carlo; a quick
     run has 2000 paths."""
     exact = {
-        "continuous": [_continuous_error(x) for x in DAMPING_PRODUCTS],
-        **{f"{n} steps": [_discrete_error(x, n) for x in DAMPING_PRODUCTS] for n in STEP_COUNTS},
+        "continuous": [_continuous_covariance_error(x) for x in DAMPING_PRODUCTS],
+        **{f"{n} steps": [_discrete_covariance_error(x, n) for x in DAMPING_PRODUCTS] for n in STEP_COUNTS},
     }
     rows = [
         Observed(
@@ -65,7 +65,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"errors": exact, "differences": differences}
 
 
-def _matrix_power(matrix: Matrix, exponent: int) -> Matrix:
+def _matrix_power(matrix: DecimalMatrix, exponent: int) -> DecimalMatrix:
     """Integer power of a matrix, by squaring."""
     size = range(len(matrix))
     product = [[Decimal(int(i == j)) for j in size] for i in size]
@@ -76,14 +76,18 @@ def _matrix_power(matrix: Matrix, exponent: int) -> Matrix:
     return product
 
 
-def _matrix_product(a: Matrix, b: Matrix) -> Matrix:
+def _matrix_product(first_matrix: DecimalMatrix, second_matrix: DecimalMatrix) -> DecimalMatrix:
+    """Product of two matrices in decimal arithmetic."""
     return [
-        [sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0)) for column in zip(*b, strict=True)]
-        for row in a
+        [
+            sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0))
+            for column in zip(*second_matrix, strict=True)
+        ]
+        for row in first_matrix
     ]
 
 
-def _matrix_exponential(matrix: Matrix) -> Matrix:
+def _matrix_exponential(matrix: DecimalMatrix) -> DecimalMatrix:
     """Matrix exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
     small = [[value / 2**20 for value in row] for row in matrix]
     term = total = _matrix_power(small, 0)
@@ -93,63 +97,68 @@ def _matrix_exponential(matrix: Matrix) -> Matrix:
     return _matrix_power(total, 2**20)
 
 
-def _continuous_error(damping_product: float) -> float:
+def _continuous_covariance_error(damping_product: float) -> float:
     """Largest relative error of the continuous covariance P of position x and velocity v. Exact: d/dt (Pxx, Pxv, Pvv) =
     (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv), with damping eta and noise intensity s^2."""
     eta = damping_product / END_TIME
     with localcontext(prec=DECIMAL_DIGITS):
         e, t = Decimal(eta), Decimal(END_TIME)
-        gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
-        rates: Matrix = [
+        gain = Decimal(FORCE_NOISE_DEVIATION) ** 2 * Decimal(TIME_STEP) / Decimal(VEHICLE_MASS) ** 2
+        rates: DecimalMatrix = [
             [Decimal(0), 2 * t, Decimal(0), Decimal(0)],
             [Decimal(0), -e * t, t, Decimal(0)],
             [Decimal(0), Decimal(0), -2 * e * t, gain * t],
             [Decimal(0)] * 4,
         ]
         truth = [row[3] for row in _matrix_exponential(rates)]
-        return _largest_relative_error(continuous_covariance(END_TIME, DEVIATION, STEP, MASS, eta), truth)
+        return _largest_covariance_error(
+            continuous_covariance(END_TIME, FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, eta), truth
+        )
 
 
-def _discrete_error(damping_product: float, step_count: int) -> float:
+def _discrete_covariance_error(damping_product: float, step_count: int) -> float:
     """Largest relative error of the discrete covariance, compared with the matrix recursion of an Euler step in
     60-digit arithmetic. ``step_count`` steps make END_TIME."""
     step = END_TIME / step_count
     eta = min(damping_product / END_TIME, 1.9 / step)
     with localcontext(prec=DECIMAL_DIGITS):
         d = Decimal(step)
-        r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
-        recursion: Matrix = [
+        r, kick = 1 - Decimal(eta) * d, (Decimal(FORCE_NOISE_DEVIATION) * d / Decimal(VEHICLE_MASS)) ** 2
+        recursion: DecimalMatrix = [
             [Decimal(1), 2 * d, d * d, Decimal(0)],
             [Decimal(0), r, d * r, Decimal(0)],
             [Decimal(0), Decimal(0), r * r, kick],
             [Decimal(0)] * 3 + [Decimal(1)],
         ]
         truth = [row[3] for row in _matrix_power(recursion, step_count)]
-        return _largest_relative_error(euler_covariance(step_count, DEVIATION, step, MASS, eta), truth)
+        return _largest_covariance_error(
+            euler_covariance(step_count, FORCE_NOISE_DEVIATION, step, VEHICLE_MASS, eta), truth
+        )
 
 
-def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal]) -> float:
+def _largest_covariance_error(covariance: np.ndarray, exact_values: Sequence[Decimal]) -> float:
+    """Largest relative error of the entries xx, xv and vv of a covariance."""
     return max(
         float(abs(Decimal(float(value)) / true - 1))
-        for value, true in zip(computed_values[[0, 0, 1], [0, 1, 1]], truth, strict=False)
+        for value, true in zip(covariance[[0, 0, 1], [0, 1, 1]], exact_values, strict=False)
     )
 
 
 def _discretisation_difference(damping_product: float, step_count: int) -> float:
     """1 minus the ratio of the discrete to the continuous variance of the position."""
     step = END_TIME / step_count
-    arguments = (DEVIATION, step, MASS, damping_product / END_TIME)
+    arguments = (FORCE_NOISE_DEVIATION, step, VEHICLE_MASS, damping_product / END_TIME)
     return 1 - float(euler_covariance(step_count, *arguments)[0, 0] / continuous_covariance(END_TIME, *arguments)[0, 0])
 
 
-def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
+def _monte_carlo_rows(damping_product: float, noise_path_count: int) -> list[Row]:
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
-    arguments = (DEVIATION, STEP, MASS, damping_product / (steps * STEP))
-    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(path_count, steps, *arguments, seed=SEED)
+    arguments = (FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, damping_product / (steps * TIME_STEP))
+    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(noise_path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
-    why = f"{path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
+    why = f"{noise_path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
             Observed(
@@ -160,7 +169,7 @@ def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
                 "m^2",
             ),
             float(law[0, 0]),
-            path_count,
+            noise_path_count,
             why,
         ),
         mean_square(
@@ -173,7 +182,7 @@ def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
                 "",
             ),
             1.0,
-            2 * path_count,
+            2 * noise_path_count,
             why,
         ),
     ]
@@ -197,11 +206,16 @@ def draw(case_data: Saved) -> Drawn:
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
-        exact = [continuous_covariance(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
+        exact = [
+            continuous_covariance(t, FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, eta)[0, 0] ** 0.5 for t in times
+        ]
         step_counts = np.unique(np.geomspace(10, 1e5, 13).astype(int))
-        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in step_counts]
+        euler = [
+            euler_covariance(int(n), FORCE_NOISE_DEVIATION, TIME_STEP, VEHICLE_MASS, eta)[0, 0] ** 0.5
+            for n in step_counts
+        ]
         axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
-        axes[0].loglog(step_counts * STEP, euler, "o", color=f"C{i}", markersize=3.5)
+        axes[0].loglog(step_counts * TIME_STEP, euler, "o", color=f"C{i}", markersize=3.5)
     axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
     axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
     steps, *columns = np.array(case_data["differences"]).T

@@ -1,7 +1,7 @@
 """What accuracy costs: error over computing work of every integrator, cheapest settings, and loss by default settings.
 
 Another system that is integrated in time joins by a problem in ``validation/price/problems`` and its name in
-``PROBLEMS``. Ride is not integrated in time and has separate methods.
+``COST_PROBLEMS``. Ride is not integrated in time and has separate methods.
 """
 
 import os
@@ -34,15 +34,15 @@ from validation.price.tables import tables as cost_tables
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
-MakeProblem = Callable[[bool], Problem]
-PROBLEMS: tuple[MakeProblem, ...] = (
+MakeCostProblem = Callable[[bool], Problem]
+COST_PROBLEMS: tuple[MakeCostProblem, ...] = (
     road_excited.problem,
     force_excited.problem,
     partial(wheelset.problem, speed=20.0),
     braking_stop.problem,
     inertial_unit.problem,
 )
-FULL_RUN_PROBLEMS: tuple[MakeProblem, ...] = (
+FURTHER_COST_PROBLEMS: tuple[MakeCostProblem, ...] = (
     force_excited.noisy_problem,
     force_excited.prescribed_pitch_problem,
     free_vehicle.problem,
@@ -50,7 +50,7 @@ FULL_RUN_PROBLEMS: tuple[MakeProblem, ...] = (
     partial(wheelset.problem, speed=1.0),
     contact_alone.problem,
 )
-"""Problems of a full run in addition to those of PROBLEMS."""
+"""Problems of a full run in addition to those of COST_PROBLEMS."""
 TIMING_ROUNDS = {True: 1, False: 15}
 """Number of interleaved timing rounds, for a quick run (True) and a full run (False), of settings whose computing time
 decides something."""
@@ -62,7 +62,7 @@ CALLBACK_RATIOS = {
     "to no forces": "ratio of native springs and a compiled callback for the road to the bodies without any force",
 }
 """Ratios of computing times, with the two models that each compares."""
-COUNTED_DURATION = 0.2
+COUNTED_RUN_DURATION = 0.2
 """Length (s) of the runs in which force calls are also counted from outside the engine."""
 COINCIDING_CURVES = {
     "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
@@ -73,19 +73,22 @@ SECONDS_REASON = "a target about seconds, which are reported and never gated"
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; a quick run has five of the eleven
     problems, and a part of their settings."""
     rounds = TIMING_ROUNDS[quick]
     if quick:
-        priced, (beside, data) = [_problem_rows(True, rounds, make) for make in PROBLEMS], _further_cases(True, rounds)
+        priced, (beside, data) = (
+            [_cost_problem_rows(True, rounds, make) for make in COST_PROBLEMS],
+            _further_costs(True, rounds),
+        )
     else:
-        priced, (beside, data) = _cases_in_processes(rounds)
+        priced, (beside, data) = _costs_in_processes(rounds)
     rows = [row for problem_rows, _ in priced for row in problem_rows]
-    return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
+    return rows + _coinciding_curve_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
-def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
+def _further_costs(quick: bool, round_count: int) -> CaseAnswer:
     """Rows and data of costs that the common runner does not measure: ride, parts of a step, force calls, claims about
     speed."""
     road = assembly_of_scene(road_excited.scene())
@@ -100,31 +103,31 @@ def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
     settings = dict.fromkeys(
         _setting_at_1_ms(setting) for setting in road_excited.settings(quick) if setting.method != "DVERK6"
     )
-    return rows + split.rows(data["split"]) + _force_call_rows([*settings], road) + _speed_rows(data), data
+    return rows + split.rows(data["split"]) + _force_call_rows([*settings], road) + _target_speed_rows(data), data
 
 
-def _problem_rows(quick: bool, round_count: int, make_problem: MakeProblem) -> CaseAnswer:
+def _cost_problem_rows(quick: bool, round_count: int, make_problem: MakeCostProblem) -> CaseAnswer:
     """Rows and saved data of one cost problem, which is a model with a range of integrators and settings."""
     problem = make_problem(quick)
     measured = runner.measure(problem, quick, round_count, SHORTEST_TIMED_RUN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _cases_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
+def _costs_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
     """Rows and data of all cost problems and of the further costs, computed by at most two processes."""
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        first, *other_problems = PROBLEMS + FULL_RUN_PROBLEMS
+        first, *other_problems = COST_PROBLEMS + FURTHER_COST_PROBLEMS
         road, beside = (
-            pool.submit(_problem_rows, False, round_count, first),
-            pool.submit(_further_cases, False, round_count),
+            pool.submit(_cost_problem_rows, False, round_count, first),
+            pool.submit(_further_costs, False, round_count),
         )
-        priced = [*pool.map(partial(_problem_rows, False, round_count), other_problems[::-1])][::-1]
+        priced = [*pool.map(partial(_cost_problem_rows, False, round_count), other_problems[::-1])][::-1]
         return [road.result(), *priced], beside.result()
 
 
-def _road_rows(saved_rows: Saved) -> list[Row]:
+def _coinciding_curve_rows(saved_road_problem: Saved) -> list[Row]:
     """Rows: work-precision curves that must coincide on the road, and methods that Exudyn names but does not have."""
-    road = runner.of_saved(saved_rows)
+    road = runner.of_saved(saved_road_problem)
     groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
         behaviour_row(
@@ -152,18 +155,22 @@ def _road_rows(saved_rows: Saved) -> list[Row]:
     ]
 
 
-def _setting_at_1_ms(setting: Setting) -> Setting:
+def _setting_at_1_ms(solver_setting: Setting) -> Setting:
     """The setting of a fixed-step method with a step of 1 ms; settings of adaptive methods are unchanged."""
-    return setting if setting.adaptive else road_excited.setting(setting.engine, setting.method, 1e-3)
+    return (
+        solver_setting
+        if solver_setting.adaptive
+        else road_excited.setting(solver_setting.engine, solver_setting.method, 1e-3)
+    )
 
 
-def _force_call_rows(settings: list[Setting], assembly: Assembly) -> list[Row]:
+def _force_call_rows(solver_settings: list[Setting], assembly: Assembly) -> list[Row]:
     """Rows: number of force calls that each engine reports, compared with calls counted from outside."""
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
-            counted_calls(engine, assembly, road_excited.settings_of(counted_setting, COUNTED_DURATION))
-            for counted_setting in settings
+            counted_calls(engine, assembly, road_excited.settings_of(counted_setting, COUNTED_RUN_DURATION))
+            for counted_setting in solver_settings
             if counted_setting.engine == engine
         ]
         what = (
@@ -186,7 +193,7 @@ def _force_call_rows(settings: list[Setting], assembly: Assembly) -> list[Row]:
     return rows
 
 
-def _speed_rows(case_data: Saved) -> list[Row]:
+def _target_speed_rows(case_data: Saved) -> list[Row]:
     """Rows on target speeds, reported with their intervals and without a verdict."""
     rows = [
         Observed(
@@ -206,12 +213,13 @@ def _speed_rows(case_data: Saved) -> list[Row]:
     return rows + [_real_time_row(key, case_data["real time"][key]) for key in ("with table", "without table")]
 
 
-def _real_time_row(key: str, factors: tuple[float, float, float] | None) -> Row:
-    name = f"price.real-time.{key.replace(' ', '-')}"
-    what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"
-    if factors is None:
+def _real_time_row(speed_key: str, real_time_factors: tuple[float, float, float] | None) -> Row:
+    """Row: real-time factor of the reference, with its interval."""
+    name = f"price.real-time.{speed_key.replace(' ', '-')}"
+    what = f"reference RK4 at 1 ms, {speed_key.replace('table', 'making its road table')}"
+    if real_time_factors is None:
         return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
-    factor, low, high = factors
+    factor, low, high = real_time_factors
     quantity = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
     return Observed(name, SYSTEM, quantity, factor, "times real time").aim(1000.0, SECONDS_REASON, "at least")
 
@@ -234,6 +242,7 @@ def draw(case_data: Saved) -> Drawn:
 
 
 def _caption(measured_points: runner.MeasuredPoints) -> str:
+    """Caption of a figure of error over work."""
     return (
         f"{measured_points.title}: error over work and over seconds. Reference: {measured_points.reference}. "
         "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "

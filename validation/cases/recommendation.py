@@ -21,16 +21,16 @@ TITLE = "What to recommend"
 SYSTEM: System = "cost"
 QUICK_SCENE_NUMBER = 8
 """Number of the only scene of a quick run."""
-SCENE_COUNTS = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
+SCENE_COUNTS_BY_SYSTEM = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
 """Number of scenes of each system in a full run."""
-REDRAWS = 3
+REDRAW_COUNT = 3
 """A refused scene is replaced by another random one at most so many times; then it counts as one whose tolerance is
 missed."""
 QUICK_ENGINE = "mujoco"
 """Engine of a quick run; a full run has all engines."""
 REDRAW_STRIDE = 1000
 """Difference between the number of a scene and of the scene that replaces it."""
-LEAST_MET_SHARE, ERROR_FACTOR = 0.95, 3.0
+LEAST_KEPT_TOLERANCE_SHARE, LARGEST_ERROR_FACTOR = 0.95, 3.0
 """Least share of scenes whose every recommended setting keeps its tolerance; and bound of the factor between predicted
 and true error."""
 
@@ -38,12 +38,12 @@ and true error."""
 @allowing_breaches(
     "random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same"
 )
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on all recommendations for all scenes; a quick run has those of one engine for one scene."""
     both = (
-        [scene_verdicts("pitch-plane", QUICK_SCENE_NUMBER, folder, (QUICK_ENGINE,))]
+        [verdicts_on_scene("pitch-plane", QUICK_SCENE_NUMBER, work_folder, (QUICK_ENGINE,))]
         if quick
-        else _verdicts_in_processes(folder)
+        else _verdicts_in_processes(work_folder)
     )
     verdicts, refused = [of_scene for of_scene, _ in both], [why for _, of_scene in both for why in of_scene]
     return _promise_rows(verdicts, refused), {
@@ -52,7 +52,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _verdicts_in_processes(folder: Path) -> list[SceneVerdicts]:
+def _verdicts_in_processes(work_folder: Path) -> list[SceneVerdicts]:
     """Verdicts on the recommendations for all scenes, computed by at most two processes, the long computations
     first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
@@ -60,32 +60,34 @@ def _verdicts_in_processes(folder: Path) -> list[SceneVerdicts]:
         return [
             job.result()
             for job in [
-                pool.submit(scene_verdicts, system, n, folder)
-                for system in reversed(SCENE_COUNTS)
-                for n in range(SCENE_COUNTS[system])
+                pool.submit(verdicts_on_scene, system, n, work_folder)
+                for system in reversed(SCENE_COUNTS_BY_SYSTEM)
+                for n in range(SCENE_COUNTS_BY_SYSTEM[system])
             ]
         ]
 
 
-def scene_verdicts(system: str, scene_number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> SceneVerdicts:
+def verdicts_on_scene(
+    system_name: str, scene_number: int, work_folder: Path, engine_names: tuple[str, ...] = ENGINES
+) -> SceneVerdicts:
     """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
-    verdicts if the scene was refused more than REDRAWS times."""
+    verdicts if the scene was refused more than REDRAW_COUNT times."""
     refused: list[str] = []
-    for n in range(scene_number, scene_number + (REDRAWS + 1) * REDRAW_STRIDE, REDRAW_STRIDE):
+    for n in range(scene_number, scene_number + (REDRAW_COUNT + 1) * REDRAW_STRIDE, REDRAW_STRIDE):
         try:
             reasons = (
-                verdicts_on_pitch_plane(random_scene(n, folder), engines)
-                if system == "pitch-plane"
-                else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system, n))
+                verdicts_on_pitch_plane(random_scene(n, work_folder), engine_names)
+                if system_name == "pitch-plane"
+                else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system_name, n))
             )
         except (InputError, RunFailed) as error:
-            refused.append(f"{system} {n}: {error}")
+            refused.append(f"{system_name} {n}: {error}")
         else:
             return reasons, refused
     return [], refused
 
 
-def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
+def _promise_rows(verdicts: list[list[Verdict]], refusal_reasons: list[str]) -> list[Row]:
     """Rows on the promises of a recommendation: tolerance, predicted error, and cost. A scene counts as met if every
     recommended setting keeps the scene's tolerance."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
@@ -99,23 +101,23 @@ def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row
             f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
             kept_scenes / len(verdicts),
             "",
-        ).within(1.0, 1.0 - LEAST_MET_SHARE, why, "closed form"),
+        ).within(1.0, 1.0 - LEAST_KEPT_TOLERANCE_SHARE, why, "closed form"),
         Observed(
             "recommendation.predicted",
             SYSTEM,
             "largest factor between the predicted and the true error",
             max(factors, default=float("inf")),
             "times",
-        ).at_most(ERROR_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
+        ).at_most(LARGEST_ERROR_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
         Observed(
             "recommendation.refused",
             SYSTEM,
             f"scenes that were refused with a reason and drawn again, in addition to {scenes}",
-            len(refused),
+            len(refusal_reasons),
             "scenes",
         ).at_most(
-            (1.0 - LEAST_MET_SHARE) * len(verdicts),
-            "; ".join(refused) or "none was: every one got a recommendation",
+            (1.0 - LEAST_KEPT_TOLERANCE_SHARE) * len(verdicts),
+            "; ".join(refusal_reasons) or "none was: every one got a recommendation",
             "none",
         ),
         Observed(
@@ -129,14 +131,14 @@ def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row
             "recommendation.slower",
             SYSTEM,
             "settings recommended by force calls that take more calls than the engine's default at the same tolerance",
-            _slower_count(every, "calls"),
+            _slower_setting_count(every, "calls"),
             "settings",
         ).at_most(0.0, "exact", "none"),
         Observed(
             "recommendation.slower.seconds",
             SYSTEM,
             "settings recommended by seconds that take longer than the engine's default at the same tolerance",
-            _slower_count(every, "seconds"),
+            _slower_setting_count(every, "seconds"),
             "settings",
         ).aim(
             0.0,
@@ -146,7 +148,8 @@ def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row
     ]
 
 
-def _slower_count(verdicts: list[Verdict], cost_kind: str) -> int:
+def _slower_setting_count(verdicts: list[Verdict], cost_kind: str) -> int:
+    """Number of recommended settings that are slower than promised, by one kind of cost."""
     return sum(verdict.slower for verdict in verdicts if verdict.kind == cost_kind)
 
 
@@ -196,12 +199,12 @@ def draw(case_data: Saved) -> Drawn:
     ax.plot(span, span, color=DARK, linewidth=0.8)
     ax.fill_between(
         span,
-        span / ERROR_FACTOR,
-        span * ERROR_FACTOR,
+        span / LARGEST_ERROR_FACTOR,
+        span * LARGEST_ERROR_FACTOR,
         color="#bbbbbb",
         alpha=0.4,
         linewidth=0,
-        label=f"within a factor {ERROR_FACTOR:g}",
+        label=f"within a factor {LARGEST_ERROR_FACTOR:g}",
     )
     ax.axvline(1.0, color=REJECTED_COLOUR, linewidth=1.0, label="tolerance")
     ax.set(

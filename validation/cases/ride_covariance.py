@@ -44,30 +44,37 @@ SEED = 5
 SHIPPED_VEHICLES = ("r19_ride", "r19_free", "seven_freedoms", "three_axle_truck")
 VARIED_VEHICLES = ("r19_ride", "r19_free", "three_axle_truck")
 WEIGHTED_OUTPUTS = {"left occupant": "Wk", "right occupant": "Wk", "body centre": "Wk"}
-SPEEDS = np.linspace(5.0, 50.0, 60)
-SYMMETRY_ZERO = 1e-20
+SWEPT_SPEEDS = np.linspace(5.0, 50.0, 60)
+SYMMETRY_ZERO_SHARE = 1e-20
 """Variances below this share of the largest variance count as zero by symmetry."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: covariance compared with quadrature, closed forms and limits, and the fast method for many speeds. A quick
     run leaves out the engines' own linearisations, and compares two vehicles at one speed each."""
-    routes = [_quadrature_comparison(*job) for job in _comparisons(quick)]
-    rows = [*_closed_form_rows(), *_quadrature_rows(routes), *_limit_rows(), *weighting_rows(SEED), *no_variance_rows()]
+    routes = [_quadrature_comparison(*job) for job in _compared_vehicles_and_roads(quick)]
+    rows = [
+        *_closed_form_rows(),
+        *_quadrature_rows(routes),
+        *_delay_limit_rows(),
+        *weighting_rows(SEED),
+        *no_variance_rows(),
+    ]
     engines = () if quick else ("exudyn", "mujoco")
     rows += [_engine_row(engine) for engine in engines]
-    speeds = SPEEDS[::20] if quick else SPEEDS
+    speeds = SWEPT_SPEEDS[::20] if quick else SWEPT_SPEEDS
     fast_rows, figure = _speed_sweep_rows(speeds, "reference" if quick else "exudyn")
     return rows + fast_rows, {"routes": routes, "figure": figure}
 
 
 @cache
-def _ride_vehicle(vehicle_name: str, seed: int = 0) -> SpatialVehicle:
+def _ride_vehicle(vehicle_name: str, variant_seed: int = 0) -> SpatialVehicle:
+    """A shipped vehicle, or a random variant of it if the seed is not 0."""
     vehicle = load_vehicle(vehicle_name)
-    return changed_vehicle(vehicle, seed) if seed else vehicle
+    return changed_vehicle(vehicle, variant_seed) if variant_seed else vehicle
 
 
-def _comparisons(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
+def _compared_vehicles_and_roads(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
     """Vehicles and roads to compare: vehicle name, seed of its random variant or 0, random road or None for the
     paper's, speed (m/s)."""
     if quick:
@@ -89,17 +96,19 @@ def _random_road(seed: int) -> TwoTrackRoad:
     return TwoTrackRoad(mean, roll)
 
 
-def _quadrature_comparison(vehicle_name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
+def _quadrature_comparison(
+    vehicle_name: str, variant_seed: int, road: TwoTrackRoad | None, speed: float
+) -> dict[str, Any]:
     """Largest relative difference between standard deviations by covariance and by quadrature, over all outputs and
     five cases of correlation, with the error that each method states."""
-    vehicle = linearise(_ride_vehicle(vehicle_name, seed), speed)
+    vehicle = linearise(_ride_vehicle(vehicle_name, variant_seed), speed)
     compared = [
         _covariance_difference(vehicle, vehicle, excitation, speed)
         for excitation in five_correlation_cases(vehicle.wheels, road).values()
     ]
     worst, by_covariance, by_quadrature, counts = zip(*compared, strict=True)
     return {
-        "vehicle": vehicle_name + (f", twin {seed}" if seed else ""),
+        "vehicle": vehicle_name + (f", twin {variant_seed}" if variant_seed else ""),
         "speed": speed,
         "values": sum(counts),
         "worst": max(worst),
@@ -108,15 +117,15 @@ def _quadrature_comparison(vehicle_name: str, seed: int, road: TwoTrackRoad | No
 
 
 def _covariance_difference(
-    vehicle: LinearVehicle, analytic: LinearVehicle, road: Excitation, speed: float
+    vehicle: LinearVehicle, analytic_vehicle: LinearVehicle, road_excitation: Excitation, speed: float
 ) -> tuple[float, float, float, int]:
     """Largest relative difference between a vehicle's standard deviations by covariance and those by quadrature on the
     analytic vehicle, the error that each method states, and the number of outputs that do not vanish by symmetry."""
     covariance, integrals = (
-        stationary_covariance(vehicle_with_road(vehicle, road, speed)),
-        variances_by_quadrature(analytic, road, speed),
+        stationary_covariance(vehicle_with_road(vehicle, road_excitation, speed)),
+        variances_by_quadrature(analytic_vehicle, road_excitation, speed),
     )
-    is_finite = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
+    is_finite = covariance.variance > SYMMETRY_ZERO_SHARE * covariance.variance.max()
     worst = largest_relative_error(covariance.deviation[is_finite], np.sqrt(integrals.variance[is_finite]))
     return worst, covariance.error[is_finite].max(), integrals.error[is_finite].max(), int(is_finite.sum())
 
@@ -159,8 +168,9 @@ def _closed_form_rows() -> list[Row]:
     ]
 
 
-def _quadrature_rows(comparisons: list[dict[str, Any]]) -> list[Row]:
-    by_vehicle = {name: [*group] for name, group in groupby(comparisons, key=itemgetter("vehicle"))}
+def _quadrature_rows(quadrature_comparisons: list[dict[str, Any]]) -> list[Row]:
+    """Rows: largest difference of standard deviations from quadrature, for every vehicle."""
+    by_vehicle = {name: [*group] for name, group in groupby(quadrature_comparisons, key=itemgetter("vehicle"))}
     return [
         Observed(
             f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
@@ -174,7 +184,7 @@ def _quadrature_rows(comparisons: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def _limit_rows() -> list[Row]:
+def _delay_limit_rows() -> list[Row]:
     """Rows: limits of zero and of infinite delay between the axles, and covariances of the road under the wheels."""
     vehicle = linearise(_ride_vehicle("three_axle_truck", SEED))
     road = paper_road(vehicle.wheels)
@@ -198,11 +208,11 @@ def _limit_rows() -> list[Row]:
             largest_relative_error(late, apart),
             "",
         ).at_most(1e-14, "exact but for rounding: the response has died out", "closed form"),
-        _inputs_row(),
+        _road_height_row(),
     ]
 
 
-def _inputs_row() -> Row:
+def _road_height_row() -> Row:
     """Row: covariance of the road heights under the wheels in the stationary solution, compared with its law."""
     vehicle = linearise(_ride_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
@@ -222,31 +232,31 @@ def _inputs_row() -> Row:
     ).at_most(1e-12, "exact but for rounding", "closed form")
 
 
-def _engine_row(engine: str) -> Row:
+def _engine_row(engine_name: str) -> Row:
     """Row: covariance of an engine's own linearised vehicle, compared with quadrature on the analytic vehicle."""
     from models.engines.spatial_protocol import build
 
     worst = 0.0
     for name, speed in (("r19_ride", 20.0), ("r19_free", 33.0), ("three_axle_truck", 9.0)):
         vehicle = _ride_vehicle(name, SEED)
-        linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
+        linear, analytic = build(engine_name, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
         roads = five_correlation_cases(analytic.wheels).values()
         worst = max(worst, *(_covariance_difference(linear, analytic, road, speed)[0] for road in roads))
     return Observed(
-        f"ride_covariance.engine.{engine}",
+        f"ride_covariance.engine.{engine_name}",
         SYSTEM,
-        f"difference of the standard deviations from the linearisation of {engine}, three asymmetric "
+        f"difference of the standard deviations from the linearisation of {engine_name}, three asymmetric "
         "twins, five cases, from quadrature of the analytic vehicles",
         worst,
         "",
     ).at_most(1e-6, "asked", "native")
 
 
-def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[str, Any]]:
+def _speed_sweep_rows(speeds: np.ndarray, engine_name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data on the fast method: five cases of correlation over many speeds with weighting, by the fast and by
     the direct method, with processor times."""
     vehicle = _ride_vehicle("r19_ride")
-    linear = linear_vehicle(vehicle, engine)
+    linear = linear_vehicle(vehicle, engine_name)
     roads = five_correlation_cases(linear(20.0).wheels)
     variance_sweep(
         linear, roads, speeds[:1], WEIGHTED_OUTPUTS
@@ -256,7 +266,7 @@ def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
     slow = variance_sweep(linear, roads, speeds[some], WEIGHTED_OUTPUTS, fast=False)
-    is_finite = slow.variance > SYMMETRY_ZERO * slow.variance.max()
+    is_finite = slow.variance > SYMMETRY_ZERO_SHARE * slow.variance.max()
     rows = [
         Observed(
             "ride_covariance.fast.equal",
@@ -278,7 +288,7 @@ def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[
             "ride_covariance.fast.time",
             SYSTEM,
             f"time of five cases at {len(speeds)} speeds with ISO weighting, from the linear vehicle "
-            f"of {engine}, single core, measured once",
+            f"of {engine_name}, single core, measured once",
             seconds,
             "s",
         ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),
@@ -332,10 +342,10 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].set_ylim(bottom=0.0)
     legend_below(figure, axes[0], columns=2)
     add_heading(figure, "Which roads belong together matters most at the centre of the body")
-    return [(FIGURE_TEXT, figure)]
+    return [(FIGURE_CAPTION, figure)]
 
 
-FIGURE_TEXT = (
+FIGURE_CAPTION = (
     "R19-ride on the paper's road in its five cases of correlation. At the centre the order of the cases changes with "
     "the speed: there front and rear add up or cancel with the delay, which axles that are equal or independent both "
     "miss. Front and rear of the body hardly feel it: there only the correlation of left and right matters."

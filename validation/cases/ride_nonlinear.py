@@ -32,19 +32,19 @@ TITLE = "Nonlinear ride: statistical linearisation, Monte Carlo beside it, both 
 SYSTEM: System = "ride"
 ROAD_LEVELS = (1.0, 4.0, 16.0)
 """Road levels as factors on the paper's: about class C, E, and G, where the stops are hit all the time."""
-COPY_COUNTS, COPY_SECONDS = (60, 400), (1.5, 10.0)
+MONTE_CARLO_COPY_COUNTS, MONTE_CARLO_COPY_SECONDS = (60, 400), (1.5, 10.0)
 """Number of Monte Carlo copies in a quick and in a full run; and their length (s)."""
-MILD_DAMPING = 1500.0
+DAMPING_BESIDE_SINGLE_LAW = 1500.0
 """Damping (N s/m) of the spring whose friction or stops are tested alone."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of gains, fixed point, one road level and a short run in time; a full run has three levels and a vehicle of
     19 degrees of freedom in time."""
-    rows = [*_gain_rows(), *_fixed_point_rows()]
+    rows = [*_equivalent_gain_rows(), *_fixed_point_rows()]
     table = []
     for level in ROAD_LEVELS[: 1 if quick else None]:
-        level_rows, line = _level_rows(level, quick)
+        level_rows, line = _road_level_rows(level, quick)
         rows += level_rows
         table.append(line)
     rows += nonlinear_engine_rows(quick)
@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + level_rows, {"levels": table, "spectra": shown}
 
 
-def _gain_rows() -> list[Row]:
+def _equivalent_gain_rows() -> list[Row]:
     """Rows: equivalent gains by closed forms compared with their defining integrals, for damper, bump stops and dry
     friction."""
     spring = vehicle_and_road(NONLINEAR_VEHICLE)[0].springs[0]
@@ -101,12 +101,12 @@ def _gain_rows() -> list[Row]:
     ]
 
 
-def normal_expectation(law: Any, cuts: Any) -> float:
-    """Expected value of law(x) for a standard normal x, integrated piece by piece between the law's corners
-    ``cuts``."""
-    edges = np.unique(np.clip([-12.0, *cuts, 12.0], -12.0, 12.0))
+def normal_expectation(force_law: Any, law_corners: Any) -> float:
+    """Expected value of force_law(x) for a standard normal x, integrated piece by piece between the law's corners
+    ``law_corners``."""
+    edges = np.unique(np.clip([-12.0, *law_corners, 12.0], -12.0, 12.0))
     integrals = [
-        quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
+        quad(lambda x: force_law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
         for a, b in pairwise(edges)
     ]
     return float(sum(integrals)) / np.sqrt(2 * np.pi)
@@ -148,12 +148,14 @@ def _fixed_point_rows() -> list[Row]:
     ]
 
 
-def _level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
+def _road_level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
     """Rows at one road level: standard deviations and mean travel by statistical linearisation, compared with Monte
     Carlo. The tolerance of each is the accuracy that the result states."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
-    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[not quick], copies=COPY_COUNTS[not quick], seed=SEED)
+    copies = copies_in_time(
+        vehicle, road, SPEED, MONTE_CARLO_COPY_SECONDS[not quick], copies=MONTE_CARLO_COPY_COUNTS[not quick], seed=SEED
+    )
     rows, cells = [], [f"{road_level:g}"]
     for i, name in enumerate(copies.names):
         error = float(linear.covariance.deviation[i] / copies.deviation[i] - 1.0)
@@ -200,11 +202,14 @@ def _linear_springs_row() -> Row:
     """Row: with linear springs, the variances of the Monte Carlo copies agree with the covariance."""
     vehicle, road = vehicle_and_road("quarter_car")
     exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
-    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1], seed=SEED)
+    copies = copies_in_time(
+        vehicle, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copies=MONTE_CARLO_COPY_COUNTS[1], seed=SEED
+    )
     return Observed(
         "ride_nonlinear.linear",
         SYSTEM,
-        f"largest |z| of 3 variances of quarter_car in {COPY_COUNTS[1]} copies in time against the covariance",
+        f"largest |z| of 3 variances of quarter_car in {MONTE_CARLO_COPY_COUNTS[1]} copies in time against the "
+        "covariance",
         float(np.abs(copies.z(exact.deviation)).max()),
         "",
     ).at_most(4.0, "of 3 normal values one beyond 4 in 5000 times", "none")
@@ -218,16 +223,18 @@ def _single_law_rows() -> list[Row]:
         "damper": (4.0, {"travel_force": None, "friction": 0.0}),
         "friction of 100 N": (
             0.25,
-            {"travel_force": None, "rate_force": None, "damping": MILD_DAMPING, "friction": 100.0},
+            {"travel_force": None, "rate_force": None, "damping": DAMPING_BESIDE_SINGLE_LAW, "friction": 100.0},
         ),
-        "stops": (64.0, {"rate_force": None, "damping": MILD_DAMPING, "friction": 0.0}),
+        "stops": (64.0, {"rate_force": None, "damping": DAMPING_BESIDE_SINGLE_LAW, "friction": 0.0}),
     }
     rows = []
     for name, (level, laws) in law_cases.items():
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
-        copies = copies_in_time(alone, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1] // 2, seed=SEED)
+        copies = copies_in_time(
+            alone, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copies=MONTE_CARLO_COPY_COUNTS[1] // 2, seed=SEED
+        )
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
         curve_kept = [
             largest_error_seen(share) for share in linear.left_out

@@ -37,7 +37,7 @@ from validation.ride.rides import STANDARD_WEIGHTINGS, largest_relative_error
 
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"
-WHEELS = (
+ASYMMETRIC_WHEEL_POSITIONS = (
     WheelPosition("front left", 1.2, 0.7, 0),
     WheelPosition("front right", 1.2, -0.6, 0),
     WheelPosition("middle left", -1.4, 0.65, 1),
@@ -53,16 +53,16 @@ MISPRINTED_FREQUENCY = 10.0
 """Frequency (Hz) at which the standard's table prints Wd = 212 although its own parameters give 202."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of closed forms by second methods, frequency weightings, and fits to an artificial road; a full run also has
     fits to measured roads."""
-    rows = [*_paper_rows(), *_input_rows(), *_isotropic_rows(), *_weighting_rows()]
+    rows = [*_paper_road_rows(), *_wheel_height_covariance_rows(), *_isotropic_rows(), *_weighting_rows()]
     of_made, road = generated_road_rows(1_000.0 if quick else 20_000.0)
     of_measured, roads = ([], []) if quick else measured_road_rows()
     return [*rows, *of_made, *of_measured], {"made": road, "measured": roads}
 
 
-def _paper_rows() -> list[Row]:
+def _paper_road_rows() -> list[Row]:
     """Rows on the paper's two-track road: level of the track spectrum, variance of a track, and coherency, compared
     with closed forms."""
     road = road_of_level(HALF_TRACK)
@@ -97,15 +97,15 @@ def _paper_rows() -> list[Row]:
     ]
 
 
-def _input_rows() -> list[Row]:
+def _wheel_height_covariance_rows() -> list[Row]:
     """Rows: height covariances of the wheels in five cases of correlation, by filters with delayed noise, compared with
     delayed outputs of one filter."""
     worst = {"first": 0.0, "second": 0.0}
     for order, cutoff in (("first", None), ("second", 40.0)):
         road = road_of_level(HALF_TRACK, cutoff=cutoff)
         for case in CORRELATION_CASES.values():
-            by_noise = heights_covariance(road_excitation(road, WHEELS, *case))
-            by_output = input_covariance(road, WHEELS, *case)
+            by_noise = wheel_heights_covariance(road_excitation(road, ASYMMETRIC_WHEEL_POSITIONS, *case))
+            by_output = input_covariance(road, ASYMMETRIC_WHEEL_POSITIONS, *case)
             worst[order] = max(worst[order], float(np.abs(by_noise - by_output).max() / np.abs(by_output).max()))
     why = "the Lyapunov equation of six wheels with delays, against the autocovariance of the filter at the distance"
     return [
@@ -118,30 +118,30 @@ def _input_rows() -> list[Row]:
             "",
         ).at_most(1e-13, why, "closed form")
         for order, error in worst.items()
-    ] + [_limit_row()]
+    ] + [_axle_distance_limit_row()]
 
 
-def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
+def wheel_heights_covariance(excitation: Excitation, speed: float = SPEED) -> np.ndarray:
     """Covariance (w, w) in m^2 of the road heights under the w wheels, from the Lyapunov equation of the filters of all
     axles."""
-    axles, C = np.eye(len(road.heights)), np.hstack(road.heights)
-    B = tuple(np.kron(axles[:, [i]], speed**0.5 * road.G) for i in range(len(axles)))
-    D = tuple(np.zeros((len(C), road.G.shape[1])) for _ in B)
-    delays = tuple(length / speed for length in road.lengths)
+    axles, C = np.eye(len(excitation.heights)), np.hstack(excitation.heights)
+    B = tuple(np.kron(axles[:, [i]], speed**0.5 * excitation.G) for i in range(len(axles)))
+    D = tuple(np.zeros((len(C), excitation.G.shape[1])) for _ in B)
+    delays = tuple(length / speed for length in excitation.lengths)
     names = tuple(map(str, range(len(C))))
-    A = np.kron(axles, speed * road.F)
-    return C @ stationary_covariance(DelayedSystem(A, B, delays, C, D, names, road.independent)).P @ C.T
+    A = np.kron(axles, speed * excitation.F)
+    return C @ stationary_covariance(DelayedSystem(A, B, delays, C, D, names, excitation.independent)).P @ C.T
 
 
-def _limit_row() -> Row:
+def _axle_distance_limit_row() -> Row:
     """Row: height covariance of axles at the same place compared with equal axles, and of axles far apart compared with
     uncorrelated axles."""
     road = road_of_level(HALF_TRACK)
     pairs = []
     for length, front_rear in ((0.0, "equal"), (200.0, "uncorrelated")):
-        wheels = tuple(WheelPosition(w.name, -length * w.axle, w.y, w.axle) for w in WHEELS)
+        wheels = tuple(WheelPosition(w.name, -length * w.axle, w.y, w.axle) for w in ASYMMETRIC_WHEEL_POSITIONS)
         delayed, limit = (
-            heights_covariance(road_excitation(road, wheels, "modelled", how)) for how in ("delayed", front_rear)
+            wheel_heights_covariance(road_excitation(road, wheels, "modelled", how)) for how in ("delayed", front_rear)
         )
         pairs.append(float(np.abs(delayed - limit).max() / np.abs(limit).max()))
     why = "no distance: one input; 200 m: independent but for exp(-0.3 times 200) = 9e-27"
@@ -185,17 +185,17 @@ def _isotropic_rows() -> list[Row]:
     ]
 
 
-def _cross_density_of_surface(spectrum_part: DensityTerm, k: float, track_distance: float) -> float:
+def _cross_density_of_surface(density_term: DensityTerm, wavenumber: float, track_distance: float) -> float:
     """Cross spectral density S(k, d) of two tracks at the distance d, by the integral of Phi(sqrt(k^2 + l^2)) cos(l d)
     over l. Phi is the surface density, the Hankel transform of the track's autocovariance."""
-    w = spectrum_part.waviness
-    height = spectrum_part.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
-    track = float(spectrum_part.density(np.array(k), 0.0))
+    w = density_term.waviness
+    height = density_term.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
+    track = float(density_term.density(np.array(wavenumber), 0.0))
     return (
         2.0
         * track
         * quad(
-            lambda across: height * (spectrum_part.corner**2 + k**2 + across**2) ** (-(w + 1.0) / 2.0) / track,
+            lambda across: height * (density_term.corner**2 + wavenumber**2 + across**2) ** (-(w + 1.0) / 2.0) / track,
             0.0,
             math.inf,
             weight="cos",
@@ -210,7 +210,7 @@ def _acceleration_rows(road: TwoTrackRoad) -> list[Row]:
     """Rows: accelerations of the built-in vehicle by frequency responses compared with the covariance, and those on an
     isotropic road."""
     vehicle = linearise(load_vehicle("r19_ride"))
-    exact = _acceleration_values(
+    exact = _values_of_accelerations(
         stationary_covariance(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED)).deviation,
         vehicle,
     )
@@ -244,19 +244,22 @@ def _acceleration_rows(road: TwoTrackRoad) -> list[Row]:
     ]
 
 
-def _acceleration_values(values: np.ndarray, vehicle: LinearVehicle) -> np.ndarray:
-    return values[["acceleration" in output.kind for output in vehicle.outputs]]
+def _values_of_accelerations(output_values: np.ndarray, vehicle: LinearVehicle) -> np.ndarray:
+    """Entries of the vehicle's outputs (m,) that are accelerations."""
+    return output_values[["acceleration" in output.kind for output in vehicle.outputs]]
 
 
 def _acceleration_names(vehicle: LinearVehicle) -> list[str]:
+    """Names of the vehicle's outputs that are accelerations."""
     return [output.name for output in vehicle.outputs if "acceleration" in output.kind]
 
 
-def _accelerations_by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
+def _accelerations_by_frequency(vehicle: LinearVehicle, road_model: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
+    """Standard deviations (m/s^2) of the vehicle's accelerations, integrated over the wavenumbers."""
     spectral = variances_over_wavenumbers(
-        vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *WAVENUMBER_BAND
+        vehicle, lambda k: spectral_matrix(road_model, vehicle.wheels, k), SPEED, *WAVENUMBER_BAND
     )
-    return np.sqrt(_acceleration_values(spectral, vehicle))
+    return np.sqrt(_values_of_accelerations(spectral, vehicle))
 
 
 def _weighting_rows() -> list[Row]:
@@ -296,10 +299,10 @@ def _weighting_rows() -> list[Row]:
             "",
         ).beside(212.0, "the table's 212 is not that of its own parameters: 22 other entries are")
     )
-    return rows + _weighted_rows()
+    return rows + _weighted_acceleration_rows()
 
 
-def _weighted_rows() -> list[Row]:
+def _weighted_acceleration_rows() -> list[Row]:
     """Rows: weighted acceleration a_w of a vehicle by the Lyapunov equation, compared with quadrature."""
     vehicle = linearise(load_vehicle("r19_ride"))
     road = road_of_level(HALF_TRACK)
@@ -327,22 +330,31 @@ def _weighted_rows() -> list[Row]:
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
     """Tables of the five input covariances, of the weightings beside the standard's table, and of the fits."""
-    return [_inputs_table(), _weighting_table(), fits_table([case_data["made"], *case_data["measured"]])]
+    return [
+        _wheel_height_covariance_table(),
+        _weighting_table(),
+        fits_table([case_data["made"], *case_data["measured"]]),
+    ]
 
 
-def _inputs_table() -> Table:
+def _wheel_height_covariance_table() -> Table:
+    """Table of the height covariances of pairs of wheels in the five cases of correlation."""
     road = road_of_level(HALF_TRACK)
     some = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (2, 3), (4, 5))
     rows = []
     for number, case in CORRELATION_CASES.items():
-        P = input_covariance(road, WHEELS, *case)
+        P = input_covariance(road, ASYMMETRIC_WHEEL_POSITIONS, *case)
         rows.append((f"{number}: {case[0]}, {case[1]}", *(f"{1e6 * P[i, j]:.2f}" for i, j in some)))
-    heads = ("left/right, front/rear", *(f"{WHEELS[i].name} with {WHEELS[j].name}" for i, j in some))
+    heads = (
+        "left/right, front/rear",
+        *(f"{ASYMMETRIC_WHEEL_POSITIONS[i].name} with {ASYMMETRIC_WHEEL_POSITIONS[j].name}" for i, j in some),
+    )
     note = "Covariance of the heights under the wheels in mm^2; three axles, every wheel at its own y."
     return Table("The road under the wheels in five cases", note, heads, tuple(rows))
 
 
 def _weighting_table() -> Table:
+    """Table of the weighting factors beside those of the standard."""
     rows = []
     for f, wk, wd in STANDARD_WEIGHTINGS:
         factors = [1e3 * abs(complex(WEIGHTINGS[name].response(np.array(f)))) for name in ("Wk", "Wd")]

@@ -27,9 +27,9 @@ from validation.ride.rides import largest_relative_error, paper_road
 TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
 SEED = 21
-COPY_COUNT = 4000
+MONTE_CARLO_COPY_COUNT = 4000
 BODY_POINTS = ("body front", "body centre", "body rear")
-DRIVES = {
+SPEED_PROFILES_OF_DRIVES = {
     "accelerating": SpeedProfile((0.0, 25.0 / 3.0), (5.0, 30.0)),
     "braking": SpeedProfile((0.0, 3.0), (30.0, 6.0)),
 }
@@ -39,8 +39,8 @@ STOP_PROFILE = SpeedProfile((0.0, 1.0, 11.0, 12.0, 15.75, 18.0), (0.0, 0.0, 30.0
 SHORT_STOP_PROFILE = SpeedProfile((0.0, 0.2, 2.2, 2.4, 3.4, 4.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
 SETTLED_RATE_TIMES_TIME = 13.0
 """Slowest decay rate times the time after a change of speed; e^-26 of the change is left in a variance."""
-CONSTANT_SPEED = SpeedProfile((0.0, 0.5), (20.0, 20.0))
-STOP_AND_GO = SpeedProfile((0.0, 0.5, 1.0, 1.3, 2.0), (12.0, 12.0, 0.0, 0.0, 5.0))
+CONSTANT_SPEED_PROFILE = SpeedProfile((0.0, 0.5), (20.0, 20.0))
+STOP_AND_GO_PROFILE = SpeedProfile((0.0, 0.5, 1.0, 1.3, 2.0), (12.0, 12.0, 0.0, 0.0, 5.0))
 """Speed profile with a stop within the wheelbase: the last axle passes the same road after the stop as the first axle
 before the stop."""
 STEADY_SPEED = 20.0
@@ -48,18 +48,21 @@ STEADY_SPEED = 20.0
 STEADY_SECONDS, STEADY_COPY_COUNT = 10.0, 1000
 """Length (s) and number of the Monte Carlo copies at constant speed; each copy tells as much as dozens do at a single
 instant."""
-TIMED_REPEATS = 20
+TIMED_REPEAT_COUNT = 20
 """Number of repetitions in the timing of the covariance, which is too short to time once."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of limits and of the adjoint with a half car; a full run also has larger vehicles, Monte Carlo, and the
     cost."""
-    rows = [*_limit_rows("half_car", SHORT_STOP_PROFILE), _adjoint_row(), _damped_tyre_row()]
+    rows = [*_stationary_limit_rows("half_car", SHORT_STOP_PROFILE), _adjoint_row(), _damped_tyre_row()]
     if quick:
         return rows, {}
-    rows += [*_limit_rows("r19_ride", STOP_PROFILE), *_limit_rows("three_axle_truck", SHORT_STOP_PROFILE)]
-    data = {name: _drive_comparison(profile) for name, profile in DRIVES.items()}
+    rows += [
+        *_stationary_limit_rows("r19_ride", STOP_PROFILE),
+        *_stationary_limit_rows("three_axle_truck", SHORT_STOP_PROFILE),
+    ]
+    data = {name: _drive_comparison(profile) for name, profile in SPEED_PROFILES_OF_DRIVES.items()}
     for name, drive in data.items():
         rows += _monte_carlo_rows(name, drive)
     return rows + _constant_speed_rows(), data
@@ -67,19 +70,19 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 @cache
 def vehicle_and_road(
-    vehicle_name: str, tyre_damping: float = 0.0, cutoff: float | None = None
+    vehicle_name: str, tyre_damping: float = 0.0, second_corner: float | None = None
 ) -> tuple[LinearVehicle, Excitation]:
     """A shipped vehicle and the paper's road, which reaches the rear wheels with a delay. A vehicle without a track
     width has one track.
 
-    ``cutoff`` (rad/m): a second corner of the road.
+    ``second_corner`` (rad/m): a second corner of the road.
     """
     spatial = load_vehicle(vehicle_name)
     vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
-    return vehicle, paper_road(vehicle.wheels, cutoff=cutoff)
+    return vehicle, paper_road(vehicle.wheels, cutoff=second_corner)
 
 
-def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
+def _stationary_limit_rows(vehicle_name: str, stop_profile: SpeedProfile) -> list[Row]:
     """Rows on limits: stationary covariance long after a change of speed and at constant speed, the road's own
     covariance, and effect of half the step."""
     vehicle, road = vehicle_and_road(vehicle_name)
@@ -89,10 +92,10 @@ def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
         -SETTLED_RATE_TIMES_TIME / np.linalg.eigvals(system.A).real.max(),
     )
     change = SpeedProfile((0.0, 0.5, 0.5 + settling), (STEADY_SPEED / 2.0, STEADY_SPEED, STEADY_SPEED))
-    settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, CONSTANT_SPEED))
-    often = np.linspace(stops.times[0], stops.times[-1], 41)
+    settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, CONSTANT_SPEED_PROFILE))
+    often = np.linspace(stop_profile.times[0], stop_profile.times[-1], 41)
     stopped, fine = (
-        varying_speed(vehicle, road, stops, instants=often, largest_rate_times_step=reach)
+        varying_speed(vehicle, road, stop_profile, instants=often, largest_rate_times_step=reach)
         for reach in (LARGEST_RATE_TIMES_STEP, LARGEST_RATE_TIMES_STEP / 2)
     )
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
@@ -135,8 +138,8 @@ def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
 def _adjoint_row() -> Row:
     """Row: standard deviation at the end of a drive with a stop, compared with the value by the adjoint equation."""
     vehicle, road = vehicle_and_road("half_car")
-    varied = varying_speed(vehicle, road, STOP_AND_GO)
-    exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
+    varied = varying_speed(vehicle, road, STOP_AND_GO_PROFILE)
+    exact = deviation_by_adjoint(vehicle, road, STOP_AND_GO_PROFILE, "body rear")
     return Observed(
         "ride_varying_speed.adjoint",
         SYSTEM,
@@ -164,14 +167,16 @@ def _damped_tyre_row() -> Row:
     )
 
 
-def _drive_comparison(profile: SpeedProfile) -> dict[str, Any]:
+def _drive_comparison(speed_profile: SpeedProfile) -> dict[str, Any]:
     """Data of a vehicle with 19 degrees of freedom on a drive: covariance, quasi-stationary solution, Monte Carlo
     copies, and computing times."""
     vehicle, road = vehicle_and_road("r19_ride")
-    instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
-    copies, slow = _timed_call(variances_along_drive, vehicle, road, profile, instants, copies=COPY_COUNT, seed=SEED)
-    varied, fast = _timed_call(varying_speed, vehicle, road, profile, instants=copies.time)
-    often = np.linspace(profile.times[0], profile.times[-1], 101)
+    instants = speed_profile.times[-1] * np.array([0.25, 0.6, 0.95])
+    copies, slow = _timed_call(
+        variances_along_drive, vehicle, road, speed_profile, instants, copies=MONTE_CARLO_COPY_COUNT, seed=SEED
+    )
+    varied, fast = _timed_call(varying_speed, vehicle, road, speed_profile, instants=copies.time)
+    often = np.linspace(speed_profile.times[0], speed_profile.times[-1], 101)
     columns = [varied.names.index(point) for point in BODY_POINTS]
     near = np.abs(varied.time[:, None] - often).argmin(axis=0)
     return {
@@ -188,24 +193,26 @@ def _drive_comparison(profile: SpeedProfile) -> dict[str, Any]:
     }
 
 
-def _monte_carlo_rows(drive_name: str, drive: dict[str, Any]) -> list[Row]:
+def _monte_carlo_rows(drive_name: str, drive_record: dict[str, Any]) -> list[Row]:
     """Rows: Monte Carlo copies at three instants, judged at three points of the body; all outputs and the error of the
     quasi-stationary solution are reported."""
-    error = largest_relative_error(np.array(drive["quasi"]), np.array(drive["deviation"]))
+    error = largest_relative_error(np.array(drive_record["quasi"]), np.array(drive_record["deviation"]))
     return [
         Observed(
             f"ride_varying_speed.copies.{drive_name}",
             SYSTEM,
-            f"r19_ride {drive_name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants in 3 points of the "
+            f"r19_ride {drive_name}: largest |z| of {MONTE_CARLO_COPY_COUNT} Monte Carlo copies at 3 instants in 3 "
+            "points of the "
             "body",
-            float(np.abs(drive["z"]).max()),
+            float(np.abs(drive_record["z"]).max()),
             "",
         ).at_most(4.0, "of 9 normal values one beyond 4 in 1800 times", "none"),
         Observed(
             f"ride_varying_speed.outputs.{drive_name}",
             SYSTEM,
-            f"r19_ride {drive_name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants for all 16 outputs",
-            drive["all"],
+            f"r19_ride {drive_name}: largest |z| of {MONTE_CARLO_COPY_COUNT} Monte Carlo copies at 3 instants for "
+            "all 16 outputs",
+            drive_record["all"],
             "",
         ).beside("below 4", "wheel loads and travels follow the same law", "none"),
         Observed(
@@ -229,9 +236,11 @@ def _constant_speed_rows() -> list[Row]:
     exact = stationary_covariance(system_at_speed(vehicle, road, STEADY_SPEED))
     fast = (
         _timed_call(
-            lambda: [stationary_covariance(system_at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEATS)]
+            lambda: [
+                stationary_covariance(system_at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEAT_COUNT)
+            ]
         )[1]
-        / TIMED_REPEATS
+        / TIMED_REPEAT_COUNT
     )
     copies, slow = _timed_call(
         variances_at_constant_speed, vehicle, road, STEADY_SPEED, STEADY_SECONDS, copies=STEADY_COPY_COUNT, seed=SEED
@@ -274,28 +283,30 @@ def _constant_speed_rows() -> list[Row]:
     ]
 
 
-def _timed_call(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
+def _timed_call(timed_function: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
     """Result of a function call, and its processor time (s)."""
     start = time.process_time()
-    return function(*arguments, **keywords), time.process_time() - start
+    return timed_function(*arguments, **keywords), time.process_time() - start
 
 
-def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:
+def deviation_by_adjoint(
+    vehicle: LinearVehicle, road_excitation: Excitation, speed_profile: SpeedProfile, output_name: str
+) -> float:
     """Standard deviation of one output at a drive's end by the adjoint equation, from the output's response to the road
     noise at each position.
 
     Backward in time l' = -A' l from l = C: noise that axle i meets at t moves the output by l(t) . B_i. The drive
     begins in motion and is taken as even long before.
     """
-    at_1, two = (system_at_speed(vehicle, road, speed) for speed in (1.0, 2.0))
+    at_1, two = (system_at_speed(vehicle, road_excitation, speed) for speed in (1.0, 2.0))
     steady, per_speed = (2.0 * at_1.A - two.A).T, (two.A - at_1.A).T
-    row = at_1.names.index(output)
-    seen = at_1.C[row] + (profile.speeds[-1] - 1.0) * (two.C - at_1.C)[row]
-    slowest = -np.linalg.eigvals(system_at_speed(vehicle, road, float(profile.speeds[0])).A).real.max()
-    pieces, cuts = {}, [profile.times[0] - 10.0 / slowest, *profile.times]
+    row = at_1.names.index(output_name)
+    seen = at_1.C[row] + (speed_profile.speeds[-1] - 1.0) * (two.C - at_1.C)[row]
+    slowest = -np.linalg.eigvals(system_at_speed(vehicle, road_excitation, float(speed_profile.speeds[0])).A).real.max()
+    pieces, cuts = {}, [speed_profile.times[0] - 10.0 / slowest, *speed_profile.times]
     for start, stop in reversed(list(pairwise(cuts))):
         back = solve_ivp(
-            lambda t, x: -(steady @ x + profile.speed(t) * (per_speed @ x)),
+            lambda t, x: -(steady @ x + speed_profile.speed(t) * (per_speed @ x)),
             (stop, start),
             seen,
             method="DOP853",
@@ -304,10 +315,10 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
             dense_output=True,
         )
         pieces[start, stop], seen = back.sol, back.y[:, -1]
-    path_points, weights = _path_points(profile, cuts, road.lengths)
+    path_points, weights = _road_quadrature_points(speed_profile, cuts, road_excitation.lengths)
     response = np.zeros((len(path_points), at_1.B[0].shape[1]))
-    for B, length in zip(at_1.B, road.lengths, strict=True):
-        met = profile.time(path_points + length)
+    for B, length in zip(at_1.B, road_excitation.lengths, strict=True):
+        met = speed_profile.time(path_points + length)
         for (start, stop), adjoint in pieces.items():
             then = np.flatnonzero((met > start) & (met < stop))
             if len(then):
@@ -315,13 +326,13 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
     return float(np.sqrt(weights @ (response**2).sum(axis=1)))
 
 
-def _path_points(
-    profile: SpeedProfile, times: list[float], lengths: tuple[float, ...]
+def _road_quadrature_points(
+    speed_profile: SpeedProfile, times: list[float], axle_distances: tuple[float, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature points (m) along the road and their weights, dense enough for the fast response of every axle."""
     fine = [np.linspace(start, stop, int(np.ceil((stop - start) / 0.02)) + 1) for start, stop in pairwise(times)]
-    passed = profile.path(np.unique(np.concatenate(fine)))
-    cells = np.unique(np.concatenate([passed - length for length in lengths]))
+    passed = speed_profile.path(np.unique(np.concatenate(fine)))
+    cells = np.unique(np.concatenate([passed - length for length in axle_distances]))
     points, weights = np.polynomial.legendre.leggauss(6)
     half = np.diff(cells)[:, None] / 2.0
     return (cells[:-1, None] + half * (points + 1.0)).ravel(), (half * weights).ravel()
@@ -336,7 +347,11 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     ]
     if not rows:
         return []
-    note = f"How many standard errors the variance over {COPY_COUNT} copies lies above the covariance along the drive."
+    note = (
+        f"How many standard errors the variance over {MONTE_CARLO_COPY_COUNT} copies lies above the covariance along "
+        "the "
+        "drive."
+    )
     return [Table("Monte Carlo at varying speed", note, ("drive", "time", *BODY_POINTS), tuple(rows))]
 
 
@@ -366,7 +381,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.set(title=f"{name}, {drive['speed'][0]:.0f} to {drive['speed'][-1]:.0f} m/s", xlabel="time [s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
-    axes[0].plot([], [], "ko", markersize=3, label=f"{COPY_COUNT} copies, 2 standard errors")
+    axes[0].plot([], [], "ko", markersize=3, label=f"{MONTE_CARLO_COPY_COUNT} copies, 2 standard errors")
     axes[0].legend(fontsize=7.5)
     add_heading(figure, "A drive of varying speed is no row of constant speeds")
     caption = (

@@ -18,26 +18,27 @@ from validation.common.scenes import COURSE_FILE, data_folder, largest_differenc
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
-ROAD_LENGTH, INCREMENT = 60.0, 0.05
-SEED = 3
+ROAD_LENGTH, STATION_INCREMENT = 60.0, 0.05
+ROAD_SEED = 3
 """Seed of the class C road's random phases."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of round trips through files, sampling by recurrence, variance of a road class, and the measured course; a
     quick run is the same."""
     with TemporaryDirectory() as name:
         rows = _round_trip_rows(Path(name))
-    return [*rows, _recurrence_row(), _class_variance_row(), *_measured_course_rows()], {}
+    return [*rows, _road_recurrence_row(), _class_variance_row(), *_measured_course_rows()], {}
 
 
 @on_paper_road()
-def _round_trip_rows(folder: Path) -> list[Row]:
+def _round_trip_rows(work_folder: Path) -> list[Row]:
+    """Rows: the study road is written to OpenCRG and CSV files and read back unchanged."""
     road = study_road()
-    write_opencrg(road, folder / "study.crg", ROAD_LENGTH, INCREMENT)
-    _write_csv(road, folder / "study.csv")
-    back = {"OpenCRG": read_opencrg(folder / "study.crg"), "CSV": read_csv_road(folder / "study.csv")}
-    station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
+    write_opencrg(road, work_folder / "study.crg", ROAD_LENGTH, STATION_INCREMENT)
+    _write_csv(road, work_folder / "study.csv")
+    back = {"OpenCRG": read_opencrg(work_folder / "study.crg"), "CSV": read_csv_road(work_folder / "study.csv")}
+    station = STATION_INCREMENT * np.arange(round(ROAD_LENGTH / STATION_INCREMENT) + 1)
     true = road.height_and_slope(station)[0]
     rows = [
         Observed(
@@ -54,7 +55,7 @@ def _round_trip_rows(folder: Path) -> list[Row]:
             road_scene(
                 duration=2.5,
                 road={"source": source, "file": f"study.{suffix}", "speed": 20.0, "beyond_end": "refused"},
-                folder=folder,
+                folder=work_folder,
             ),
             "reference",
         )
@@ -72,12 +73,12 @@ def _round_trip_rows(folder: Path) -> list[Row]:
     return rows
 
 
-def _write_csv(road: RoadProfile, path: Path) -> None:
+def _write_csv(road: RoadProfile, csv_path: Path) -> None:
     """Write road heights to a CSV file as a surveyor would: upward, in mm."""
-    station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
+    station = STATION_INCREMENT * np.arange(round(ROAD_LENGTH / STATION_INCREMENT) + 1)
     up = -1e3 * road.height_and_slope(station)[0]
     np.savetxt(
-        path,
+        csv_path,
         np.column_stack([station, up, up]),
         fmt="%.17g",
         delimiter=",",
@@ -86,7 +87,8 @@ def _write_csv(road: RoadProfile, path: Path) -> None:
     )
 
 
-def _recurrence_row() -> Row:
+def _road_recurrence_row() -> Row:
+    """Row: study road sampled by recurrence, compared with the formula."""
     road = study_road()
     station = 300.0 + 0.01 * np.arange(4000)
     error = np.abs(road.sample_uniform(300.0, 0.01, 4000)[0] - road.height_and_slope(station)[0]).max()
@@ -102,7 +104,7 @@ def _recurrence_row() -> Row:
 def _class_variance_row() -> Row:
     """Row: variance of a class C road, compared with the integral of its spectral density over the band."""
     low, high = 0.05, 2.0
-    road = iso8608_road("C", seed=SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
+    road = iso8608_road("C", seed=ROAD_SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
     height = road.sample_uniform(0.0, 0.05, 400_000)[0]
     expected = DENSITY_OF_CLASS["C"] * 0.1**2 * (1 / low - 1 / high)
     return Observed(
@@ -117,6 +119,7 @@ def _class_variance_row() -> Row:
 
 
 def _measured_course_rows() -> list[Row]:
+    """Rows: properties of the measured course, compared with those that its owners state."""
     data = data_folder()
     if data is None:
         return [not_run("roads.measured", SYSTEM, "measured roads", "TWINRIG_DATA names no folder")]
@@ -136,7 +139,7 @@ def _measured_course_rows() -> list[Row]:
             "roads.course.rms",
             SYSTEM,
             "rms of the undulated part of the measured course, detrended",
-            float(_detrended(undulated).std()),
+            float(_heights_without_trend(undulated).std()),
             "m",
         ).within(
             1.7441 * 0.0254,
@@ -147,6 +150,7 @@ def _measured_course_rows() -> list[Row]:
     ]
 
 
-def _detrended(values: np.ndarray) -> np.ndarray:
-    index = np.arange(len(values))
-    return values - np.polyval(np.polyfit(index, values, 1), index)
+def _heights_without_trend(heights: np.ndarray) -> np.ndarray:
+    """Heights from which a straight line has been subtracted."""
+    index = np.arange(len(heights))
+    return heights - np.polyval(np.polyfit(index, heights, 1), index)

@@ -21,9 +21,9 @@ from validation.hard_cases.case import IMPLEMENTATIONS
 TITLE = "The score of a stabilised run"
 SYSTEM: System = "drift"
 STUDY_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "stabilisers.toml"
-QUICK_OPTIONS = ("run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]")
+QUICK_SCENE_CHANGES = ("run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]")
 """Changes of the study's scene in a quick run: two stabilisers on a grade."""
-FULL_OPTIONS = (
+FULL_SCENE_CHANGES = (
     "run.duration=60.0",
     "options.sampling_rate=1000.0",
     "options.stiffnesses=[50.0, 100.0, 300.0, 1e4, 1e5]",
@@ -35,9 +35,9 @@ SEED = 11
 """Seed of the random walk and of the white noise on which damage conventions are compared."""
 SAMPLE_COUNT = 20_000
 
-GOOD_METHODS = ("exact pitch prescribed", "exact heave and pitch", "Kalman filter", "Kalman smoother")
-BAD_METHODS = ("free", "spring 300 N m/rad", "spring 10000 N m/rad", "10000 beyond 0.05 rad", "high-pass 0.1 Hz")
-"""Stabilisers that are known to give wrong results on both roads; those of GOOD_METHODS give right ones."""
+GOOD_STABILISERS = ("exact pitch prescribed", "exact heave and pitch", "Kalman filter", "Kalman smoother")
+BAD_STABILISERS = ("free", "spring 300 N m/rad", "spring 10000 N m/rad", "10000 beyond 0.05 rad", "high-pass 0.1 Hz")
+"""Stabilisers that are known to give wrong results on both roads; those of GOOD_STABILISERS give right ones."""
 
 PROTOTYPE_RESULTS = {
     "free": (5.9, 0.755, 5e5),
@@ -56,21 +56,24 @@ noise, by stabiliser."""
 
 @on_paper_road()
 @allowing_breaches("what holds a run too softly, or too hard, is scored like all else")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on heave drift, vertical forces, damage conventions and verdicts; a full run has the whole study in all
     engines, and the prototype's runs."""
-    rows = [*_convention_rows(), *_heave_rows(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
+    rows = [
+        *_damage_convention_rows(),
+        *_heave_drift_rows(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0),
+    ]
     with TemporaryDirectory() as name:
         if quick:
-            return rows + _grade_rows(Path(name), ("reference",)), {"study": [], "prototype": []}
-        rows += _grade_rows(Path(name), IMPLEMENTATIONS)
-        studied = _study_results(Path(name))
-        long = _long_results(Path(name))
+            return rows + _verdicts_on_grade_rows(Path(name), ("reference",)), {"study": [], "prototype": []}
+        rows += _verdicts_on_grade_rows(Path(name), IMPLEMENTATIONS)
+        studied = _results_of_study(Path(name))
+        long = _results_of_long_runs(Path(name))
     rows += [*_verdict_rows(studied), *_vertical_damage_rows(studied), *_prototype_rows(long)]
     return rows, {"study": studied, "prototype": long}
 
 
-def _convention_rows() -> list[Row]:
+def _damage_convention_rows() -> list[Row]:
     """Rows: cycle counting from turning points alone gives the library's result; and change of the damage by another
     convention."""
     from rainflow import extract_cycles
@@ -109,12 +112,12 @@ def _repeated_damage(load: np.ndarray) -> float:
     return pseudo_damage(np.concatenate((load, load))) - pseudo_damage(load)
 
 
-def _heave_rows(engines: tuple[str, ...], duration: float) -> list[Row]:
+def _heave_drift_rows(engine_names: tuple[str, ...], duration: float) -> list[Row]:
     """Rows: in a run that sinks steadily, the heave error grows, but the section forces are right."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         virtual_drive(folder, duration)
-        sunk = {engine: _sinking_errors(engine, folder, duration) for engine in engines}
+        sunk = {engine: _errors_of_sinking_run(engine, folder, duration) for engine in engine_names}
     rows = []
     for engine, (drift, worst) in sunk.items():
         rows += [
@@ -141,26 +144,26 @@ def _heave_rows(engines: tuple[str, ...], duration: float) -> list[Row]:
     return rows
 
 
-def _sinking_errors(engine: str, folder: Path, duration: float) -> tuple[float, float]:
+def _errors_of_sinking_run(engine_name: str, work_folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) of the sinking run, and largest deviation of its damage ratios from 1."""
-    scene = force_scene(folder, duration=duration)
+    scene = force_scene(work_folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING_SPEED)})
-    still, moved = (simulate(simulated_scene, engine) for simulated_scene in (scene, sinking))
+    still, moved = (simulate(simulated_scene, engine_name) for simulated_scene in (scene, sinking))
     wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
 
-def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
+def _verdicts_on_grade_rows(work_folder: Path, engine_names: tuple[str, ...]) -> list[Row]:
     """Rows: on a grade of 0.1 rad a holding spring gives wrong results, and a prescribed pitch right ones, in each
     implementation."""
-    scene = load(STUDY_SCENE, QUICK_OPTIONS)
+    scene = load(STUDY_SCENE, QUICK_SCENE_CHANGES)
     options = read(Options, scene.options, "", "options")
-    (folder / "short").mkdir()
-    bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
+    (work_folder / "short").mkdir()
+    bench = Bench(roads(scene, options)["grade"], "grade", options, work_folder / "short")
     rows = []
-    for engine in engines:
+    for engine in engine_names:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
-            row = _score_of_method(bench, name, engine)
+            row = _score_of_stabiliser(bench, name, engine)
             rows.append(
                 behaviour_row(
                     f"score.grade.{name.split()[0]}.{engine}",
@@ -177,27 +180,32 @@ def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def _study_results(folder: Path) -> list[Saved]:
+def _results_of_study(work_folder: Path) -> list[Saved]:
     """Results of all stabilisers of the study with its default options, in all engines."""
-    (folder / "study").mkdir()
-    _, rows, failed = compare(load(STUDY_SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
+    (work_folder / "study").mkdir()
+    _, rows, failed = compare(
+        load(STUDY_SCENE), IMPLEMENTATIONS, work_folder / "study", lambda text, progress_share: None
+    )
     assert not failed, failed
     return rows
 
 
-def _verdict_rows(studied: list[Saved]) -> list[Row]:
+def _verdict_rows(study_results: list[Saved]) -> list[Row]:
     """Rows: runs known to be good or bad get the right verdict. The verdict without the true run is judged for bad runs
     only."""
     rows = []
-    for row in studied:
+    for row in study_results:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         run_text = f"{row['engine']}, {row['road']}: {name}"
-        if name in GOOD_METHODS or name in BAD_METHODS:
-            id, wanted = f"score.verdict.{_row_id(row)}", "accepted" if name in GOOD_METHODS else "rejected"
+        if name in GOOD_STABILISERS or name in BAD_STABILISERS:
+            id, wanted = (
+                f"score.verdict.{_row_id_of_stabiliser(row)}",
+                "accepted" if name in GOOD_STABILISERS else "rejected",
+            )
             rows.append(behaviour_row(id, SYSTEM, f"{run_text}, by damage", word, wanted, row["reason"], "closed form"))
-        if name in BAD_METHODS:
+        if name in BAD_STABILISERS:
             id, what, why = (
-                f"score.without-truth.{_row_id(row)}",
+                f"score.without-truth.{_row_id_of_stabiliser(row)}",
                 f"{run_text}, without the truth",
                 row["reason without truth"],
             )
@@ -205,7 +213,7 @@ def _verdict_rows(studied: list[Saved]) -> list[Row]:
             rows.append(behaviour_row(id, SYSTEM, what, verdict_text, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
             id, what = (
-                f"score.unseen.{_row_id(row)}",
+                f"score.unseen.{_row_id_of_stabiliser(row)}",
                 f"{run_text}, damage ratio of f3x where the run itself shows nothing",
             )
             why = "what an engineer without the truth cannot know"
@@ -213,15 +221,17 @@ def _verdict_rows(studied: list[Saved]) -> list[Row]:
     return rows
 
 
-def _name_in_id(name: str) -> str:
-    return name.replace(" ", "-").replace("/", "-")
+def _stabiliser_in_row_id(stabiliser_name: str) -> str:
+    """Name of a stabiliser as part of a row id."""
+    return stabiliser_name.replace(" ", "-").replace("/", "-")
 
 
-def _row_id(row: Saved) -> str:
-    return ".".join((_name_in_id(row["method"]), row["road"], row["engine"]))
+def _row_id_of_stabiliser(study_result: Saved) -> str:
+    """Part of a row id for a stabiliser, road and engine."""
+    return ".".join((_stabiliser_in_row_id(study_result["method"]), study_result["road"], study_result["engine"]))
 
 
-def _vertical_damage_rows(studied: list[Saved]) -> list[Row]:
+def _vertical_damage_rows(study_results: list[Saved]) -> list[Row]:
     """Rows: the damage of the vertical section force is nearly right even in a run that has tumbled, so this damage
     must not be used as a score."""
     return [
@@ -239,31 +249,32 @@ def _vertical_damage_rows(studied: list[Saved]) -> list[Row]:
             "by it calls a tumbling run good; here it is shown, never judged by",
             "closed form",
         )
-        for row in studied
+        for row in study_results
         if row["method"] == "free"
     ]
 
 
-def _long_results(folder: Path) -> list[Saved]:
+def _results_of_long_runs(work_folder: Path) -> list[Saved]:
     """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the hand-written reference."""
-    scene = load(STUDY_SCENE, FULL_OPTIONS)
-    (folder / "long").mkdir()
-    bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")
-    return [_score_of_method(bench, name) for name in PROTOTYPE_RESULTS]
+    scene = load(STUDY_SCENE, FULL_SCENE_CHANGES)
+    (work_folder / "long").mkdir()
+    bench = Bench(scene, "road", read(Options, scene.options, "", "options"), work_folder / "long")
+    return [_score_of_stabiliser(bench, name) for name in PROTOTYPE_RESULTS]
 
 
-def _score_of_method(bench: Bench, method: str, engine: str = "reference") -> Saved:
-    effects = bench.methods[method]
-    return bench.row(method, effects, bench.simulate(engine, effects))
+def _score_of_stabiliser(stabiliser_bench: Bench, stabiliser_name: str, engine_name: str = "reference") -> Saved:
+    """Score of a run with one stabiliser."""
+    effects = stabiliser_bench.methods[stabiliser_name]
+    return stabiliser_bench.row(stabiliser_name, effects, stabiliser_bench.simulate(engine_name, effects))
 
 
-def _prototype_rows(long_runs: list[Saved]) -> list[Row]:
+def _prototype_rows(results_of_long_runs: list[Saved]) -> list[Row]:
     """Rows: pitch errors and damage ratios over 60 s, reported next to the prototype's; a tumbled run has no damage
     ratio."""
     rows = []
-    for row in long_runs:
+    for row in results_of_long_runs:
         pitch, upright, along = PROTOTYPE_RESULTS[row["method"]]
-        name = _name_in_id(row["method"])
+        name = _stabiliser_in_row_id(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
         shown = (
             ("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),
@@ -309,19 +320,20 @@ TABLE_HEADINGS = (
 )
 
 
-def _table_cells(row: Saved) -> tuple[str, ...]:
-    ratios = (row[f"damage {channel}"] for channel in SECTION_FORCE_CHANNELS)
+def _table_cells(study_result: Saved) -> tuple[str, ...]:
+    """Table cells of a stabiliser's result."""
+    ratios = (study_result[f"damage {channel}"] for channel in SECTION_FORCE_CHANNELS)
     return (
-        row.get("engine", "reference"),
-        row.get("road", "road"),
-        row["method"],
+        study_result.get("engine", "reference"),
+        study_result.get("road", "road"),
+        study_result["method"],
         *("" if ratio is None else f"{ratio:.3g}" for ratio in ratios),
-        f"{row['vertical damage f3']:.3f}",
-        f"{row['pitch error max [rad]']:.2g}",
-        f"{row['moment rms [N m]']:.0f}",
-        f"{row['moment share to 15 Hz']:.1%}",
-        row["verdict"],
-        row["without truth"],
+        f"{study_result['vertical damage f3']:.3f}",
+        f"{study_result['pitch error max [rad]']:.2g}",
+        f"{study_result['moment rms [N m]']:.0f}",
+        f"{study_result['moment share to 15 Hz']:.1%}",
+        study_result["verdict"],
+        study_result["without truth"],
     )
 
 

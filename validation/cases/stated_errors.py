@@ -22,9 +22,9 @@ from validation.stated_errors.sample import Sample
 TITLE = "Stated errors against truths a hundred times finer"
 SYSTEM: System = "cost"
 SEED = 21
-SAMPLE_MODULES = modules_of("validation.stated_errors.systems")
+SAMPLING_MODULES = modules_of("validation.stated_errors.systems")
 """Modules that draw random samples, by system."""
-LEAST_SAMPLE_COUNT = 60
+LEAST_ERROR_SAMPLE_COUNT = 60
 """Least number of samples of all systems together; each system has the same number."""
 QUICK_SAMPLE_COUNTS = {"pitch-plane": 3}
 """Number of samples by system in a quick run."""
@@ -34,59 +34,62 @@ useless."""
 LEAST_RIGHT_SHARE, LARGEST_USELESS_SHARE, LARGEST_COST_RATIO = 0.95, 0.1, 0.6
 """Least share of stated errors that must be right, largest share that may be useless, and largest cost of an error
 estimate divided by the cost of the run."""
-ROUNDING_SHARE = 1e-12
+ROUNDING_ERROR_SHARE = 1e-12
 """True errors below this share of their channel's deviation count as rounding."""
 
 
 @allowing_breaches("what is judged is how well equations are solved, whatever a random vehicle does")
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on the stated errors of all systems that draw random samples; a quick run has a few samples of the pitch
     plane, and gives no verdict on shares."""
-    names = list(SAMPLE_MODULES)
-    counts = QUICK_SAMPLE_COUNTS if quick else dict.fromkeys(names, -(-LEAST_SAMPLE_COUNT // len(names)))
-    samples = [sample for of_system in _make_samples(counts) for sample in of_system]
+    names = list(SAMPLING_MODULES)
+    counts = QUICK_SAMPLE_COUNTS if quick else dict.fromkeys(names, -(-LEAST_ERROR_SAMPLE_COUNT // len(names)))
+    samples = [sample for of_system in _samples_by_system(counts) for sample in of_system]
     return [*_common_rows(samples, quick), *(row for name in counts for row in _system_rows(name, samples))], {
         "samples": samples
     }
 
 
-def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
+def _samples_by_system(sample_counts: dict[str, int]) -> list[list[Saved]]:
     """Random samples of stated and true errors for each system, computed by at most two processes; by this process if
     there is only one system."""
     if len(sample_counts) == 1:
-        return [samples_of_system(name, count) for name, count in sample_counts.items()]
+        return [error_samples_of_system(name, count) for name, count in sample_counts.items()]
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        return list(pool.map(samples_of_system, sample_counts, sample_counts.values()))
+        return list(pool.map(error_samples_of_system, sample_counts, sample_counts.values()))
 
 
-def samples_of_system(system: str, sample_count: int) -> list[Saved]:
+def error_samples_of_system(system_name: str, sample_count: int) -> list[Saved]:
     """Random samples of stated and true errors for one system, as tables for JSON."""
-    drawn: Iterator[Sample] = import_module(SAMPLE_MODULES[system]).samples(sample_count, SEED)
-    return [_sample_as_table(system, sample) for sample in drawn]
+    drawn: Iterator[Sample] = import_module(SAMPLING_MODULES[system_name]).samples(sample_count, SEED)
+    return [_error_sample_as_table(system_name, sample) for sample in drawn]
 
 
-def _sample_as_table(system: str, sample: Sample) -> Saved:
+def _error_sample_as_table(system_name: str, error_sample: Sample) -> Saved:
     """A sample of stated and true error as a table for JSON; its ``ratio`` is the ratio of the true to the stated
     error, None where no number is stated."""
     sample_table = {
-        "system": system,
-        "name": sample.name,
-        "engine": sample.engine,
-        "cost": sample.extra_calls / sample.calls,
+        "system": system_name,
+        "name": error_sample.name,
+        "engine": error_sample.engine,
+        "cost": error_sample.extra_calls / error_sample.calls,
         "ratio": None,
     }
-    if not sample.stated_errors:
+    if not error_sample.stated_errors:
         return sample_table
-    stated, true = sample.stated_errors[sample.printed_channel], sample.true_errors[sample.printed_channel]
+    stated, true = (
+        error_sample.stated_errors[error_sample.printed_channel],
+        error_sample.true_errors[error_sample.printed_channel],
+    )
     return sample_table | {
-        "channel": sample.printed_channel,
+        "channel": error_sample.printed_channel,
         "stated": stated.error,
         "true": true,
         "unit": stated.unit,
         "share": stated.share,
         "warned": stated.warned,
         "ratio": error_ratio(true, stated.error),
-        "rounding": true <= ROUNDING_SHARE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
+        "rounding": true <= ROUNDING_ERROR_SHARE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
     }
 
 
@@ -95,18 +98,21 @@ def error_ratio(true_error: float, stated_error: float) -> float:
     return true_error / stated_error if stated_error > 0.0 else (0.0 if true_error == 0.0 else math.inf)
 
 
-def _common_rows(samples: list[Saved], quick: bool) -> list[Row]:
+def _common_rows(error_samples: list[Saved], quick: bool) -> list[Row]:
     """Rows on the stated errors of all systems together. A quick run has few samples, so its shares are reported
     without a verdict."""
-    known = [sample for sample in samples if sample["ratio"] is not None]
-    right = _share_of_true(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
-    useless = _share_of_true(sample["ratio"] < USELESS_RATIO and not sample["rounding"] for sample in known)
+    known = [sample for sample in error_samples if sample["ratio"] is not None]
+    right = _share_of_true_entries(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
+    useless = _share_of_true_entries(sample["ratio"] < USELESS_RATIO and not sample["rounding"] for sample in known)
     silent = [
         sample
         for sample in known
         if sample["ratio"] > MISLEADING_RATIO and not (sample["warned"] or sample["rounding"])
     ]
-    costs = [_median_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
+    costs = [
+        _median_estimate_cost(name, error_samples)
+        for name in dict.fromkeys(sample["system"] for sample in error_samples)
+    ]
     near = f"share of {len(known)} samples whose true error is at most {RIGHT_RATIO:g} times the stated error"
     below = f"share of {len(known)} samples whose true error is below a tenth of the stated error"
     asked, tenth = (
@@ -145,22 +151,22 @@ def _common_rows(samples: list[Saved], quick: bool) -> list[Row]:
         Observed(
             "stated_errors.without",
             SYSTEM,
-            f"results, of {len(samples)} samples, that say why there is no number",
-            float(len(samples) - len(known)),
+            f"results, of {len(error_samples)} samples, that say why there is no number",
+            float(len(error_samples) - len(known)),
             "",
         ).beside("few", "what does not repeat has no error of steps", "none"),
     ]
 
 
-def _share_of_true(hits: Iterator[bool]) -> float:
+def _share_of_true_entries(true_or_false: Iterator[bool]) -> float:
     """Share of true entries; 1 if there are no entries."""
-    counted = list(hits)
+    counted = list(true_or_false)
     return float(np.mean(counted)) if counted else 1.0
 
 
-def _median_cost(system: str, samples: list[Saved]) -> float:
+def _median_estimate_cost(system_name: str, error_samples: list[Saved]) -> float:
     """Median cost of a system's error estimates; estimates without a number count only if no estimate has a number."""
-    of_system = [sample for sample in samples if sample["system"] == system]
+    of_system = [sample for sample in error_samples if sample["system"] == system_name]
     return float(
         np.median(
             [sample["cost"] for sample in of_system if sample["ratio"] is not None]
@@ -169,12 +175,12 @@ def _median_cost(system: str, samples: list[Saved]) -> float:
     )
 
 
-def _system_rows(system: str, samples: list[Saved]) -> list[Row]:
+def _system_rows(system_name: str, error_samples: list[Saved]) -> list[Row]:
     """Rows on the stated errors of one system, reported without a verdict."""
-    of_system = [sample for sample in samples if sample["system"] == system]
+    of_system = [sample for sample in error_samples if sample["system"] == system_name]
     known = [sample for sample in of_system if sample["ratio"] is not None]
-    sample_text = f"{system}, {len(known)} of {len(of_system)} samples"
-    near = _share_of_true(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
+    sample_text = f"{system_name}, {len(known)} of {len(of_system)} samples"
+    near = _share_of_true_entries(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
     middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
     shown = (
@@ -183,12 +189,12 @@ def _system_rows(system: str, samples: list[Saved]) -> list[Row]:
         (
             "cost",
             "median ratio of the cost of the estimate to that of the run",
-            _median_cost(system, samples),
+            _median_estimate_cost(system_name, error_samples),
             LARGEST_COST_RATIO,
         ),
     )
     return [
-        Observed(f"stated_errors.{system}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
+        Observed(f"stated_errors.{system_name}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
             expected, why, "none"
         )
         for id, what, value, expected in shown

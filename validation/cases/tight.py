@@ -11,20 +11,20 @@ TITLE = "Road-excited run at the recommended setting against a tight-tolerance s
 SYSTEM: System = "pitch-plane"
 DURATION = 20.0
 QUICK_DURATION = 0.5
-STEP = 2.5e-4
-SOLVER_TOLERANCE = 1e-9
+TIME_STEP = 2.5e-4
+TIGHT_SOLVER_TOLERANCE = 1e-9
 """Tolerance of the solutions that judge. Two solver families then differ by 5e-9, a twentieth of their bound; a row
 shows this difference."""
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """A row for the uncertainty of the tight solution, and a row for each implementation; a quick run takes half a
     second."""
     duration = QUICK_DURATION if quick else DURATION
-    scene = road_scene(step=STEP, duration=duration)
-    tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, SOLVER_TOLERANCE))
-    by_lsoda = simulate(scene, "reference", Settings("LSODA", STEP, duration, SOLVER_TOLERANCE))
+    scene = road_scene(step=TIME_STEP, duration=duration)
+    tight = simulate(scene, "reference", Settings("DOP853", TIME_STEP, duration, TIGHT_SOLVER_TOLERANCE))
+    by_lsoda = simulate(scene, "reference", Settings("LSODA", TIME_STEP, duration, TIGHT_SOLVER_TOLERANCE))
     rows = [
         Observed(
             "tight.uncertainty",
@@ -42,7 +42,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             Observed(
                 f"tight.{engine}",
                 SYSTEM,
-                f"largest error of the states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
+                f"largest error of the states over {duration:g} s, {engine} {name} at {1e3 * TIME_STEP:g} ms",
                 largest_difference(run, tight),
                 "m, rad, m/s, rad/s",
             ).at_most(1e-6, "a thousandth of a millimetre: far below what a road survey resolves", independence)

@@ -17,27 +17,33 @@ from validation.spatial.written_equations import TURN_CONTROLS
 
 TITLE = "A car with a trailer on its suspension"
 SYSTEM: System = "rolling-vehicle"
-TRAINS = {"caravan": caravan, "train": train}
-STEADY_TRAINS = {"caravan": caravan, "train": train_without_tie}
+VEHICLE_TRAINS = {"caravan": caravan, "train": train}
+VEHICLE_TRAINS_IN_STEADY_TURN = {"caravan": caravan, "train": train_without_tie}
 SPEED, TURN_SPEED = 22.0, 15.0
 """Speeds (m/s) on the rough road, and in the steady turn."""
-TURN_TOLERANCE = 1e-3
+STEADY_TURN_TOLERANCE = 1e-3
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows on static loads and engines; a full run also has turns, a circle, energy, and a planted fault."""
-    rows = [_static_loads_row(), *(_engines_row(name, 0.05 if quick else 1.0) for name in TRAINS)]
+    rows = [_static_loads_row(), *(_engine_agreement_row(name, 0.05 if quick else 1.0) for name in VEHICLE_TRAINS)]
     if not quick:
-        rows += [*(row for name in TRAINS for row in _turn_rows(name)), _circle_row(), _energy_row(), _fault_row()]
+        rows += [
+            *(row for name in VEHICLE_TRAINS for row in _steady_turn_rows(name)),
+            _steady_circle_row(),
+            _energy_row(),
+            _planted_fault_row(),
+        ]
     return rows, {}
 
 
-def _rough_turn(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
+def _rough_turn(engine_name: str, vehicle: SpatialVehicle, duration: float) -> Drive:
     """A turn on a rough road, steered, braked and driven."""
-    return drive_run(engine, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
+    return drive_run(engine_name, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
 
 
 def _static_loads_row() -> Row:
+    """Row: static loads on ball and axles, compared with the levers' closed form."""
     return Observed(
         "trailer.loads",
         SYSTEM,
@@ -47,8 +53,9 @@ def _static_loads_row() -> Row:
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
 
-def _engines_row(train_name: str, duration: float) -> Row:
-    first, second = (_rough_turn(engine, TRAINS[train_name](), duration).run for engine in ("mujoco", "exudyn"))
+def _engine_agreement_row(train_name: str, duration: float) -> Row:
+    """Row: a turn on a rough road in Exudyn and MuJoCo."""
+    first, second = (_rough_turn(engine, VEHICLE_TRAINS[train_name](), duration).run for engine in ("mujoco", "exudyn"))
     gap = max(np.abs(first.positions - second.positions).max(), np.abs(first.rates - second.rates).max())
     return Observed(
         f"trailer.engines.{train_name}",
@@ -59,8 +66,9 @@ def _engines_row(train_name: str, duration: float) -> Row:
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
 
 
-def _turn_rows(train_name: str) -> list[Row]:
-    errors = towed_turn(STEADY_TRAINS[train_name](), TURN_SPEED)
+def _steady_turn_rows(train_name: str) -> list[Row]:
+    """Rows: yaw gain and articulation of a train in a steady turn, compared with closed forms."""
+    errors = towed_turn(VEHICLE_TRAINS_IN_STEADY_TURN[train_name](), TURN_SPEED)
     why = "linear tyres, with trail and turning slip; a body that is towed balances about its hitch"
     return [
         Observed(
@@ -70,18 +78,19 @@ def _turn_rows(train_name: str) -> list[Row]:
             "over the closed form's, less 1",
             errors.yaw_rate,
             "",
-        ).at_most(TURN_TOLERANCE, why, "closed form"),
+        ).at_most(STEADY_TURN_TOLERANCE, why, "closed form"),
         Observed(
             f"trailer.heading.{train_name}",
             SYSTEM,
             f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({train_name})",
             float(np.abs(errors.towed_headings).max()),
             "rad/rad",
-        ).at_most(TURN_TOLERANCE, why, "closed form"),
+        ).at_most(STEADY_TURN_TOLERANCE, why, "closed form"),
     ]
 
 
-def _circle_row() -> Row:
+def _steady_circle_row() -> Row:
+    """Row: angle between caravan and car in a slow circle, compared with rolling without side slip."""
     return Observed(
         "trailer.circle",
         SYSTEM,
@@ -92,6 +101,7 @@ def _circle_row() -> Row:
 
 
 def _energy_row() -> Row:
+    """Row: error of the energy balance in a turn with the caravan."""
     drive = _rough_turn("mujoco", caravan(), 0.4)
     return Observed(
         "trailer.ledger",
@@ -102,9 +112,10 @@ def _energy_row() -> Row:
     ).at_most(1e-7, "Simpson's rule over springs, dampers, tyres, drag, brakes and steering", "closed form")
 
 
-def _fault_row() -> Row:
+def _planted_fault_row() -> Row:
+    """Row: wheels of the caravan that keep to the car's heading are detected by the steady turn."""
     errors = towed_turn(caravan(), TURN_SPEED, give_towed_wheels_car_heading)
-    seen = abs(errors.yaw_rate) > TURN_TOLERANCE or np.abs(errors.towed_headings).max() > TURN_TOLERANCE
+    seen = abs(errors.yaw_rate) > STEADY_TURN_TOLERANCE or np.abs(errors.towed_headings).max() > STEADY_TURN_TOLERANCE
     return behaviour_row(
         "trailer.fault",
         SYSTEM,

@@ -22,40 +22,44 @@ from validation.common.scenes import (
 
 TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
-STEPS = (2e-3, 1e-3, 5e-4)
+TIME_STEPS = (2e-3, 1e-3, 5e-4)
 ENGINE_TOLERANCE = 1e-12
-ROUGH_SAMPLES = 4_800
+SAMPLE_COUNT_TO_ROUGH_ROAD = 4_800
 """Number of samples of 0.5 ms until both wheels are well on the rough part of the course."""
-OTHER_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 60.0, "refused"))
+FURTHER_MEASURED_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 60.0, "refused"))
 """Further measured roads: file, speed (m/s), and how the road continues beyond its end."""
 BOUND_REASON = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
 
 
 @on_paper_road()
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows for each road, excitation, vehicle and engine, each with the largest difference over the steps; a quick run
     has one vehicle at one step."""
     rows: list[Row] = []
-    steps = STEPS[-1:] if quick else STEPS
+    steps = TIME_STEPS[-1:] if quick else TIME_STEPS
     for parameter_set_name in VEHICLE_SETS[-1:] if quick else VEHICLE_SETS:
-        rows += _engine_rows(
+        rows += _path_difference_rows(
             f"study road, {parameter_set_name}", [road_scene(parameter_set_name, step) for step in steps]
         )
-        measured = simulate(road_scene(parameter_set_name, STEPS[-1], 2.1), "reference")
-        rows += _force_rows(parameter_set_name, "study road", measured, steps)
-        rows += _course_rows(parameter_set_name, steps)
+        measured = simulate(road_scene(parameter_set_name, TIME_STEPS[-1], 2.1), "reference")
+        rows += _wheel_force_rows(parameter_set_name, "study road", measured, steps)
+        rows += _measured_course_rows(parameter_set_name, steps)
     return rows, {}
 
 
-def _force_rows(parameter_set_name: str, road_name: str, measured_run: Result, steps: tuple[float, ...]) -> list[Row]:
+def _wheel_force_rows(
+    parameter_set_name: str, road_name: str, measured_run: Result, time_steps: tuple[float, ...]
+) -> list[Row]:
     """Rows: runs driven by the wheel forces of a road-excited run, whose samples are held constant or interpolated
     linearly."""
     with TemporaryDirectory() as name:
         write_measurement(measured_run, Path(name), 2e-3)
         rows = []
         for interpolation in ("held", "linear"):
-            scenes = [force_scene(Path(name), parameter_set_name, step, 2.0, interpolation) for step in steps]
-            rows += _engine_rows(f"{interpolation} wheel forces of the {road_name}, {parameter_set_name}", scenes)
+            scenes = [force_scene(Path(name), parameter_set_name, step, 2.0, interpolation) for step in time_steps]
+            rows += _path_difference_rows(
+                f"{interpolation} wheel forces of the {road_name}, {parameter_set_name}", scenes
+            )
         return rows
 
 
@@ -63,7 +67,7 @@ def _force_rows(parameter_set_name: str, road_name: str, measured_run: Result, s
     "edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road"
 )
 @allowing_breaches("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
-def _course_rows(parameter_set_name: str, steps: tuple[float, ...]) -> list[Row]:
+def _measured_course_rows(parameter_set_name: str, time_steps: tuple[float, ...]) -> list[Row]:
     """Rows: runs on the measured course (250 m at 50 m/s), and runs driven by the wheel forces of its rough part."""
     data = data_folder()
     if data is None or not (data / COURSE_FILE).exists():
@@ -77,23 +81,25 @@ def _course_rows(parameter_set_name: str, steps: tuple[float, ...]) -> list[Row]
             )
         ]
     road = {"source": "opencrg", "file": COURSE_FILE, "speed": 50.0, "beyond_end": "refused"}
-    scenes = [road_scene(parameter_set_name, step, 5.0, road, data) for step in steps]
+    scenes = [road_scene(parameter_set_name, step, 5.0, road, data) for step in time_steps]
     measured = simulate(scenes[-1], "reference")
     rough = Result(
-        measured.data.isel(time=slice(ROUGH_SAMPLES, None)).assign_coords(time=measured.data.time[:-ROUGH_SAMPLES])
+        measured.data.isel(time=slice(SAMPLE_COUNT_TO_ROUGH_ROAD, None)).assign_coords(
+            time=measured.data.time[:-SAMPLE_COUNT_TO_ROUGH_ROAD]
+        )
     )
-    rows = _engine_rows(f"measured course, {parameter_set_name}", scenes) + _force_rows(
-        parameter_set_name, "measured course", rough, steps
+    rows = _path_difference_rows(f"measured course, {parameter_set_name}", scenes) + _wheel_force_rows(
+        parameter_set_name, "measured course", rough, time_steps
     )
-    for name, speed, rule in OTHER_ROADS:
+    for name, speed, rule in FURTHER_MEASURED_ROADS:
         road = {"source": "opencrg", "file": name, "speed": speed, "beyond_end": rule, "track": "left"}
-        rows += _engine_rows(
+        rows += _path_difference_rows(
             f"{name}, left track, {rule}, {parameter_set_name}", [road_scene(parameter_set_name, 1e-3, 4.0, road, data)]
         )
     return rows
 
 
-def _engine_rows(title: str, scenes: list[Scene]) -> list[Row]:
+def _path_difference_rows(title: str, scenes: list[Scene]) -> list[Row]:
     """Rows for Exudyn and MuJoCo: largest difference of the states from the reference equations over all scenes."""
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)

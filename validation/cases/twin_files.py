@@ -39,14 +39,14 @@ TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
 STATE_COUNT, QUICK_STATE_COUNT = 100, 5
 SOLVER_TOLERANCE = 1e-8
-SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+SCENE_FOLDER = Path(__file__).parents[2] / "studies" / "scenes"
 EXPORTED_SCENES = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
 """Scenes whose vehicle is written as MJCF by ``twinrig export`` and read again."""
 IGNORED_CONTENT = tuple(kind for kind in CONTENT_KINDS if kind not in ("flex", "turning_law"))
 """Content that is ignored in exported vehicles: there, springs along axes of bodies are actuators at sites."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of 24 models, eight of them exported, and of 30 planted differences; a quick run has seven models, five
     states and six planted differences."""
     texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED, "geared": GEARED}
@@ -54,47 +54,55 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     if not quick:
         texts |= {f"chain_{count}": random_chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": random_tree(4 + 2 * seed, seed) for seed in range(1, 8)}
-    rows = [_agreement_row(name, _file_of_text(folder, name, text), quick) for name, text in texts.items()]
-    rows += [] if quick else [_agreement_row(name, _exported_file(folder, name), quick) for name in EXPORTED_SCENES]
+    rows = [_agreement_row(name, _model_file_of_text(work_folder, name, text), quick) for name, text in texts.items()]
+    rows += (
+        []
+        if quick
+        else [_agreement_row(name, _model_file_of_exported_scene(work_folder, name), quick) for name in EXPORTED_SCENES]
+    )
     return [
         *rows,
-        _soft_constraint_row(folder, "geared", GEARED),
-        _soft_constraint_row(folder, "linked", LINKED),
-        *_cart_rows(folder),
-        _planted_differences_row(folder, quick),
+        _soft_constraint_row(work_folder, "geared", GEARED),
+        _soft_constraint_row(work_folder, "linked", LINKED),
+        *_simulated_cart_rows(work_folder),
+        _planted_differences_row(work_folder, quick),
     ], {}
 
 
-def _file_of_text(folder: Path, name: str, text: str, ignored_content: tuple[str, ...] = ()) -> ModelFile:
-    path = folder / f"{name}{'.urdf' if '<robot' in text else '.xml'}"
-    path.write_text(text, encoding="utf-8")
+def _model_file_of_text(
+    work_folder: Path, model_name: str, model_text: str, ignored_content: tuple[str, ...] = ()
+) -> ModelFile:
+    """Write the text of a model to an MJCF or URDF file, and read the file."""
+    path = work_folder / f"{model_name}{'.urdf' if '<robot' in model_text else '.xml'}"
+    path.write_text(model_text, encoding="utf-8")
     return read(path, ignored_content)
 
 
-def _exported_file(folder: Path, scene_name: str) -> ModelFile:
-    scene = load(SCENES / f"{scene_name}.toml")
+def _model_file_of_exported_scene(work_folder: Path, scene_name: str) -> ModelFile:
+    """Export the vehicle of a scene as MJCF, and read the file."""
+    scene = load(SCENE_FOLDER / f"{scene_name}.toml")
     answer = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, "mujoco")
-    return _file_of_text(folder, f"exported_{scene_name}", answer.text, IGNORED_CONTENT)
+    return _model_file_of_text(work_folder, f"exported_{scene_name}", answer.text, IGNORED_CONTENT)
 
 
-def _agreement_row(model_name: str, file: ModelFile, quick: bool) -> Row:
+def _agreement_row(model_name: str, model_file: ModelFile, quick: bool) -> Row:
     """Row: largest difference of accelerations from the model file, over the models of all engines."""
-    agreements = certificate(file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
+    agreements = certificate(model_file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
     worst: Agreement = max(agreements, key=lambda agreement: agreement.acceleration)
     return Observed(
         f"twin_files.{model_name}",
         SYSTEM,
         f"largest difference of accelerations in Exudyn, MuJoCo and plain equations from the file as MuJoCo parsed it, "
-        f"{file.twin.size} coordinates, {model_name}",
+        f"{model_file.twin.size} coordinates, {model_name}",
         worst.acceleration,
         "of its size",
     ).at_most(SAME, "what counts as alike; an acceleration near 0 is counted by what rounding may make of it", "native")
 
 
-def _soft_constraint_row(folder: Path, model_name: str, text: str) -> Row:
+def _soft_constraint_row(work_folder: Path, model_name: str, model_text: str) -> Row:
     """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation in
     independently written equations."""
-    twin = _file_of_text(folder, model_name, text).twin
+    twin = _model_file_of_text(work_folder, model_name, model_text).twin
     states = comparison_states(twin, QUICK_STATE_COUNT)
     apart = agreement_of_build(
         "", reference_of_file(twin, states, SOFT_BUILD), motion_at(soft_constraint_equations(twin), states)
@@ -109,10 +117,10 @@ def _soft_constraint_row(folder: Path, model_name: str, text: str) -> Row:
     ).at_most(SOLVER_TOLERANCE, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
 
 
-def _cart_rows(folder: Path) -> list[Row]:
+def _simulated_cart_rows(work_folder: Path) -> list[Row]:
     """Rows: largest difference between the states of all engines' models over 1 s, and balance of energy and work, of
     the cart model."""
-    report = compare_paths(_file_of_text(folder, "cart", CART).twin)
+    report = compare_paths(_model_file_of_text(work_folder, "cart", CART).twin)
     return [
         Observed(
             "twin_files.path",
@@ -131,12 +139,12 @@ def _cart_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _planted_differences_row(folder: Path, quick: bool) -> Row:
+def _planted_differences_row(work_folder: Path, quick: bool) -> Row:
     """Row: number of planted differences that the comparison names first, with their right size."""
-    first, named = _file_of_text(folder, "original", JOINTED).twin, 0
+    first, named = _model_file_of_text(work_folder, "original", JOINTED).twin, 0
     chosen = PLANTED_DIFFERENCES[::5] if quick else PLANTED_DIFFERENCES
     for name, old, new, kind, owner, size in chosen:
-        second = _file_of_text(folder, "planted", model_with_change(JOINTED, name, old, new)).twin
+        second = _model_file_of_text(work_folder, "planted", model_with_change(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
         sentence = influential[0].sentence(("original", "planted")) if influential else ""
         named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence

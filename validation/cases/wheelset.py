@@ -30,31 +30,31 @@ from validation.faults import wheelset as faults
 
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
-EDGE_RADIUS = 2e-3
+EDGE_RAIL_HEAD_RADIUS = 2e-3
 """Head radius (m) of rails that are nearly edges, as in Klingel's formula."""
-STEP, DURATION = 5e-4, 1.0
-STATE_SPREAD = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
+TIME_STEP, DURATION = 5e-4, 1.0
+RANDOM_STATE_DEVIATIONS = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
 """Standard deviations of random states about rest, so large that flanges touch, wheels lift off, and creep forces
 saturate."""
-SPEED_RATIO = 1.1
+RATIO_TO_CRITICAL_SPEED = 1.1
 """Speed of simulations and limit cycles divided by the critical speed."""
-ENGINES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
+ENGINE_NAMES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: wavelength, critical speed, accelerations, simulations, limit cycles, energy and planted faults. A quick
     run has the chosen wheelset alone, without planted faults."""
     wheelsets = {"chosen": CHOSEN_WHEELSET} | ({} if quick else drawn_wheelsets())
     speeds = {name: critical_speeds(wheelset, quick or name != "chosen") for name, wheelset in wheelsets.items()}
-    rows = [*_wave_rows(wheelsets), *_critical_rows(speeds), *_acceleration_rows(wheelsets)]
-    rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
+    rows = [*_wavelength_rows(wheelsets), *_critical_speed_rows(speeds), *_acceleration_rows(wheelsets)]
+    rows += _simulation_rows(wheelsets, speeds, 11 if quick else 21)
     cycles = _limit_cycles(wheelsets, speeds, ("reference", "mujoco") if quick else tuple(IMPLEMENTATION_MODULES))
-    rows += [*_cycle_rows(cycles), _order_row(), *_energy_rows()]
+    rows += [*_limit_cycle_rows(cycles), _convergence_order_row(), *_energy_rows()]
     if not quick:
         rows += [
             _no_critical_speed_row("heavy", HEAVY_WHEELSET, "unstable"),
             _no_critical_speed_row("stiff", STIFF_WHEELSET, "stable"),
-            *_fault_rows(),
+            *_planted_fault_rows(),
         ]
     orbit_fields = ("speed", "amplitude", "frequency", "error", "frequency_error")
     return rows, {
@@ -68,13 +68,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def _relative_spread(values: Iterable[float]) -> float:
+def _relative_spread(compared_values: Iterable[float]) -> float:
     """Largest difference between any two values, divided by the largest magnitude."""
-    every = np.array(list(values))
+    every = np.array(list(compared_values))
     return float(np.ptp(every) / np.abs(every).max())
 
 
-def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
+def _wavelength_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     """Rows: wavelength of each free wheelset in all implementations, compared with the closed form and, on knife-edge
     rails, with Klingel's formula."""
     closed, edges, among = [], [], []
@@ -82,7 +82,7 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
         closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
         among.append(_relative_spread(waves.values()))
-        edge = wheelset.changed(head_radius=EDGE_RADIUS)
+        edge = wheelset.changed(head_radius=EDGE_RAIL_HEAD_RADIUS)
         plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
         edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
     count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"
@@ -111,10 +111,10 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     ]
 
 
-def _critical_rows(speeds: CriticalSpeeds) -> list[Row]:
+def _critical_speed_rows(critical_speed_table: CriticalSpeeds) -> list[Row]:
     """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
     wheelsets have one."""
-    there = [[speed for speed in of_engine.values() if speed is not None] for of_engine in speeds.values()]
+    there = [[speed for speed in speeds.values() if speed is not None] for speeds in critical_speed_table.values()]
     agreed = all(len(of_engine) in (0, len(IMPLEMENTATION_MODULES)) for of_engine in there)
     having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATION_MODULES)]
     why = (
@@ -162,11 +162,11 @@ def _no_critical_speed_row(wheelset_name: str, wheelset: Wheelset, expected_outc
 def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     """Rows: state derivatives of each engine at random states, compared with the reference equations."""
     draw, rows = np.random.default_rng(SEED), []
-    for engine in ENGINES:
+    for engine in ENGINE_NAMES:
         worst = 0.0
         for wheelset in wheelsets.values():
             written, built = (implementation(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
-            states = written.rest + STATE_SPREAD * draw.normal(size=(20, eq.STATE_COUNT))
+            states = written.rest + RANDOM_STATE_DEVIATIONS * draw.normal(size=(20, eq.STATE_COUNT))
             worst = max(
                 worst, *(largest_relative_difference(built.rates(state), written.rates(state)) for state in states)
             )
@@ -183,21 +183,28 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _simulation_speed(speeds: CriticalSpeeds, wheelset_name: str) -> float:
+def _travel_speed_of_simulation(critical_speed_table: CriticalSpeeds, wheelset_name: str) -> float:
     """Speed (m/s) of a wheelset's simulation: above its critical speed, or 60 m/s if it has none."""
-    critical = speeds[wheelset_name]["reference"]
-    return min(SPEED_RATIO * critical, 180.0) if critical is not None else 60.0
+    critical = critical_speed_table[wheelset_name]["reference"]
+    return min(RATIO_TO_CRITICAL_SPEED * critical, 180.0) if critical is not None else 60.0
 
 
-def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: int) -> list[Row]:
+def _simulation_rows(
+    wheelsets: dict[str, Wheelset], critical_speed_table: CriticalSpeeds, cell_count: int
+) -> list[Row]:
     """Rows on simulations of one second by RK4 with FASTSIM: differences between the implementations, and the sign of
     the creep forces' power."""
-    pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
+    pairs = {("reference", engine): 0.0 for engine in ENGINE_NAMES} | {ENGINE_NAMES: 0.0}
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
-        setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", cells)
-        step = _time_step(Equations(*setup))
+        setup: tuple[Any, ...] = (
+            wheelset,
+            _travel_speed_of_simulation(critical_speed_table, name),
+            "fastsim",
+            cell_count,
+        )
+        step = _time_step_of_wheelset(Equations(*setup))
         for engine in IMPLEMENTATION_MODULES:
             equations = implementation(engine)(*setup)
             paths[engine] = equations.run(equations.displaced_state(4e-3), DURATION, step)
@@ -206,7 +213,7 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: in
         for first, second in pairs:
             gap = float(np.abs(paths[first].states - paths[second].states).max())
             pairs[first, second] = max(pairs[first, second], gap)
-    of = f"states of {len(wheelsets)} wheelsets over 1 s with FASTSIM ({cells} cells), RK4 at the same step"
+    of = f"states of {len(wheelsets)} wheelsets over 1 s with FASTSIM ({cell_count} cells), RK4 at the same step"
     why = "the same method and contact forces; what differs is rounding"
     return [
         *(
@@ -217,10 +224,14 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: in
                 pairs["reference", engine],
                 "",
             ).at_most(1e-10, why, "shared kernel")
-            for engine in ENGINES
+            for engine in ENGINE_NAMES
         ),
         Observed(
-            "wheelset.path.between", SYSTEM, f"{of}: largest difference between the two engines", pairs[ENGINES], ""
+            "wheelset.path.between",
+            SYSTEM,
+            f"{of}: largest difference between the two engines",
+            pairs[ENGINE_NAMES],
+            "",
         ).at_most(1e-10, why, "shared kernel"),
         Observed(
             "wheelset.power",
@@ -232,14 +243,14 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: in
     ]
 
 
-def _time_step(equations: Equations) -> float:
-    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller step that divides DURATION."""
+def _time_step_of_wheelset(equations: Equations) -> float:
+    """Time step (s) for the wheelset's fastest motion: TIME_STEP, or a smaller step that divides DURATION."""
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
-    return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
+    return DURATION / np.ceil(DURATION / min(TIME_STEP, 1.0 / fastest))
 
 
 def _limit_cycles(
-    wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, engines: tuple[str, ...]
+    wheelsets: dict[str, Wheelset], critical_speed_table: CriticalSpeeds, engine_names: tuple[str, ...]
 ) -> dict[str, dict[str, Orbit]]:
     """Limit cycles by wheelset and implementation: of the chosen wheelset, and of those whose critical speed is low
     enough for a simulation above this speed.
@@ -248,12 +259,12 @@ def _limit_cycles(
     """
     cycles = {}
     for name, wheelset in wheelsets.items():
-        if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
+        if name != "chosen" and not 20.0 < (critical_speed_table[name]["reference"] or 0.0) < 160.0:
             continue
-        setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", 11)
-        first = attained_cycle(Equations(*setup), step=_time_step(Equations(*setup)))
+        setup: tuple[Any, ...] = (wheelset, _travel_speed_of_simulation(critical_speed_table, name), "fastsim", 11)
+        first = attained_cycle(Equations(*setup), step=_time_step_of_wheelset(Equations(*setup)))
         if first is not None:
-            guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engines}
+            guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engine_names}
             cycles[name] = {
                 engine: refined_orbit(solved_orbit(guess, "amplitude", precise=False), "amplitude")
                 for engine, guess in guesses.items()
@@ -261,15 +272,17 @@ def _limit_cycles(
     return cycles
 
 
-def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
+def _limit_cycle_rows(limit_cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
     """Rows on amplitude and frequency of the limit cycles: relative change by halving the step, and difference between
     the implementations divided by this change."""
-    rows, count = list[Row](), len(cycles["chosen"])
+    rows, count = list[Row](), len(limit_cycles["chosen"])
     for value, error in (("amplitude", "error"), ("frequency", "frequency_error")):
-        every = [[(getattr(o, value), getattr(o, error)) for o in of_engine.values()] for of_engine in cycles.values()]
+        every = [
+            [(getattr(o, value), getattr(o, error)) for o in of_engine.values()] for of_engine in limit_cycles.values()
+        ]
         errors = max(e / v for of_engine in every for v, e in of_engine)
         apart = max(float(np.ptp([v for v, _ in of_engine])) / max(e for _, e in of_engine) for of_engine in every)
-        of = f"{value} of the limit cycle of {len(cycles)} wheelsets above the critical speed"
+        of = f"{value} of the limit cycle of {len(limit_cycles)} wheelsets above the critical speed"
         rows += [
             Observed(
                 f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: relative change if the step is halved", errors, ""
@@ -285,7 +298,7 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
     return rows
 
 
-def _order_row() -> Row:
+def _convergence_order_row() -> Row:
     """Row: observed order of RK4 with linear creep, from three steps."""
     equations = Equations(CHOSEN_WHEELSET, 60.0, "linear")
     start = equations.displaced_state(5e-3)
@@ -307,7 +320,7 @@ def _energy_rows() -> list[Row]:
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
         equations = Equations(CHOSEN_WHEELSET, 60.0, law, 11)  # type: ignore[arg-type]
         left = []
-        for step in (STEP, STEP / 2.0, STEP / 4.0):
+        for step in (TIME_STEP, TIME_STEP / 2.0, TIME_STEP / 4.0):
             book = energy_ledger(equations, equations.run(equations.displaced_state(5e-3), 0.1, step))
             left.append(float(np.abs(book.residual).max() / book.creep[-1]))
         rows += [
@@ -329,7 +342,7 @@ def _energy_rows() -> list[Row]:
     return rows
 
 
-def _fault_rows() -> list[Row]:
+def _planted_fault_rows() -> list[Row]:
     """Rows: a small fault planted in one implementation must exceed the tolerances of the other rows."""
     equations, engine = Equations(CHOSEN_WHEELSET, 60.0), implementation("mujoco")(CHOSEN_WHEELSET, 60.0)
     state = equations.displaced_state(3e-3)

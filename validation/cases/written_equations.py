@@ -22,7 +22,7 @@ from validation.spatial.written_equations import (
 
 TITLE = "Cars by plain equations that share no force with the engines"
 SYSTEM: System = "rolling-vehicle"
-ENGINES = ("mujoco", "exudyn")
+ENGINE_NAMES = ("mujoco", "exudyn")
 STATE_COUNT, QUICK_STATE_COUNT = 100, 12
 ACCELERATION_TOLERANCE, PATH_TOLERANCE, LAW_TOLERANCE = 1e-12, 1e-10, 1e-12
 INDEPENDENCE_NOTE = (
@@ -33,21 +33,21 @@ DURATION, QUICK_DURATION = 1.0, 0.02
 for each simulated second."""
 
 
-def measure(quick: bool, folder: Path) -> CaseAnswer:
+def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     """Rows of cars on hub forces and of cars on rolling tyres; a quick run has fewer states and simulates a few
     steps."""
     states, duration = (QUICK_STATE_COUNT, QUICK_DURATION) if quick else (STATE_COUNT, DURATION)
-    return [*_law_rows(states), *_hub_rows(states, duration), *_rolling_rows(states, duration)], {}
+    return [*_force_law_rows(states), *_hub_force_car_rows(states, duration), *_rolling_car_rows(states, duration)], {}
 
 
-def _plain_equations_row(row_name: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
+def _plain_equations_row(row_name: str, quantity_name: str, largest_error: float, unit: str, error_bound: float) -> Row:
     """Row that compares the independently written equations with another implementation of the same laws."""
-    return Observed(f"written.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
-        bound, INDEPENDENCE_NOTE, "native"
+    return Observed(f"written.{row_name}", SYSTEM, quantity_name, largest_error, unit).at_most(
+        error_bound, INDEPENDENCE_NOTE, "native"
     )
 
 
-def _law_rows(state_count: int) -> list[Row]:
+def _force_law_rows(state_count: int) -> list[Row]:
     """Rows on the creep forces of the tyre, and on the preloads in the design position."""
     rows = [
         _plain_equations_row(
@@ -77,11 +77,11 @@ def _law_rows(state_count: int) -> list[Row]:
     return rows
 
 
-def _hub_rows(state_count: int, duration: float) -> list[Row]:
+def _hub_force_car_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on vehicles that are cut at their wheels and driven by hub forces."""
     rows = []
     for name, car in cut_cars().items():
-        for engine in ("reference", *ENGINES):
+        for engine in ("reference", *ENGINE_NAMES):
             what = (
                 f"largest difference of {name}'s accelerations on hub forces and on a road "
                 f"in {engine}, {state_count} random states"
@@ -115,11 +115,11 @@ def _hub_rows(state_count: int, duration: float) -> list[Row]:
     return rows
 
 
-def _rolling_rows(state_count: int, duration: float) -> list[Row]:
+def _rolling_car_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on cars on rolling tyres: accelerations, tyre reports, and simulations."""
     rows = []
     for name, car in rolling_cars().items():
-        for engine in ENGINES:
+        for engine in ENGINE_NAMES:
             what = f"largest difference of {name}'s accelerations on tyres in {engine}, {state_count} random states"
             gap = rolling_acceleration_difference(car, engine, state_count)
             rows.append(
