@@ -38,7 +38,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
-            eigenvalues[engine] = linearised_result(scene, engine, error=scene.error)
+            eigenvalues[engine] = linearised_result(scene, engine, estimate_error=scene.error)
             progress(f"paths of {engine}", (i + 0.5) / len(engines))
             paths[engine] = {speed: run_path(scene, engine, speed, error=scene.error) for speed in path_speeds(scene)}
         except RunFailed as error:

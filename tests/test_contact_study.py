@@ -359,7 +359,7 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
 
     store, again = Store(tmp_path), Counting()
     with pytest.raises(KeyboardInterrupt):
-        solve_table(path, resumed, built, Method(), stop, store=store)
+        solve_table(path, resumed, built, Method(), stop, block_store=store)
     assert not resumed.exists() and store.has(1)
-    solve_table(path, resumed, built, Method(), executor=again, store=store)
+    solve_table(path, resumed, built, Method(), executor=again, block_store=store)
     assert resumed.read_bytes() == alone.read_bytes() and again.count == 3

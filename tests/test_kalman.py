@@ -151,7 +151,7 @@ def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     gain = np.einsum("nij,mj->nim", wide, see) @ np.linalg.inv(see @ see.T + ANGLE**2 * np.eye(n + 1))
     wanted = np.array(means) + gain @ (measured.values[: n + 1, 0] - np.array(means)[:, PITCH])
     left = np.einsum("nij,nkj->nik", wide, wide) - np.einsum("nim,nkm->nik", gain, np.einsum("nij,mj->nim", wide, see))
-    found = estimate(own, measured, 16.0, start_deviation=0.05, smoother=True)
+    found = estimate(own, measured, 16.0, start_deviation=0.05, with_smoother=True)
     size = np.sqrt(np.einsum("nii->ni", left))[:, :6]
     assert np.abs((found.states - wanted)[:, :6] / size).max() < 1e-3  # of a deviation; the start's 1e-6 costs digits
     spread = np.sqrt(np.einsum("nii->ni", found.covariances))[:, :6]

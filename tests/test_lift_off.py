@@ -282,7 +282,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     own = ride_scene("quarter_car_nonlinear")
     vehicle = vehicle_of(own)
     road = road_path(excitation_of(own, wheels(vehicle)), 20.0, 5e-4)
-    runs = [drive_over_road(engine, vehicle, road, 2.0, seed=2) for engine in ENGINES[1:]]
+    runs = [drive_over_road(engine, vehicle, road, 2.0, road_seed=2) for engine in ENGINES[1:]]
     assert np.abs(runs[0].run.positions - runs[1].run.positions).max() < 1e-12
     load = preloads(vehicle).tyres[vehicle.tyres[0].name]
     force = runs[0].output_values("tyre force front left")

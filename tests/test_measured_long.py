@@ -89,9 +89,9 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
         patch.setattr(Checkpoint, "save", saved)
         patch.setattr(Columns, "write", written)
         with pytest.raises(Killed):
-            run(own, tmp_path / "run", block=0.04)
+            run(own, tmp_path / "run", block_duration=0.04)
     told = list[float]()
-    found = run(own, tmp_path / "run", lambda done, of: told.append(done), block=0.05)
+    found = run(own, tmp_path / "run", lambda done, of: told.append(done), block_duration=0.05)
     assert computed_channel_bytes(tmp_path) == bits and found.done == own.count
     assert told[0] > 0.0 or time == 1  # it did not begin anew
     assert told[-1] == pytest.approx(SECONDS, abs=2e-3)
@@ -131,7 +131,7 @@ def test_a_vehicle_that_topples_ends_with_the_time_and_what_there_was(whole, tmp
         return values
 
     with pytest.raises(RunFailed, match=r"topples|infinite|gave up") as error:
-        run(replace(changed(own, tmp_path, pushed), hold=AttitudeHold("none")), tmp_path / "run", block=0.03)
+        run(replace(changed(own, tmp_path, pushed), hold=AttitudeHold("none")), tmp_path / "run", block_duration=0.03)
     assert error.value.time is not None and 0.097 <= error.value.time <= SECONDS  # the cubic begins a sample earlier
     assert 98 <= error.value.partial.done <= 201
     assert np.isfinite(error.value.partial.samples(error.value.partial.answers[0])).all()
@@ -153,7 +153,7 @@ def test_short_gaps_of_forces_are_bridged_and_told_and_long_ones_refused(whole, 
         run(gap(own, tmp_path, "fl_fz", 20, 170), tmp_path / "run")
     (tmp_path / "changed.json").unlink()
     other = gap(own, tmp_path, "rr_fz", 70, 110)  # across the blocks' border at 0.09 s
-    outcome = run(other, tmp_path / "run", block=0.03)
+    outcome = run(other, tmp_path / "run", block_duration=0.03)
     assert [(one.place, one.weight, one.size) for one in outcome.findings] == [("rr_fz", "doubt", pytest.approx(0.04))]
     column = Inputs(other.recording, own.vehicle).wrenches(0, 201)[:, 20]
     assert np.isfinite(column).all() and np.ptp(column[70:110]) <= 2 * np.ptp(column)

@@ -266,7 +266,7 @@ def _engine_rows_and_times(
     """Rows on the agreement of the first paths between engines, and the wall time (s) per path and step of each
     engine."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
-    single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
+    single, two = (mujoco_threads(scene, times, truth, thread_count=threads) for threads in (1, 2))
     jobs_by_method: dict[str, Callable[[], Arrays]] = {
         "mujoco, 1 thread": lambda: run_paths(single, path_count),
         "mujoco, 2 threads": lambda: run_paths(two, path_count),

@@ -277,7 +277,8 @@ def _spatial_rows(quick: bool) -> list[Row]:
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
     first, two = (
-        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINES
+        drive_over_road(engine, car, path, 1.0 if quick else 10.0, road_seed=SEED, steps_per_output=20).run
+        for engine in ENGINES
     )
     apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [

@@ -154,7 +154,7 @@ def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine} {stabiliser} {block}"
-        run(job, run_folder / name, block=block)
+        run(job, run_folder / name, block_duration=block)
         bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
@@ -227,7 +227,7 @@ def _export_rows(folder: Path) -> list[Row]:
     wanted = outcome.answers[:6]
     values = np.column_stack([outcome.samples(answer) for answer in wanted])
     worst, format_text = 0.0, set()
-    for path in hand_on(outcome, run_folder, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
+    for path in hand_on(outcome, run_folder, ("csv", "mf4", "rsp", "tdms"), wanted, file_comment="Monday"):
         source = open_source(path)
         names = [channel.name for channel in source.channels if channel.name in {answer.name for answer in wanted}]
         read = np.vstack([block.values for block in source.blocks(names)])

@@ -266,7 +266,7 @@ def _other_run_rows(
     except RunFailed as error:
         assert isinstance(error.partial, SectionOutcome)
         run = error.partial
-    sentence = judge(free, run, trusted=until)
+    sentence = judge(free, run, trusted_time=until)
     rows.append(
         Observed(
             f"measured_virtual.free_{chain_test.name}",

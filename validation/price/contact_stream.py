@@ -48,7 +48,7 @@ def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
     write_table(folder / "cases.csv", row_count)
     start_time = time.perf_counter()
     counts = solve_table(
-        folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
+        folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), with_errors=False
     )
     if counts != {"rows": row_count, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {row_count} sound rows")

@@ -54,9 +54,9 @@ def nonlinear_engine_rows(quick: bool) -> list[Row]:
             vehicle,
             road,
             NONLINEAR_DURATIONS[not quick],
-            seed=SEED,
-            skipped=SKIPPED_SECONDS * (not quick),
-            stride=5,
+            road_seed=SEED,
+            skipped_time=SKIPPED_SECONDS * (not quick),
+            steps_per_output=5,
         )
         for engine in ENGINES
     }
@@ -112,7 +112,9 @@ def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
     vehicle, excitation_ = vehicle_and_road("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
     runs = {
-        engine: drive_over_road(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, stride=2)
+        engine: drive_over_road(
+            engine, vehicle, road, RUN_DURATION, road_seed=SEED, skipped_time=SKIPPED_SECONDS, steps_per_output=2
+        )
         for engine in ENGINES
     }
     linear = linearise(vehicle)

@@ -54,15 +54,15 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         _check_log(scene, scene.port.log, len(engines))
 
 
-def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
+def _check_log(scene: BrakingScene, log_template: str, engine_count: int) -> None:
     """Raise InputError for a name of the port's log under which several procedures or engines would write the same
     file.
     """
-    drives = {"procedure": len(scene.procedures), "engine": engines}
+    drives = {"procedure": len(scene.procedures), "engine": engine_count}
     for key, several in drives.items():
-        if several > 1 and f"{{{key}}}" not in log:
+        if several > 1 and f"{{{key}}}" not in log_template:
             allowed = f"must have {{{key}}} in it: {several} of them are driven, and each writes a log of its own"
-            raise InputError(scene.file, "port.log", log, allowed)
+            raise InputError(scene.file, "port.log", log_template, allowed)
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -180,8 +180,8 @@ def _towed_body_lines(scene: BrakingScene) -> list[tuple[str, str]]:
     return [("trailer", hitch_line(handling.vehicle, handling.held, name)) for name in handling.vehicle.towed]
 
 
-def _assumptions_of_scene(scene: BrakingScene, name: str) -> list[Assumption]:
-    return assumptions(scene, name, braked_vehicle(scene, scene.procedures[name]))
+def _assumptions_of_scene(scene: BrakingScene, procedure_name: str) -> list[Assumption]:
+    return assumptions(scene, procedure_name, braked_vehicle(scene, scene.procedures[procedure_name]))
 
 
 def user_code(scene: BrakingScene) -> str:

@@ -193,16 +193,16 @@ class BrakingScene(SceneFile):
     run: RunTable = RunTable()
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> BrakingScene:
     """Build a checked braking scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(BrakingScene, table, file, folder)
+    scene = checked(BrakingScene, scene_tables, scene_path, scene_folder)
     parts = (_procedure_refusals, _vehicle_refusals, _brake_refusals, _run_refusals)
     for key_path, value, allowed in chain.from_iterable(refusals_of(scene) for refusals_of in parts):
         raise InputError(scene.file, key_path, value, allowed)
     check(scene)
-    return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
+    return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene_path)})
 
 
 KEYS_OF_PROCEDURE = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}

@@ -171,23 +171,23 @@ class Stop:
             "final pressure [bar]": path.pressures[-1],
         }
 
-    def results_in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
-        """Results at ``time`` (s) after the brake is applied on a circle (radius in m, positive to the left), by name
-        and unit.
+    def results_in_turn(self, turn_radius: float, time_after_braking: float = 1.0) -> dict[str, float]:
+        """Results at ``time_after_braking`` (s) after the brake is applied on a circle (radius in m, positive to the
+        left), by name and unit.
 
         Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
         """
         speed, yaw_rate, slip = (
-            float(np.interp(time, self.times, values))
+            float(np.interp(time_after_braking, self.times, values))
             for values in (self.speed, self.path.states[:, 1, 2], self.side_slip)
         )
-        position = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
+        position = [np.interp(time_after_braking, self.times, self.path.states[:, 0, i]) for i in range(2)]
         vx, vy = self.path.states[0, 1, :2] / self.speed[0]
-        centre = self.path.states[0, 0, :2] + radius * np.array([-vy, vx])
+        centre = self.path.states[0, 0, :2] + turn_radius * np.array([-vy, vx])
         return {
-            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, radius),
-            "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time,
-            "outside of the circle [m]": float(np.hypot(*(position - centre)) - abs(radius)),
+            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, turn_radius),
+            "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time_after_braking,
+            "outside of the circle [m]": float(np.hypot(*(position - centre)) - abs(turn_radius)),
             "side slip [deg]": float(np.degrees(slip)),
         }
 
@@ -196,6 +196,6 @@ class Stop:
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 
-def _index_of_peak(values: np.ndarray) -> int:
+def _index_of_peak(signed_values: np.ndarray) -> int:
     """Index of the value with the largest magnitude."""
-    return int(np.argmax(np.abs(values)))
+    return int(np.argmax(np.abs(signed_values)))

@@ -43,12 +43,12 @@ class Stops:
     spread: float
     seed: int
 
-    def __call__(self, paths: range) -> dict[str, np.ndarray]:
+    def __call__(self, stop_numbers: range) -> dict[str, np.ndarray]:
         """Runs the stops with these numbers. Returns KEPT_QUANTITIES and the initial speed (m/s) as arrays
         (len(paths),) by name.
         """
         scene = build(self.table, self.file, Path(self.folder))
-        rows = [self._quantities_of_stop(scene, number) for number in paths]
+        rows = [self._quantities_of_stop(scene, number) for number in stop_numbers]
         kept_keys = {**KEPT_QUANTITIES, "speed": "initial speed [m/s]"}
         return {name: np.array([row[key] for row in rows]) for name, key in kept_keys.items()}
 
@@ -61,17 +61,17 @@ class Stops:
             "seed": self.seed,
         }
 
-    def _quantities_of_stop(self, scene: BrakingScene, path_number: int) -> dict[str, float]:
+    def _quantities_of_stop(self, scene: BrakingScene, stop_number: int) -> dict[str, float]:
         procedure = scene.procedures[self.procedure]
-        drawn = float(normal_samples(self.seed, path_number, 1, 1, source=SPEED)[0, 0])
+        drawn = float(normal_samples(self.seed, stop_number, 1, 1, source=SPEED)[0, 0])
         changed = procedure.model_copy(update={"speed": procedure.speed * (1.0 + self.spread * drawn)})
         scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
         try:
             path = run(scene, procedure=self.procedure).detail
         except RunFailed as error:
-            raise PathFailed(path_number, str(error)) from None
+            raise PathFailed(stop_number, str(error)) from None
         if not path.ended_at_rest:
-            raise PathFailed(path_number, f"does not stand after {scene.run.duration:g} s")
+            raise PathFailed(stop_number, f"does not stand after {scene.run.duration:g} s")
         return Stop(path).vehicle_results()
 
 
@@ -89,9 +89,9 @@ class Scatter:
         return self.deviation / sqrt(self.count)
 
 
-def scatter_of(values: np.ndarray) -> Scatter:
+def scatter_of(sample_values: np.ndarray) -> Scatter:
     """Count, mean and standard deviation of values (n,), n at least 2."""
-    return Scatter(values.size, float(values.mean()), float(values.std(ddof=1)))
+    return Scatter(sample_values.size, float(sample_values.mean()), float(sample_values.std(ddof=1)))
 
 
 def statistical_errors(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:

@@ -81,11 +81,11 @@ def _contact_assumptions(scene: ContactScene) -> list[Assumption]:
     return []
 
 
-def _values_text(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
+def _values_text(scene_table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
     """Text of a scene table: its keys, values and units, without keys that have no value."""
-    model = type(table)
+    model = type(scene_table)
     parts = []
-    for name, value in table:  # type: ignore[attr-defined]
+    for name, value in scene_table:  # type: ignore[attr-defined]
         extra = model.model_fields[name].json_schema_extra  # type: ignore[attr-defined]
         unit = f" {extra['unit']}".rstrip() if isinstance(extra, dict) else ""
         if value is not None and name not in omitted_keys:

@@ -49,19 +49,21 @@ class Radii(Strict):
     rail_x: float | None = quantity("m", "radius of the rail along x", default=None, signed=True)
     rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
 
-    def curvatures(self, file: str) -> tuple[float, float]:
+    def curvatures(self, scene_path: str) -> tuple[float, float]:
         """Coefficients A and B (1/m) of the undeformed distance A x^2 + B y^2. Raises InputError for a radius of zero,
         or bodies that do not touch on an ellipse.
         """
         for name, radius in self:
             if radius == 0:
-                raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
+                raise InputError(
+                    scene_path, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)"
+                )
         curvature_pair = []
         for axis in ("x", "y"):
             value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
             if value <= 0:
                 raise InputError(
-                    file,
+                    scene_path,
                     f"radii.wheel_{axis}, rail_{axis}",
                     None,
                     f"are flat or conform along {axis}: "
@@ -195,11 +197,11 @@ def scene_errors(scene: ContactScene) -> Iterator[None]:
         raise InputError(scene.file, f"{within}{error.place}", error.value, error.allowed, error.choices) from None
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> ContactScene:
     """Build a checked contact scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(ContactScene, table, file, folder)
+    scene = checked(ContactScene, scene_tables, scene_path, scene_folder)
     _raise_first_refusal(
         scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method_refusals
     )
@@ -213,8 +215,8 @@ Refusals = Iterator[tuple[str, Any, str]]
 """Wrong keys of a scene, their values and what is allowed there; the first of them is reported."""
 
 
-def _raise_first_refusal(scene: ContactScene, *checks: Callable[[ContactScene], Refusals]) -> None:
-    for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
+def _raise_first_refusal(scene: ContactScene, *refusal_checks: Callable[[ContactScene], Refusals]) -> None:
+    for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in refusal_checks):
         raise InputError(scene.file, key_path, value, allowed)
 
 

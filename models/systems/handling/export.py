@@ -19,10 +19,10 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
 
 
 def export_handling(
-    engine: str, handling: Handling, export_subject: ExportSubject, further_omissions: list[str]
+    engine: str, handling_model: Handling, export_subject: ExportSubject, further_omissions: list[str]
 ) -> Exported:
     """Export a vehicle as a model file of an engine. ``further_omissions`` lists what the file leaves out besides
     springs, tyres and other forces of the vehicle.
     """
-    left_out = [*elements_left_out(handling.vehicle), *further_omissions]
-    return export_free_vehicle(engine, driven_by(handling), export_subject, left_out)
+    left_out = [*elements_left_out(handling_model.vehicle), *further_omissions]
+    return export_free_vehicle(engine, driven_by(handling_model), export_subject, left_out)

@@ -170,10 +170,10 @@ def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, .
     return tuple(finding for finding in findings if finding.weight == "doubt")
 
 
-def _finding_text(text: str) -> str:
+def _finding_text(finding_text: str) -> str:
     """Text of a finding without its advice on a channel map, which plain files do not have."""
-    text_before, colon, _ = text.partition("; give sign")
-    return text_before + "." if colon else text.replace(" in the channel map", "")
+    text_before, colon, _ = finding_text.partition("; give sign")
+    return text_before + "." if colon else finding_text.replace(" in the channel map", "")
 
 
 def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
@@ -181,9 +181,9 @@ def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 
-    def signal(location: str, quantity: Quantity, axis: str, file: str | None, frame: Frame) -> Signal:
+    def signal(location: str, quantity: Quantity, axis: str, file_name: str | None, frame: Frame) -> Signal:
         name = f"{location} {quantity} {axis}"
-        return Signal(name, str(file), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0)
+        return Signal(name, str(file_name), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0)
 
     (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
     signals = (

@@ -146,11 +146,11 @@ class HubScene(SceneFile):
             return Settings(FIXED_STEP_METHOD, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
-    def spring_force_route(self, method: Method) -> ForceRoute:
+    def spring_force_route(self, stabiliser_method: Method) -> ForceRoute:
         """How a run computes spring forces ("native" or "compiled") with a stabiliser. Enforced roll and pitch need
         compiled forces, whatever the scene says.
         """
-        return "compiled" if method == "prescribed" else self.run.forces
+        return "compiled" if stabiliser_method == "prescribed" else self.run.forces
 
     def cut_vehicle(self) -> CutVehicle:
         """Returns the vehicle without its tyres, cut at the hubs, with the scene's effects; raises InputError."""
@@ -193,42 +193,44 @@ class HubScene(SceneFile):
         return HubForces(forces[:count], period, self.forces.frame), Angles(angles[:count], period)
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HubScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> HubScene:
     """Build a checked scene of hub forces from the nested tables of a scene file. Raises InputError for unknown keys
     and for values outside their ranges.
     """
-    scene = checked(HubScene, table, file, folder)
+    scene = checked(HubScene, scene_tables, scene_path, scene_folder)
     if (scene.forces.file is None) == (scene.road is None):
-        raise InputError(file, "road", None, "give either the table road, for a virtual measurement, or forces.file")
+        raise InputError(
+            scene_path, "road", None, "give either the table road, for a virtual measurement, or forces.file"
+        )
     if (scene.forces.file is None) != (scene.angles.file is None):
         missing = "angles.file" if scene.angles.file is None else "forces.file"
-        raise InputError(file, missing, None, "is missing: forces and angles are measured together")
+        raise InputError(scene_path, missing, None, "is missing: forces and angles are measured together")
     if scene.forces.file is not None:
-        _check_file_only(file, scene)
+        _check_file_only(scene_path, scene)
     elif scene.forces.accept:
-        raise InputError(file, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
+        raise InputError(scene_path, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
     if "forces" in scene.run.model_fields_set and scene.run.forces != scene.spring_force_route(scene.stabilise.method):
         allowed = "an enforced tilt needs all forces in one place: drop it, or choose another stabilise.method"
-        raise InputError(file, "run.forces", scene.run.forces, allowed)
-    _check_steps(file, scene)
-    check_engines(file, scene.engines)
+        raise InputError(scene_path, "run.forces", scene.run.forces, allowed)
+    _check_steps(scene_path, scene)
+    check_engines(scene_path, scene.engines)
     return with_effect_tables(scene)
 
 
-def _check_file_only(file: str, scene: HubScene) -> None:
+def _check_file_only(scene_path: str, scene: HubScene) -> None:
     """Raise InputError for keys that only a virtual measurement can have, in a scene with measured files."""
     for table, name in (("forces", "sampling_rate"), ("forces", "noise"), ("angles", "noise")):
         entries = getattr(scene, table)
         if name in entries.model_fields_set:
-            raise InputError(file, f"{table}.{name}", getattr(entries, name), f"is that of {table}.file: drop it")
+            raise InputError(scene_path, f"{table}.{name}", getattr(entries, name), f"is that of {table}.file: drop it")
 
 
-def _check_steps(file: str, scene: HubScene) -> None:
+def _check_steps(scene_path: str, scene: HubScene) -> None:
     step, duration = scene.run.step, scene.run.duration
     if not divides(step, duration):
         allowed = f"must divide run.duration = {duration:g} s, as {dividing_step(step, duration)} s does"
-        raise InputError(file, "run.step", step, allowed)
+        raise InputError(scene_path, "run.step", step, allowed)
     period = 1.0 / scene.forces.sampling_rate
     if scene.road is not None and not (divides(step, period) and divides(period, duration)):
         allowed = f"its period must be a multiple of run.step = {step:g} s and divide run.duration = {duration:g} s"
-        raise InputError(file, "forces.sampling_rate", scene.forces.sampling_rate, allowed)
+        raise InputError(scene_path, "forces.sampling_rate", scene.forces.sampling_rate, allowed)

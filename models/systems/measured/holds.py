@@ -33,7 +33,7 @@ def stabilisers_of_runs(scene: MeasuredScene, recording: Recording) -> dict[str,
     return {FREE_RUN: AttitudeHold("none", **deviations)} | ({} if settings.method == "none" else stabilised_hold)
 
 
-def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
+def noise_of(stated_deviations: Deviations, recording: Recording) -> dict[str, float]:
     """Standard deviations of the measured noise in SI, by key of [noise]: as stated, else estimated from the recording,
     but at least those of usual transducers, since filters hide noise.
     """
@@ -42,5 +42,7 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
         sizes = np.array([white_noise(recording, s) for s in recording.find(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(AttitudeHold, key))
-        deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
+        deviations[key] = getattr(stated_deviations, key) or max(
+            least, float(np.median(known)) if len(known) else least
+        )
     return deviations

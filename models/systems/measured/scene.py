@@ -181,22 +181,24 @@ class MeasuredScene(SceneFile):
         return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> MeasuredScene:
     """Build a checked scene of a recording from the nested tables of a scene file. Raises InputError for unknown keys
     and for values outside their ranges.
     """
-    scene = checked(MeasuredScene, table, file, folder)
+    scene = checked(MeasuredScene, scene_tables, scene_path, scene_folder)
     vehicle, names = scene.vehicle, [each.file for each in scene.files]
     if (vehicle.file is None) == (vehicle.parameters is None):
         what = "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle"
-        raise InputError(file, "vehicle", None, what)
+        raise InputError(scene_path, "vehicle", None, what)
     if vehicle.parameters is not None and "chassis" in vehicle.model_fields_set:
-        raise InputError(file, "vehicle.chassis", vehicle.chassis, "belongs to a vehicle file: drop it")
+        raise InputError(scene_path, "vehicle.chassis", vehicle.chassis, "belongs to a vehicle file: drop it")
     if vehicle.parameters is not None and scene.virtual is not None:
-        raise InputError(file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
+        raise InputError(scene_path, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
     if bool(names) == (scene.virtual is not None):
-        raise InputError(file, "files", None, "give either [[files]] that were measured, or a table [virtual]")
+        raise InputError(scene_path, "files", None, "give either [[files]] that were measured, or a table [virtual]")
     for i, name in enumerate(names):
         if name in names[:i]:
-            raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
+            raise InputError(
+                scene_path, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]"
+            )
     return with_effect_tables(scene)

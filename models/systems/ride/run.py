@@ -51,7 +51,7 @@ def run(
     engine: str = "",
     *,
     vehicle: SpatialVehicle | None = None,
-    points: SweepPoints | None = None,
+    sweep_points: SweepPoints | None = None,
     sampling: "Sampling | None" = None,
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
@@ -59,8 +59,9 @@ def run(
     """Run a ride scene by covariances of the linear vehicle of an engine, or in time. Raises InputError, Refused or
     RunFailed.
 
-    vehicle, points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and tyres that
-    may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one random road.
+    vehicle, sweep_points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and
+    tyres that may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one
+    random road.
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
     are always checked.
 
@@ -71,7 +72,9 @@ def run(
         if scene.drive is not None:
             return _drive_deviations(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or needs_run_in_time(scene)):
-            return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
+            return _deviations_by_speed(
+                scene, engine, vehicle or vehicle_of(scene), sweep_points or SweepPoints(), error
+            )
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
@@ -81,7 +84,7 @@ def run(
 
 
 def _deviations_by_speed(
-    scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, sweep_points: SweepPoints, estimate_error: bool
 ) -> Result:
     """Result with standard deviations (correlation, speed, output) at constant speeds. Assumptions are checked on the
     scene's road, or on the last road if the scene's is not among them.
@@ -89,9 +92,9 @@ def _deviations_by_speed(
     from models.ride.sweep import variance_sweep
 
     assert scene.speeds is not None
-    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in points.correlations.items()}
+    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in sweep_points.correlations.items()}
     start_time, linear = time.process_time(), linear_vehicle(vehicle, engine)
-    swept = variance_sweep(linear, roads, points.speeds or scene.speeds.all(), scene.weighting)
+    swept = variance_sweep(linear, roads, sweep_points.speeds or scene.speeds.all(), scene.weighting)
     labelled = result(
         scene,
         {"deviation": Channel(("correlation", "speed", "output"), swept.deviation)},
@@ -110,7 +113,7 @@ def _deviations_by_speed(
     with_assumptions(
         labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, checked_speeds(swept.speeds), {}))
     )
-    if not error:
+    if not estimate_error:
         return labelled
     matrix_accuracy = (
         MATRIX_ACCURACY
@@ -120,7 +123,7 @@ def _deviations_by_speed(
     return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, matrix_accuracy)
 
 
-def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
+def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, estimate_error: bool) -> Result:
     """Result with standard deviations (time, output) along a drive, and with the quasi-stationary deviations that
     constant driving at each speed would give.
     """
@@ -134,8 +137,8 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY_SPEEDS)
     quasi_stationary_deviations = quasi_stationary(linear, road, speeds, weightings=weightings)
 
-    def deviations_along(stride: int) -> np.ndarray:
-        kept_speeds = np.unique([*range(0, len(speeds), stride), len(speeds) - 1])
+    def deviations_along(steps_per_row: int) -> np.ndarray:
+        kept_speeds = np.unique([*range(0, len(speeds), steps_per_row), len(speeds) - 1])
         return np.column_stack(
             [
                 np.interp(drive.speed, speeds[kept_speeds], column)
@@ -167,4 +170,4 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
     with_assumptions(
         labelled, assumptions(scene, vehicle, MotionAlongDrive(watched_deviations(vehicle, drive.deviation), spectral))
     )
-    return with_error_of_drive(labelled, scene, linear, road, deviations_along) if error else labelled
+    return with_error_of_drive(labelled, scene, linear, road, deviations_along) if estimate_error else labelled

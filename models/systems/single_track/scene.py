@@ -84,8 +84,8 @@ class SingleTrackScene(SceneFile):
         return Car(*self.vehicle.model_dump().values())
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> SingleTrackScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> SingleTrackScene:
     """Build a checked single-track scene from the nested tables of a scene file. Raises InputError for unknown keys and
     for values outside their ranges.
     """
-    return checked(SingleTrackScene, table, file, folder)
+    return checked(SingleTrackScene, scene_tables, scene_path, scene_folder)

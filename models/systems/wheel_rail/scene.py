@@ -68,7 +68,7 @@ class WheelRailScene(SceneFile):
     method: Method = Method()
     cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
-    def contact(self, case: Case) -> WheelsetContact:
+    def contact(self, rail_case: Case) -> WheelsetContact:
         """Returns the contact problem of the wheelset on the track in a case; raises InputError for files that are no
         profiles.
         """
@@ -77,7 +77,7 @@ class WheelRailScene(SceneFile):
             side,
             self.wheelset.load,
             self.wheelset.speed,
-            case.friction,
+            rail_case.friction,
             MaterialPair(self.bodies.wheel, self.bodies.rail),
             CELLS_PER_STRIP / self.method.cells,
         )
@@ -100,16 +100,16 @@ LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
 """Largest yaw of the wheelset (rad) and largest coefficient of friction that a scene may have."""
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelRailScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> WheelRailScene:
     """Build a checked wheel-rail scene from the nested tables of a scene file. Raises InputError for unknown keys and
     for values outside their ranges.
     """
-    scene = checked(WheelRailScene, table, file, folder)
+    scene = checked(WheelRailScene, scene_tables, scene_path, scene_folder)
     for key_path, (least, most_allowed, unit) in PLAUSIBLE_RANGES.items():
         owner, key = key_path.split(".")
         value = getattr(getattr(scene, owner), key)
         if not least <= value <= most_allowed:
-            raise InputError(file, key_path, value, f"must be from {least:g} to {most_allowed:g} {unit}")
+            raise InputError(scene_path, key_path, value, f"must be from {least:g} to {most_allowed:g} {unit}")
     for name, case in scene.cases.items():
         largest = float(np.abs(case.yaw * scene.positions.values()).max())
         if largest > LARGEST_YAW:
@@ -117,10 +117,12 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
                 f"turns the wheelset by {largest:.3g} rad, more than {LARGEST_YAW:g}: the yaw is in rad for each metre "
                 "of displacement"
             )
-            raise InputError(file, f"cases.{name}.yaw", case.yaw, refusal)
+            raise InputError(scene_path, f"cases.{name}.yaw", case.yaw, refusal)
         if case.friction > LARGEST_FRICTION:
-            raise InputError(file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
+            raise InputError(
+                scene_path, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}"
+            )
     profiles = scene.profiles
     if profiles.smoothing and not any(Path(name).suffix for name in (profiles.wheel, profiles.rail)):
-        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
+        raise InputError(scene_path, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
     return scene.model_copy(update={"profiles": profiles.with_full_paths(scene)})

@@ -96,16 +96,16 @@ class WheelsetScene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelsetScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> WheelsetScene:
     """Build a checked wheelset scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(WheelsetScene, table, file, folder)
+    scene = checked(WheelsetScene, scene_tables, scene_path, scene_folder)
     _check_speeds(scene)
     _check_run(scene)
     _check_conicity(scene)
     if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
-        raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
+        raise InputError(scene_path, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
     return with_effect_tables(scene)
 
 

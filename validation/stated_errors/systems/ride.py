@@ -164,7 +164,7 @@ def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sam
     speed = float(generator.uniform(5.0, 35.0))
     scene = _random_scene(generator, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
     vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=sample_number)
-    result = linearised_result(scene, vehicle, sampling, lambda text, share: None, error=True)
+    result = linearised_result(scene, vehicle, sampling, lambda text, share: None, estimate_error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
     fine = copies_in_time(
         vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + sample_number, longest_step=run.step / 4.0
@@ -208,7 +208,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
         result = failure.partial
     rows = result.detail.rows * FINER_STEPS
     stride, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
-    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, stride=stride)
+    fine = ride_over("mujoco", vehicle, finer, table, skipped_time=begin, steps_per_output=stride)
     gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     calls = RUNGE_KUTTA_ORDER * steps + len(rows)

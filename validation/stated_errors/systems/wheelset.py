@@ -95,7 +95,7 @@ def _true_errors(
     if scene.contact.law == "linear":
         return true
     cells = min(FINER_CELLS * scene.contact.cells, MOST_CELLS)
-    of_cells = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0, cells=cells))))
+    of_cells = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0, cell_count=cells))))
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 
