@@ -15,7 +15,7 @@ from models.brake.plane_vehicle import PAPER_TRUCK
 from models.brake.pressure import Chambers
 from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
 from models.engines.braking import EngineChassis
-from models.systems.braking.march import on_tyres
+from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
     ICE_TABLE,
@@ -98,7 +98,7 @@ def braked_truck_turn(end_speed: float, steer: float = STEER, step_function: Cal
 def simulation_speed(substep_count: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
-    vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
+    vehicle = braked_vehicle_on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
     vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
     start = time.process_time()
     path = vehicle.run(SlipBangBang(wheels=4), SPEED)

@@ -16,7 +16,7 @@ from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
-from models.systems.contact.scene import Method
+from models.systems.contact.scene import ContactMethod
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import (
@@ -249,7 +249,7 @@ def _long_table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    answers = solve_table(path, out, partial(Built, MATERIAL_PAIR), Method())
+    answers = solve_table(path, out, partial(Built, MATERIAL_PAIR), ContactMethod())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()

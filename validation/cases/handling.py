@@ -19,8 +19,8 @@ from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
-from models.systems.handling.run import Drive, drive_run, driven_by
-from models.systems.handling.single_track import steady_turn
+from models.systems.handling.run import SimulatedDrive, drive_run, driven_model
+from models.systems.handling.single_track import steady_turn_gains
 from models.tyre.bristles import FIRST_FLEXIBILITY, brush_forces, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding_car, turning_car, turning_error
@@ -70,7 +70,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
+def _drive_difference(first_drive: SimulatedDrive, second_drive: SimulatedDrive) -> float:
     """Largest difference of coordinates and rates between two drives."""
     return float(
         max(
@@ -80,7 +80,7 @@ def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
     )
 
 
-def _engines_row(drives: dict[str, Drive]) -> Row:
+def _engines_row(drives: dict[str, SimulatedDrive]) -> Row:
     return Observed(
         "handling.engines",
         SYSTEM,
@@ -119,7 +119,7 @@ def _tyre_rows() -> list[Row]:
     ]
 
 
-def _friction_power_row(drive: Drive) -> Row:
+def _friction_power_row(drive: SimulatedDrive) -> Row:
     return behaviour_row(
         "handling.power",
         SYSTEM,
@@ -157,14 +157,14 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
     may change the table of the vehicle first."""
     steer = 2e-5
     handling = Handling(R19_WITHOUT_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
-    gain = steady_turn(handling, speed).yaw_gain
+    gain = steady_turn_gains(handling, speed).yaw_gain
     if plant_fault is not None:
         plant_fault(handling)
     return float(drive_run("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
 
 
 def _steady_turn_rows() -> list[Row]:
-    turn = steady_turn(Handling(R19_WITHOUT_DRAG), 20.0)
+    turn = steady_turn_gains(Handling(R19_WITHOUT_DRAG), 20.0)
     return [
         Observed(
             "handling.turn",
@@ -333,7 +333,7 @@ def _tyre_cost_row() -> Row:
 def _threads_row() -> Row:
     """Row: lane changes at three speeds give the same bits in two threads of MuJoCo as in one."""
     handling = lane_change()
-    built = FreeMujoco(driven_by(handling))
+    built = FreeMujoco(driven_model(handling))
     built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
     with installed(built.law):
@@ -352,7 +352,7 @@ def _threads_row() -> Row:
 
 def _timed_march(handling: Handling, step_count: int) -> Callable[[], Any]:
     """Function that runs a number of steps in MuJoCo's own loop, without preparation or output channels."""
-    built = FreeMujoco(driven_by(handling))
+    built = FreeMujoco(driven_model(handling))
     built.model.opt.timestep = 1e-4
     start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
 

@@ -15,12 +15,18 @@ from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.comparison import FILTERED_RUN, Comparison, compare
-from models.systems.hub_forces.measurement import HubForces, hub_model, recorded_measurement, true_run, two_tracks
+from models.systems.hub_forces.comparison import FILTERED_RUN, StabiliserComparison, compare_stabilisers
+from models.systems.hub_forces.measurement import (
+    HubForces,
+    hub_model,
+    recorded_measurement,
+    road_under_wheels,
+    true_run,
+)
 from models.systems.hub_forces.run import inputs_with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
-from models.systems.hub_forces.tilt_filter import Deviations, estimate
+from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid_vehicle
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing_breaches
@@ -54,7 +60,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return rows, {}
     rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduction_rows(car), *_growth_rows(car)]
     scenes = {frame: _study_scene(frame) for frame in ("hub", "inertial")}
-    comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
+    comparisons = {frame: compare_stabilisers(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
         rows += [*_stabilised_rows(frame, comparison), _prescribed_angles_row(frame, comparison)]
     return rows + _fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
@@ -189,7 +195,7 @@ def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
 def _road_input(vehicle: CutVehicle, duration: float) -> HubInputs:
     """Input of the vehicle on a class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
-    return two_tracks(vehicle, left, right, 20.0, STEP, round(duration / STEP))
+    return road_under_wheels(vehicle, left, right, 20.0, STEP, round(duration / STEP))
 
 
 def _reproduction_rows(vehicle: CutVehicle) -> list[Row]:
@@ -264,7 +270,7 @@ def _study_scene(frame: str) -> HubScene:
     return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 
 
-def _stabilised_rows(frame: str, comparison: Comparison) -> list[Row]:
+def _stabilised_rows(frame: str, comparison: StabiliserComparison) -> list[Row]:
     """Rows: difference between the engines before drift-off, errors of roll and pitch with the tilt filter, and damage
     that each run predicts."""
     off = np.abs(comparison.errors(comparison.runs[FILTERED_RUN])).max(axis=0)
@@ -309,7 +315,7 @@ def _stabilised_rows(frame: str, comparison: Comparison) -> list[Row]:
     return rows
 
 
-def _prescribed_angles_row(frame: str, comparison: Comparison) -> Row:
+def _prescribed_angles_row(frame: str, comparison: StabiliserComparison) -> Row:
     """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
     measurement = comparison.measurement
     assert measurement.truth is not None
@@ -353,7 +359,7 @@ def _fault_rows(scene: HubScene) -> list[Row]:
     for i, (name, samples) in enumerate(planted.items()):
         faulty, outcome = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
-            estimate(vehicle, faulty, angles, Deviations(scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
+            estimate_tilt(vehicle, faulty, angles, StatedDeviations(scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
         except InputError:
             outcome = "refused"
         expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"

@@ -12,7 +12,12 @@ from models.core.systems import load
 from models.drift.score import SECTION_FORCE_CHANNELS, errors_of_run
 from models.fatigue.damage import WOEHLER_SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
+from models.systems.pitch_plane.stabilised import (
+    StabiliserBench,
+    StabiliserOptions,
+    compare_stabilisers,
+    scenes_by_road,
+)
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.common.scenes import force_scene, on_paper_road, virtual_drive
@@ -154,9 +159,9 @@ def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     """Rows: on a grade of 0.1 rad a holding spring gives wrong results, and a prescribed pitch right ones, in each
     implementation."""
     scene = load(STUDY_SCENE, QUICK_OPTIONS)
-    options = read(Options, scene.options, "", "options")
+    options = read(StabiliserOptions, scene.options, "", "options")
     (folder / "short").mkdir()
-    bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
+    bench = StabiliserBench(scenes_by_road(scene, options)["grade"], "grade", options, folder / "short")
     rows = []
     for engine in engines:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
@@ -180,7 +185,9 @@ def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
 def _study_results(folder: Path) -> list[Saved]:
     """Results of all stabilisers of the study with its default options, in all engines."""
     (folder / "study").mkdir()
-    _, rows, failed = compare(load(STUDY_SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
+    _, rows, failed = compare_stabilisers(
+        load(STUDY_SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None
+    )
     assert not failed, failed
     return rows
 
@@ -248,11 +255,11 @@ def _long_results(folder: Path) -> list[Saved]:
     """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the hand-written reference."""
     scene = load(STUDY_SCENE, FULL_OPTIONS)
     (folder / "long").mkdir()
-    bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")
+    bench = StabiliserBench(scene, "road", read(StabiliserOptions, scene.options, "", "options"), folder / "long")
     return [_score_of_method(bench, name) for name in PROTOTYPE_RESULTS]
 
 
-def _score_of_method(bench: Bench, method: str, engine: str = "reference") -> Saved:
+def _score_of_method(bench: StabiliserBench, method: str, engine: str = "reference") -> Saved:
     effects = bench.methods[method]
     return bench.row(method, effects, bench.simulate(engine, effects))
 
@@ -332,6 +339,6 @@ def draw(case_data: Saved) -> Drawn:
     from models.drawing.drift import decision_figure
 
     scene = load(STUDY_SCENE)
-    options = read(Options, scene.options, "", "options")
+    options = read(StabiliserOptions, scene.options, "", "options")
     rows = [row for row in case_data["study"] if row["engine"] == "reference"]
     return [("What each stabiliser leaves in the section forces", decision_figure(rows, options.limits, options.grade))]

@@ -22,7 +22,7 @@ from models.ride.statistical_linearisation import BentSpring, statistically_line
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import has_no_linear_equivalent
 from models.systems.ride.omissions import effects_of, wheels_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
+from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, refusal_reason
 from models.systems.ride.reduced_scene import reduced_without as without_effects
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
@@ -74,7 +74,7 @@ class CopiesInTime:
     scene: ReducedScene
     samples: Samples
     steps_at_speeds: tuple[CopySteps, ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[OmissibleEffect, ...]
     left_out: frozenset[str] = frozenset()
     step_factor: int = 1
     system = "ride"
@@ -195,7 +195,7 @@ def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
     return CopySteps(speed, half, settling, counted, linear.springs)
 
 
-def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
+def _can_be_left_out(scene: ReducedScene, effect: OmissibleEffect) -> bool:
     """Whether a run in time can do without an effect and the parts that must leave with it."""
     reduced_scene = effect.without(scene)
     rigid = (spring for spring in scene.vehicle.springs if spring.name in reduced_scene.rigid)

@@ -19,9 +19,9 @@ from models.engines.free_vehicle import FreeModel, free_model
 from models.multibody.forces import DISSIPATED, FX, FY, POTENTIAL, PRESS, STEER_POWER
 from models.systems.bicycle.scene import BicycleScene
 
-REFERENCE = "reference"
-COORDINATES = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
-COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
+REFERENCE_ENGINE = "reference"
+UNIT_OF_COORDINATE = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
+UNIT_OF_COORDINATE |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
 """Channels of the bicycle's coordinates with their units, in the order of ``models.bicycle.four_bodies``. Each has a
 second channel for its rate, whose name ends in _rate.
 """
@@ -32,7 +32,7 @@ bristles of the tyres begin to slide.
 """
 CHANNELS_WITH_ERROR = ("lean", "steer", "yaw")
 """Channels whose discretisation error is stated in the result."""
-UNACCOUNTED_ENERGY_SHARE = 1e-3
+LARGEST_UNACCOUNTED_ENERGY_SHARE = 1e-3
 """Largest share of the energy that a run may leave unaccounted for. Below 0.1 m/s the equations of the tyres are stiff,
 and long steps lose more.
 """
@@ -48,10 +48,10 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     error : whether the error of the time steps is estimated, by further runs in longer steps.
     """
     start_time = time.process_time()
-    ride = run_with_ideal_rolling(scene) if engine == REFERENCE else run_on_tyres(scene, engine, scene.run.step)
+    ride = run_with_ideal_rolling(scene) if engine == REFERENCE_ENGINE else run_on_tyres(scene, engine, scene.run.step)
     seconds = time.process_time() - start_time
     channels = dict[str, Channel]()
-    for i, (name, unit) in enumerate(COORDINATES.items()):
+    for i, (name, unit) in enumerate(UNIT_OF_COORDINATE.items()):
         channels[name] = Channel("time", ride.positions[:, i], unit)
         channels[f"{name}_rate"] = Channel("time", ride.rates[:, i], f"{unit}/s")
     encoder = scene.control.encoder_gain * ride.positions[:, STEER]
@@ -64,17 +64,17 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
         axes["wheel"] = Channel("wheel", ["rear", "front"])
     counts = {"steps": ride.steps}
     labelled = result(scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=ride)
-    with_assumptions(labelled, assumptions(scene))
+    with_assumptions(labelled, bicycle_assumptions(scene))
     if not error:
         return labelled
     return (
         not_estimated(labelled, "its steps are kept to a tolerance")
-        if engine == REFERENCE
+        if engine == REFERENCE_ENGINE
         else _with_step_error(labelled, scene)
     )
 
 
-def assumptions(scene: BicycleScene) -> list[Assumption]:
+def bicycle_assumptions(scene: BicycleScene) -> list[Assumption]:
     """Assumption of a bicycle run that only the wheels touch the ground, with its limits of the lean angle (rad)."""
     return [
         Assumption(
@@ -118,7 +118,7 @@ def run_on_tyres(
         step_count,
         tyres[kept_rows],
     )
-    if not ride.unaccounted() < UNACCOUNTED_ENERGY_SHARE:
+    if not ride.unaccounted() < LARGEST_UNACCOUNTED_ENERGY_SHARE:
         why = (
             f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {time_step:g} s is too long"
         )
@@ -152,7 +152,7 @@ def _with_step_error(run_result: Result, scene: BicycleScene) -> Result:
     )  # in steps of any length: rows of longer ones are among these rows
 
     def series(ride: Ride) -> Series:
-        columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in CHANNELS_WITH_ERROR}
+        columns = {name: ride.positions[:, list(UNIT_OF_COORDINATE).index(name)] for name in CHANNELS_WITH_ERROR}
         return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 
     def rerun(step_factor: float, run_share: float) -> Series:

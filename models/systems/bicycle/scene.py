@@ -27,7 +27,7 @@ class BicycleTable(Strict):
     parameters: str = Field(default="benchmark", description="a parameter set, or a TOML file with every parameter")
 
 
-class RunTable(Strict):
+class BicycleRunTable(Strict):
     """[run]: a run that begins straight ahead and upright, with a lean rate."""
 
     speed: float = quantity("m/s", "speed at the start, backwards below 0", default=4.6, signed=True)
@@ -36,7 +36,7 @@ class RunTable(Strict):
     step: float = quantity("s", "step of Runge-Kutta 4 in engines", default=2e-4)
 
 
-class SpeedsTable(Strict):
+class EigenvalueSpeedsTable(Strict):
     """[speeds]: speeds at which eigenvalues are computed, evenly spaced from start to stop (backwards below 0)."""
 
     start: float = quantity("m/s", "first speed", default=0.0, signed=True)
@@ -52,8 +52,8 @@ class BicycleScene(SceneFile):
     bicycle: BicycleTable = BicycleTable()
     tyres: BicycleTyre = UNCHANGED_TYRE
     control: Control = Control()
-    speeds: SpeedsTable = SpeedsTable()
-    run: RunTable = RunTable()
+    speeds: EigenvalueSpeedsTable = EigenvalueSpeedsTable()
+    run: BicycleRunTable = BicycleRunTable()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     @cached_property

@@ -28,14 +28,14 @@ from models.core.errors import RunFailed
 from models.systems.braking.march import BrakedVehicle, BrakingPath
 from models.systems.braking.of_scene import braked_vehicle, surfaces_of_stretch, vehicle_of
 from models.systems.braking.plan import controller_text
-from models.systems.braking.procedures import controlled_run, step_steer
-from models.systems.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.procedures import controlled_run, step_steer_response
+from models.systems.braking.scene import BrakingProcedure, BrakingRoadTable, BrakingScene, RoadStretch
+from models.systems.braking.stop_report import StopHistory
 
-AXLE_NAMES = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
+AXLE_NAMES_IN_ERRORS = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
 PRESSURE_HALVINGS = 9
 """Halvings of the interval that contains the pressure at which an axle locks, to 1/500 of the supply pressure."""
-LONGEST_RUN = 120.0
+LONGEST_RUN_DURATION = 120.0
 """Longest duration (s) of a run that measures adhesion, in place of the scene's duration."""
 PRESSURE_SHARES_BELOW_LOCK = (1.0, 0.98, 0.96)
 """Pressures of the three runs that measure k, divided by the largest pressure at which no wheel locks."""
@@ -97,8 +97,8 @@ def vehicle_on_one_surface(scene: BrakingScene, surface_name: str, **scene_chang
     """Returns the scene's vehicle on a road of a single surface; ``scene_changes`` replace values of the scene, for
     example its trailer.
     """
-    road = RoadTable(stretches=[Stretch(left=surface_name)])
-    return braked_vehicle(scene.model_copy(update={"road": road, **scene_changes}), Procedure())
+    road = BrakingRoadTable(stretches=[RoadStretch(left=surface_name)])
+    return braked_vehicle(scene.model_copy(update={"road": road, **scene_changes}), BrakingProcedure())
 
 
 def measured_adhesion(scene: BrakingScene, surface_name: str) -> Adhesion:
@@ -127,7 +127,9 @@ def _controlled_braking_rate(
     which braking begins, and between which z is measured.
     """
     port = None if scene.port is None else scene.port.model_copy(update={"log": None})
-    lasting = scene.model_copy(update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST_RUN})})
+    lasting = scene.model_copy(
+        update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST_RUN_DURATION})}
+    )
     begin, high, low = speeds_kmh
     path = controlled_run(lasting, procedure_name, vehicle, vehicle.rolling(begin * METRES_PER_SECOND_OF_KMH))
     return braking_rate(high * METRES_PER_SECOND_OF_KMH, low * METRES_PER_SECOND_OF_KMH, _slowing_time(path, high, low))
@@ -138,17 +140,19 @@ def _single_axle_braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle_
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle_index
 
     def run(pressure: float) -> BrakingPath:
-        return vehicle.run(Pressures(np.where(wheels, pressure, 0.0)), 50.0 * METRES_PER_SECOND_OF_KMH, LONGEST_RUN)
+        return vehicle.run(
+            Pressures(np.where(wheels, pressure, 0.0)), 50.0 * METRES_PER_SECOND_OF_KMH, LONGEST_RUN_DURATION
+        )
 
     low, high = 0.0, scene.brakes.supply
     if not _wheel_locks(run(high)):
-        raise NoAdhesion(f"the {AXLE_NAMES[axle_index]} does not lock at the supply's {high:g} bar")
+        raise NoAdhesion(f"the {AXLE_NAMES_IN_ERRORS[axle_index]} does not lock at the supply's {high:g} bar")
     for _ in range(PRESSURE_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _wheel_locks(run(middle)) else (middle, high)
     braking_times = [_slowing_time(run(share * low), 40.0, 20.0) for share in PRESSURE_SHARES_BELOW_LOCK]
     if not np.isfinite(braking_times).any():
-        raise NoAdhesion(f"the {AXLE_NAMES[axle_index]} alone does not slow the vehicle down to 20 km/h")
+        raise NoAdhesion(f"the {AXLE_NAMES_IN_ERRORS[axle_index]} alone does not slow the vehicle down to 20 km/h")
     return braking_rate(
         40.0 * METRES_PER_SECOND_OF_KMH, 20.0 * METRES_PER_SECOND_OF_KMH, mean_of_fastest(np.array(braking_times))
     )
@@ -156,7 +160,7 @@ def _single_axle_braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle_
 
 def _wheel_locks(braking_path: BrakingPath) -> bool:
     """Whether a wheel locks above 20 km/h."""
-    fast = Stop(braking_path).speed[:-1] > 20.0 * METRES_PER_SECOND_OF_KMH
+    fast = StopHistory(braking_path).speed[:-1] > 20.0 * METRES_PER_SECOND_OF_KMH
     return bool((braking_path.reports.locked[fast] > 0.0).any())
 
 
@@ -164,13 +168,13 @@ def _slowing_time(braking_path: BrakingPath, upper_speed: float, lower_speed: fl
     """Time (s) in which the vehicle slows from ``upper_speed`` to ``lower_speed`` (km/h); NaN if it never reaches
     ``lower_speed``.
     """
-    stop = Stop(braking_path)
+    stop = StopHistory(braking_path)
     return crossing_time(stop.times, stop.speed, lower_speed * METRES_PER_SECOND_OF_KMH) - crossing_time(
         stop.times, stop.speed, upper_speed * METRES_PER_SECOND_OF_KMH
     )
 
 
-def utilisation(
+def measured_utilisation(
     scene: BrakingScene, surface_name: str, known_adhesions: Adhesion | None = None, port_run_name: str = "adhesion"
 ) -> AdhesionUtilisation:
     """Measure the adhesion utilisation epsilon of the scene's anti-lock system on a surface. z is measured from 45 to
@@ -204,7 +208,7 @@ class SplitAdhesion:
         return split_rate(self.k_low, self.k_high)
 
 
-def split_adhesion(scene: BrakingScene, procedure_name: str) -> SplitAdhesion:
+def measured_split_adhesion(scene: BrakingScene, procedure_name: str) -> SplitAdhesion:
     """Measure the braking rate z of a split procedure, braked from 50 km/h, between 40 and 20 km/h, and the vehicle's
     adhesion on each of the two surfaces of the first stretch.
     """
@@ -219,7 +223,7 @@ def split_adhesion(scene: BrakingScene, procedure_name: str) -> SplitAdhesion:
     return SplitAdhesion(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axle_geometry(scene)) for k in adhesions))
 
 
-def figures_of_merit(scene: BrakingScene, procedure_name: str, stop: Stop) -> dict[str, float]:
+def figures_of_merit(scene: BrakingScene, procedure_name: str, stop: StopHistory) -> dict[str, float]:
     """Figures of merit of a procedure, by name and unit: response in a turn or J-turn, braking rate on split friction,
     adhesion utilisation of straight braking. Empty where they have no meaning.
 
@@ -232,7 +236,7 @@ def figures_of_merit(scene: BrakingScene, procedure_name: str, stop: Stop) -> di
             return {}
         return {f"after 1 s: {key}": value for key, value in stop.results_in_turn(procedure.radius).items()}
     if procedure.kind == "j_turn":
-        response = step_steer(scene, procedure_name)
+        response = step_steer_response(scene, procedure_name)
         time, overshoot, steady = (np.nan,) * 3 if response is None else astuple(response)
         return {
             "without brakes: response time [s]": time,
@@ -243,14 +247,14 @@ def figures_of_merit(scene: BrakingScene, procedure_name: str, stop: Stop) -> di
     if controller_text(scene) == "none" or scene.measured is not None or once:
         return {}
     if procedure.kind == "split":
-        split = split_adhesion(scene, procedure_name)
+        split = measured_split_adhesion(scene, procedure_name)
         return {
             "z_MALS": split.z,
             "z_MALS asked for": split.required_braking_rate,
             "k low": split.k_low,
             "k high": split.k_high,
         }
-    used = utilisation(scene, scene.road.stretches[0].left)
+    used = measured_utilisation(scene, scene.road.stretches[0].left)
     return {
         "z_AL": used.z,
         "k front": used.adhesion.front,

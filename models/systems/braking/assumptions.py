@@ -16,7 +16,7 @@ from models.core.result import Result
 from models.systems.braking.march import BrakedVehicle
 from models.systems.braking.of_scene import measured_pressures_of, tyre_tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, Stop, wheel_names
+from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, StopHistory, wheel_names
 
 WITHOUT_VALVES = ("none", "slip_pi")
 """Controllers that never switch valves on and off."""
@@ -129,7 +129,7 @@ def _body_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[A
         "forwards",
         "the vehicle moves forwards",
         "name the effect anti_lock, or brake the rear axle less: the vehicle spins",
-        lambda run: {"vehicle": Stop(run.detail).side_slip},
+        lambda run: {"vehicle": StopHistory(run.detail).side_slip},
         "rad",
         -math.pi / 2,
         math.pi / 2,
@@ -207,11 +207,11 @@ def _share_lifted_by_hook(scene: BrakingScene, run_result: Result) -> Watched:
     span = trailer.wheelbase
     lighter = trailer.mass * GRAVITY * min(trailer.front.x, -trailer.rear.x) / span
     share = np.abs(pull) * HOOK_HEIGHT / span / lighter
-    return {"hook": _with_start_row(np.where(Stop(path).speed[1:] > SLOWEST_SLIP_SPEED, share, np.nan))}
+    return {"hook": _with_start_row(np.where(StopHistory(path).speed[1:] > SLOWEST_SLIP_SPEED, share, np.nan))}
 
 
 def _lean_angles(run_result: Result) -> Watched:
-    lean = Stop(run_result.detail).lean
+    lean = StopHistory(run_result.detail).lean
     assert lean is not None
     return dict(zip(("roll", "pitch"), lean.T, strict=True))
 
@@ -258,7 +258,9 @@ def _resolved_speed(vehicle: BrakedVehicle, run_result: Result) -> Watched:
     angles = np.nanmax(np.nan_to_num(np.abs(run_result["slip_angle"])), axis=1)
     return {
         "vehicle": np.where(
-            (angles > LEAST_SLIP_ANGLE) & (Stop(run_result.detail).speed < least_resolved), least_resolved, np.nan
+            (angles > LEAST_SLIP_ANGLE) & (StopHistory(run_result.detail).speed < least_resolved),
+            least_resolved,
+            np.nan,
         )
     }
 
@@ -343,7 +345,7 @@ def _drive_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[
         "stop",
         "the vehicle stands at the end",
         "raise run.duration",
-        lambda run: {"vehicle": np.zeros(1) if run.detail.ended_at_rest else Stop(run.detail).speed[-1:]},
+        lambda run: {"vehicle": np.zeros(1) if run.detail.ended_at_rest else StopHistory(run.detail).speed[-1:]},
         "m/s",
         upper_limit=0.0,
     )
@@ -359,7 +361,7 @@ def _drag_work_share(scene: BrakingScene, vehicle_mass: float, run_result: Resul
     """Work of air drag over a stop, divided by the initial kinetic energy of ``vehicle_mass`` (kg). The drag is that of
     a box as wide as the track and twice as high as the centre of mass.
     """
-    truck, stop = vehicle_of(scene), Stop(run_result.detail)
+    truck, stop = vehicle_of(scene), StopHistory(run_result.detail)
     drag = 0.5 * AIR_DENSITY * DRAG_COEFFICIENT * truck.front.track * 2.0 * truck.height
     work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
     return {"vehicle": np.full(1, work / (0.5 * vehicle_mass * stop.speed[0] ** 2))}
@@ -372,7 +374,7 @@ def _by_wheel_name(wheel_values: np.ndarray) -> Watched:
 
 def _while_moving(run_result: Result, wheel_values: np.ndarray) -> np.ndarray:
     """Returns values (n, W) with NaN at samples in which the vehicle is not faster than SLOWEST_SLIP_SPEED."""
-    return np.where(Stop(run_result.detail).speed[:, None] > SLOWEST_SLIP_SPEED, wheel_values, np.nan)
+    return np.where(StopHistory(run_result.detail).speed[:, None] > SLOWEST_SLIP_SPEED, wheel_values, np.nan)
 
 
 def _with_start_row(sampled_values: np.ndarray) -> np.ndarray:

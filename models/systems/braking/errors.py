@@ -27,7 +27,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 
 LARGEST_ORDER, CAREFUL_ORDER = 1.5, 1.0
 """Largest order of convergence that is assumed (order 2 is lowered by kinks of brakes and friction tables), and the
@@ -37,7 +37,7 @@ COARSE_WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a stop that are repeated with a quarter of the steps per sample, and with two steps where the sample has a
 single one.
 """
-LONGEST_REPEAT = 1.1
+LONGEST_REPEATED_RUN = 1.1
 """Longest duration of a repeated run, divided by that of the stop."""
 EQUAL_PRESSURE_SHARE = 0.01
 """Largest rms difference of the pressures of two runs, divided by the size of the pressures, at which the controller
@@ -46,7 +46,7 @@ has acted alike in both.
 STOPPING_DISTANCE = "stopping distance"
 UNIT_OF_CHANNEL = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", STOPPING_DISTANCE: "m"}
 """Channels whose error is stated, with their units."""
-LEAST_SIZES = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
+LEAST_CHANNEL_SIZES = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
 """Least size (m, rad) by which the error of a channel is divided, for vehicles that hardly leave their course."""
 STANDSTILL_NOTE = "the vehicle stands at once"
 SINGLE_RUN_NOTE = "what stands behind the port answers one run alone"
@@ -70,7 +70,7 @@ class RepeatedRuns(NamedTuple):
     commands_for_speeds: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
 
 
-Channels = dict[str, np.ndarray]
+MotionChannels = dict[str, np.ndarray]
 
 
 def with_error(run_result: Result, scene: BrakingScene, repeated_runs: RepeatedRuns) -> Result:
@@ -154,7 +154,7 @@ def commands_change_nearby(
     return _rms(plain_commands - shifted_commands) > EQUAL_PRESSURE_SHARE * reference_size(plain_commands)
 
 
-def motion_channels(braking_path: BrakingPath, times: np.ndarray) -> Channels:
+def motion_channels(braking_path: BrakingPath, times: np.ndarray) -> MotionChannels:
     """Position, yaw, speed and hitch angle of a run at times (n,) in s; constant after the end of the run."""
     positions, rates = braking_path.states[:, 0], braking_path.states[:, 1]
     motion = {
@@ -168,10 +168,10 @@ def motion_channels(braking_path: BrakingPath, times: np.ndarray) -> Channels:
     return {name: np.interp(times, braking_path.times, values) for name, values in motion.items()}
 
 
-def motion_and_distance(braking_path: BrakingPath, times: np.ndarray) -> Channels:
+def motion_and_distance(braking_path: BrakingPath, times: np.ndarray) -> MotionChannels:
     """Channels of the motion at times (n,) in s, and the stopping distance (1,) in m if the vehicle comes to rest."""
     return motion_channels(braking_path, times) | (
-        {STOPPING_DISTANCE: Stop(braking_path).way[-1:]} if braking_path.ended_at_rest else {}
+        {STOPPING_DISTANCE: StopHistory(braking_path).way[-1:]} if braking_path.ended_at_rest else {}
     )
 
 
@@ -184,7 +184,9 @@ def _runs_in_other_steps(
     end_time = float(braking_path.times[-1])
     if steps_per_sample == 1:
         return [repeat_stop(2, FINE_WINDOW * end_time)]
-    first = repeat_stop(steps_per_sample // 2, LONGEST_REPEAT * end_time if braking_path.ended_at_rest else end_time)
+    first = repeat_stop(
+        steps_per_sample // 2, LONGEST_REPEATED_RUN * end_time if braking_path.ended_at_rest else end_time
+    )
     return (
         [first, repeat_stop(steps_per_sample // 4, COARSE_WINDOW * end_time)]
         if steps_per_sample >= 4 and same_commands(braking_path, first)
@@ -265,7 +267,7 @@ def _size_of_channel(channel_name: str, channel_values: np.ndarray, run_share: f
     """Size of a channel by which its error is divided, at least LEAST_SIZES; ``run_share`` is the share of the run that
     the values cover.
     """
-    return max(reference_size(channel_values), run_share * LEAST_SIZES.get(channel_name, 0.0))
+    return max(reference_size(channel_values), run_share * LEAST_CHANNEL_SIZES.get(channel_name, 0.0))
 
 
 def _estimate_of_channel(

@@ -22,7 +22,7 @@ from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, check_way
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
-MOST_SAMPLES_AT_ONCE = 1024
+LARGEST_SAMPLE_BATCH = 1024
 """Most samples that are computed at a time where the controller's command is constant."""
 
 
@@ -117,7 +117,7 @@ class BrakedVehicle:
             np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy()
         )
         steady = self.steering is None and is_steady(controller)
-        samples_at_once = int(min(longest_duration / self.sample + 2.0, MOST_SAMPLES_AT_ONCE)) if steady else 1
+        samples_at_once = int(min(longest_duration / self.sample + 2.0, LARGEST_SAMPLE_BATCH)) if steady else 1
         record = Record(
             current_row.whole,
             np.empty((samples_at_once, current_row.whole.size)),
@@ -181,7 +181,7 @@ class BrakedVehicle:
         return moving
 
 
-def on_tyres(
+def braked_vehicle_on_tyres(
     plane_vehicle: Plane,
     tyres: Sequence[TyreTable],
     brakes: Brakes,

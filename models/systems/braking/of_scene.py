@@ -19,9 +19,15 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
 from models.core.scene_file import parse
 from models.core.strict import read
-from models.systems.braking.march import BrakedVehicle, on_tyres
+from models.systems.braking.march import BrakedVehicle, braked_vehicle_on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
-from models.systems.braking.scene import MOST_SUBSTEPS, BrakeTable, BrakingScene, Procedure, Stretch
+from models.systems.braking.scene import (
+    LARGEST_SUBSTEP_COUNT,
+    AxleBrakeTable,
+    BrakingProcedure,
+    BrakingScene,
+    RoadStretch,
+)
 from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, table_from_file, table_of_named_tyre
 from models.tyre.tyre_table import TyreTable
 
@@ -29,7 +35,7 @@ SPRUNG_ENGINE = "mujoco"
 """Engine of a vehicle on its suspension where the user names none."""
 
 
-def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
+def braked_vehicle(scene: BrakingScene, procedure: BrakingProcedure) -> BrakedVehicle:
     """Build the scene's vehicle with its brakes on the road of a procedure. Raises InputError for inconsistent
     parts.
     """
@@ -44,7 +50,7 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
     on_front_unit = np.arange(plane.wheels) < 2
-    vehicle = on_tyres(
+    vehicle = braked_vehicle_on_tyres(
         plane,
         [tyre_table_of(scene, name, kind) for name in names for kind in kinds],
         of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
@@ -73,11 +79,13 @@ def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest_relaxation
     longest = longest_step(vehicle.slope, lively, shortest_relaxation_length)
     if vehicle.sample / vehicle.substeps > longest:
         least_substeps = math.ceil(vehicle.sample / longest)
-        if least_substeps > MOST_SUBSTEPS:
+        if least_substeps > LARGEST_SUBSTEP_COUNT:
             length = (
-                shortest_relaxation_length * (vehicle.sample / (MOST_SUBSTEPS * longest)) ** 2
+                shortest_relaxation_length * (vehicle.sample / (LARGEST_SUBSTEP_COUNT * longest)) ** 2
             )  # longest goes with its root
-            allowed = f"must be at least {1.01 * length:.2g} m: shorter ones need more than {MOST_SUBSTEPS} substeps"
+            allowed = (
+                f"must be at least {1.01 * length:.2g} m: shorter ones need more than {LARGEST_SUBSTEP_COUNT} substeps"
+            )
             raise InputError(scene.file, "relaxation", shortest_relaxation_length, allowed)
         allowed = f"must be at least {least_substeps}: at rest the vehicle rocks up on tyres of so short a [relaxation]"
         raise InputError(scene.file, "run.substeps", vehicle.substeps, allowed)
@@ -170,19 +178,19 @@ def merged_tables(base_tables: Mapping[str, Any], changed_values: Mapping[str, A
     return new
 
 
-def surfaces_of_stretch(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
+def surfaces_of_stretch(procedure: BrakingProcedure, stretch: RoadStretch) -> tuple[str, str]:
     """Names of the surfaces left and right of the line on a stretch; a split procedure may name the right surface."""
     return stretch.left, procedure.right or stretch.right or stretch.left
 
 
-def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
+def surfaces_of(scene: BrakingScene, procedure: BrakingProcedure) -> list[str]:
     """Names of all surfaces of the road of a procedure, without repetition."""
     return list(
         dict.fromkeys(name for stretch in scene.road.stretches for name in surfaces_of_stretch(procedure, stretch))
     )
 
 
-def road_of(scene: BrakingScene, procedure: Procedure, surface_names: list[str]) -> Road:
+def road_of(scene: BrakingScene, procedure: BrakingProcedure, surface_names: list[str]) -> Road:
     """Returns the road of a procedure, with surfaces numbered by their index in ``surface_names``."""
     stretches = [
         NumberedStretch(s.x, *(surface_names.index(name) for name in surfaces_of_stretch(procedure, s)))
@@ -233,7 +241,7 @@ def tyre_tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
 
 def brake_of(scene: BrakingScene, axle_name: str) -> Brake:
     """Returns the law of torque over pressure of the brakes of "front", "rear" or "trailer"."""
-    brake: BrakeTable = getattr(scene.brakes, axle_name)
+    brake: AxleBrakeTable = getattr(scene.brakes, axle_name)
     return read(
         Brake,
         {

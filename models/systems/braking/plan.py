@@ -10,7 +10,7 @@ from models.core.finding import Finding
 from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.braking.assumptions import assumptions
 from models.systems.braking.of_scene import braked_vehicle, controller_of, sprung_of, surfaces_of, vehicle_of
-from models.systems.braking.procedures import engines_of, port_of, vehicle_and_start
+from models.systems.braking.procedures import engines_of, port_run_of, vehicle_and_start_state
 from models.systems.braking.scene import BrakingScene
 from models.tyre.tyre_source import SURFACE_NAMES
 from models.vehicles.plausible import (
@@ -36,7 +36,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """
     _check_parts(scene, engines_of(scene, engines))
     for name in scene.procedures:
-        vehicle_and_start(scene, name)
+        vehicle_and_start_state(scene, name)
 
 
 def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -49,7 +49,7 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         controller_of(scene, vehicle.plane.wheels, name)
         if scene.port is not None:
             for engine in engines:
-                check_port(scene.port, port_of(scene, name, vehicle, engine))
+                check_port(scene.port, port_run_of(scene, name, vehicle, engine))
     if scene.port is not None and scene.port.log is not None:
         _check_log(scene, scene.port.log, len(engines))
 

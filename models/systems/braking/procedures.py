@@ -17,7 +17,7 @@ from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError
 from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked_vehicle, controller_of
-from models.systems.braking.scene import BrakingScene, Procedure
+from models.systems.braking.scene import BrakingProcedure, BrakingScene
 
 UNBRAKED_DURATION = 4.0
 """Time (s) after the last steering knot over which the yaw response without brakes is computed."""
@@ -35,7 +35,7 @@ STEADY_ACCELERATION = 1e-6
 """Largest residual acceleration (m/s^2 and rad/s^2) of a steady turn."""
 
 
-def vehicle_and_start(scene: BrakingScene, procedure_name: str) -> tuple[BrakedVehicle, StartState]:
+def vehicle_and_start_state(scene: BrakingScene, procedure_name: str) -> tuple[BrakedVehicle, StartState]:
     """Returns vehicle and start state of a procedure. Raises InputError for a circle that the tyres' side forces cannot
     hold.
     """
@@ -55,16 +55,16 @@ def vehicle_and_start(scene: BrakingScene, procedure_name: str) -> tuple[BrakedV
     return replace(vehicle, steer=steering(0.0), steering=steering if procedure.steering else None), start
 
 
-def steering_of(procedure: Procedure, vehicle: BrakedVehicle) -> Steering:
+def steering_of(procedure: BrakingProcedure, vehicle: BrakedVehicle) -> Steering:
     """Returns the driver's steering over time from time 0 on; a single angle is applied at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     knot_times, angles = np.array(knots, float).T
     return Steering(knot_times, angles, steer_angles(vehicle, 1.0))
 
 
-def step_steer(scene: BrakingScene, procedure_name: str) -> YawResponse | None:
+def step_steer_response(scene: BrakingScene, procedure_name: str) -> YawResponse | None:
     """Computes the yaw rate's response to the steering of a J-turn without brakes; None where it does not settle."""
-    vehicle, start = vehicle_and_start(scene, procedure_name)
+    vehicle, start = vehicle_and_start_state(scene, procedure_name)
     steering = steering_of(scene.procedures[procedure_name], vehicle)
     path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED_DURATION)
     return yaw_response(path.times, path.states[:, 1, 2], steering.half)
@@ -93,7 +93,10 @@ def controlled_run(
     usual = controller_of(scene, vehicle.plane.wheels, procedure_name)
     if scene.port is None:
         return vehicle.run(usual, start_state, scene.run.duration)
-    with controller_of_run(scene.port, port_of(scene, procedure_name, vehicle, engine), usual) as (controller, clock):
+    with controller_of_run(scene.port, port_run_of(scene, procedure_name, vehicle, engine), usual) as (
+        controller,
+        clock,
+    ):
         path = vehicle.run(controller, start_state, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 
@@ -113,7 +116,7 @@ def controller_commands(
     with ExitStack() as stack:
         if scene.port is not None:
             usual, _ = stack.enter_context(
-                controller_of_run(scene.port, port_of(scene, procedure_name, vehicle, "reference"), usual)
+                controller_of_run(scene.port, port_run_of(scene, procedure_name, vehicle, "reference"), usual)
             )
         known = speeds if vehicle.speed_given else np.full(speeds.shape, np.nan)
         commands = [
@@ -123,7 +126,7 @@ def controller_commands(
     return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
-def port_of(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
+def port_run_of(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
     """Returns the facts of a run that the port needs. The key of a log depends on vehicle and procedure, not on the
     controller.
     """
@@ -147,7 +150,7 @@ def steer_angles(vehicle: BrakedVehicle, front_angle: float) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyTurn:
+class SteadyCircle:
     """A steady circle: steer angles (W,) in rad, and a start state in which the towing vehicle heads along x."""
 
     steer: np.ndarray
@@ -206,14 +209,14 @@ class CircleMotion:
         unknown: np.ndarray = root(self.residual_accelerations, unknowns_guess, tol=1e-12).x
         return unknown, bool(np.abs(self.residual_accelerations(unknown)).max() <= STEADY_ACCELERATION)
 
-    def steady_turn(self, unknowns: np.ndarray) -> SteadyTurn:
+    def steady_turn(self, unknowns: np.ndarray) -> SteadyCircle:
         """Returns the steady turn for given unknowns, with which a procedure begins."""
-        return SteadyTurn(
+        return SteadyCircle(
             steer_angles(self.vehicle, unknowns[0]), StartState(self.state(unknowns), self.motion(unknowns)[1])
         )
 
 
-def steady_turn(vehicle: BrakedVehicle, speed: float, turn_radius: float) -> SteadyTurn | None:
+def steady_turn(vehicle: BrakedVehicle, speed: float, turn_radius: float) -> SteadyCircle | None:
     """Solve the steady circle of a vehicle (see ``CircleMotion``) at a speed (m/s) and radius (m); None if there is
     none.
 

@@ -12,7 +12,7 @@ from models.systems.braking.assumptions import assumptions
 from models.systems.braking.errors import RepeatedRuns, with_error
 from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
 from models.systems.braking.of_scene import suspended_in_engine
-from models.systems.braking.procedures import controlled_run, controller_commands, engines_of, vehicle_and_start
+from models.systems.braking.procedures import controlled_run, controller_commands, engines_of, vehicle_and_start_state
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import wheel_names
 
@@ -30,7 +30,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     """
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
-    vehicle, start = vehicle_and_start(scene, name)
+    vehicle, start = vehicle_and_start_state(scene, name)
     vehicle = vehicle_in_engine(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:

@@ -32,7 +32,7 @@ def wheel_names(wheel_count: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopHistory:
     """Time histories of a braking run for the centre of mass of the towing vehicle, along and across its path.
 
     times, speed, way, side_slip (n,): s, m/s, m, rad; lateral_acceleration (n - 1,): m/s^2 to the left; lengths (n -

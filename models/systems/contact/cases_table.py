@@ -32,7 +32,7 @@ from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, tab
 from models.core.whole_files import whole_file
 from models.ensemble.runner import values_in_order
 from models.ensemble.store import Arrays, Store
-from models.systems.contact.scene import Method
+from models.systems.contact.scene import ContactMethod
 
 MOTION_COLUMNS = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
 BY_AXES = {"a": METRES, "b": METRES, **MOTION_COLUMNS}
@@ -59,17 +59,17 @@ ERROR_COLUMNS = slice(6, 10)
 """Columns of the output that hold errors."""
 ROWS_PER_BLOCK = 10_000
 """Rows of an output file that are read at once, and most rows that a result contains."""
-BLOCKS_IN_ADVANCE = 8
+LARGEST_BLOCKS_IN_ADVANCE = 8
 """Most blocks of rows that are computed in advance of the block being written."""
-Build = Callable[[Array, Array], Any]
+BuildContacts = Callable[[Array, Array], Any]
 """Function that makes ``Built`` from the coefficients of friction and the loads (N) of some rows."""
 
 
 def solve_table(
     cases_path: Path,
     output_path: Path,
-    build_contacts: Build,
-    contact_method: Method,
+    build_contacts: BuildContacts,
+    contact_method: ContactMethod,
     report_row_count: Callable[[int], None] = lambda rows: None,
     *,
     with_errors: bool = True,
@@ -97,7 +97,9 @@ def solve_table(
             else tuple(head for head in OUTPUT_HEADINGS if head not in OUTPUT_HEADINGS[ERROR_COLUMNS])
         )
         file.write(",".join(heads) + "\n")
-        for block, answers in values_in_order(solve, chain(first, reading), executor, block_store, BLOCKS_IN_ADVANCE):
+        for block, answers in values_in_order(
+            solve, chain(first, reading), executor, block_store, LARGEST_BLOCKS_IN_ADVANCE
+        ):
             wrong = dict(zip(answers["wrong"].tolist(), answers["why"].tolist(), strict=True))
             rows = enumerate(zip(block.lines, answers["forces"].tolist(), strict=True))
             file.writelines(_output_line(line, row, wrong.get(i)) for i, (line, row) in rows)
@@ -107,13 +109,15 @@ def solve_table(
     return counts
 
 
-def compile_kernels(build_contacts: Build, contact_method: Method) -> None:
+def compile_kernels(build_contacts: BuildContacts, contact_method: ContactMethod) -> None:
     """Compile the contact kernels or load them from the cache, so that a time measured later is that of the rows."""
     unit = np.ones(1)
     _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION_COLUMNS, unit)}, build_contacts, contact_method)
 
 
-def solved_rows(row_block: RowBlock, build_contacts: Build, contact_method: Method, with_errors: bool) -> Arrays:
+def solved_rows(
+    row_block: RowBlock, build_contacts: BuildContacts, contact_method: ContactMethod, with_errors: bool
+) -> Arrays:
     """Solve a block of rows. Returns ``forces`` (rows, columns), the indices ``wrong`` (m,) of refused rows, and the
     reasons ``why`` (m,).
     """
@@ -163,7 +167,10 @@ def _forces_of_rows(
 
 
 def _forces(
-    columns_by_name: dict[str, Any], build_contacts: Build, contact_method: Method, with_errors: bool = True
+    columns_by_name: dict[str, Any],
+    build_contacts: BuildContacts,
+    contact_method: ContactMethod,
+    with_errors: bool = True,
 ) -> Array:
     """Creep forces, moment, stick share, dissipation and errors by FASTSIM, shape (rows, columns). Raises InputError if
     a row is outside the range of the theory.
@@ -198,7 +205,7 @@ def _force_errors(
     a: Array,
     b: Array,
     spin_share_of_creepage: Array,
-    contact_method: Method,
+    contact_method: ContactMethod,
 ) -> list[Array]:
     """Errors of the cells and of the theory in the forces (N), then in the moments (N m). friction_limit : mu N; share
     : share of the creepage that is due to spin.

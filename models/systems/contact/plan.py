@@ -28,9 +28,9 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     """Returns a doubt for every radius of curvature that is not large compared with the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
-    from models.systems.contact.run import hertz_of
+    from models.systems.contact.run import hertzian_contact
 
-    area = hertz_of(scene)
+    area = hertzian_contact(scene)
     doubts = list[Finding]()
     for name, radius in scene.radii:
         axis = float(area.a if name.endswith("x") else area.b)

@@ -44,7 +44,7 @@ from models.systems.contact.cases_table import column_sizes, compile_kernels, fi
 from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
-BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
+BUILT_IN_PROFILES = {"wheel": WHEELS, "rail": RAILS}
 FORCES_OF_ROLLED = attrgetter("fx", "fy", "mz", "stick", "dissipation")
 ERRORS_OF_ROLLED = attrgetter("cells", "theory", "moment_cells", "moment_theory")
 CONTACT_CHANNELS = {
@@ -65,7 +65,7 @@ CONTACT_CHANNELS = {
 this order.
 """
 FIELD_UNITS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
-CELL_POWER = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
+ERROR_ORDER_OF_CELLS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
 """Power of the number of cells along an axis with which the work of a call grows, by theory; in the exact theory each
 cell acts on every other cell.
 """
@@ -131,7 +131,7 @@ def run(
         if answers is None:
             raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
         return _table_result(scene, answers, report_progress, error)
-    motions, cells = creepages(scene), scene.method.cells
+    motions, cells = swept_creepages(scene), scene.method.cells
     report_progress("loading", 0.0)
     shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
@@ -153,7 +153,11 @@ def run(
 
 
 def _labelled_result(scene: ContactScene, contact_results: ContactResults, run_seconds: float) -> Result:
-    contact, count, power = contact_results.contact, len(contact_results.motions), CELL_POWER[scene.method.name]
+    contact, count, power = (
+        contact_results.contact,
+        len(contact_results.motions),
+        ERROR_ORDER_OF_CELLS[scene.method.name],
+    )
     errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in contact_results.errors] or [()] * count
     rows = zip(contact_results.motions, map(FORCES_OF_ROLLED, contact_results.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *errors_of_forces] for motion, forces, errors_of_forces in rows]).T
@@ -181,7 +185,7 @@ def _labelled_result(scene: ContactScene, contact_results: ContactResults, run_s
     )
 
 
-def cells_of(scene: ContactScene, contact_results: ContactResults) -> Result | None:
+def fields_by_cell(scene: ContactScene, contact_results: ContactResults) -> Result | None:
     """Result with pressure and tractions (Pa) in every cell in contact at the last creepage, patch after patch; None if
     ``run`` was called without fields.
     """
@@ -197,7 +201,7 @@ def cells_of(scene: ContactScene, contact_results: ContactResults) -> Result | N
 
 def _table_result(scene: ContactScene, output_path: Path, report_progress: Progress, estimate_error: bool) -> Result:
     """Solve the scene's table of cases, and write the forces to a file; the result has the first rows."""
-    built = partial(table_contacts, scene)
+    built = partial(inputs_of_table_contacts, scene)
     compile_kernels(built, scene.method)  # no part of the time below
     start = time.perf_counter()
     counts = _solved_table(scene, output_path, built, report_progress, estimate_error)
@@ -247,12 +251,12 @@ def _count_rows(report_progress: Progress, total_rows: int, finished_rows: int) 
     report_progress(f"{finished_rows:,} of {total_rows:,} rows", min(finished_rows / max(total_rows, 1), 1.0))
 
 
-def table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
+def inputs_of_table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
     """Inputs of the contacts in the rows of a table of cases, with the scene's materials and effects."""
     return extended_by_effects(Built(scene.pair, friction, load), scene)
 
 
-def scene_contact(scene: ContactScene) -> Built:
+def inputs_of_scene_contact(scene: ContactScene) -> Built:
     """Inputs of a scene's contact (materials, friction, load or approach, profiles), changed by the scene's effects."""
     table = scene.contact
     assert table is not None
@@ -265,7 +269,7 @@ def scene_contact(scene: ContactScene) -> Built:
 
 def solved_contact(scene: ContactScene) -> RollingContact:
     """Solve the normal problem of a scene's contact. Returns the contact, ready to roll by the scene's theory."""
-    method, built = scene.method, scene_contact(scene)
+    method, built = scene.method, inputs_of_scene_contact(scene)
     friction, pair = built.friction, built.pair
     if built.falling is not None and method.name != "fastsim":
         raise InputError(
@@ -276,27 +280,27 @@ def solved_contact(scene: ContactScene) -> RollingContact:
         )
     if scene.profiles is not None:
         with scene_errors(scene):
-            patches = [touch.patch for touch in touching_places(scene, built)]
+            patches = [touch.patch for touch in touching_points(scene, built)]
             pressed = press(patches, pair, load=built.load, approach=built.approach)
             exact = method.name == "exact"
             return Exact(pressed, friction, method.cells) if exact else Simplified(pressed, friction)
-    hertz = hertz_of(scene)
+    hertz = hertzian_contact(scene)
     if method.name == "simplified":
-        return Simplified(interpenetrating(hertz, pair), friction)
+        return Simplified(interpenetration_contact(hertz, pair), friction)
     if method.name == "fastsim":
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
         return Fastsim(hertz, friction, pair, **choices, falling=built.falling)
     return (LinearTheory if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
 
 
-def creepages(scene: ContactScene) -> list[Motion]:
+def swept_creepages(scene: ContactScene) -> list[Motion]:
     """Creepages (xi_x, xi_y, spin) of a scene, with spin in 1/m: a single triple, or one for each value of [sweep]."""
     fixed = scene.creepage.model_dump()
     values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
     return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
-def interpenetrating(
+def interpenetration_contact(
     hertz_contact: Hertz, material_pair: MaterialPair, simplified_options: SimplifiedOptions = PLAIN
 ) -> NormalContact:
     """Solve the normal problem of a Hertzian contact by the simplified theory of 1983 (interpenetration), on a
@@ -307,7 +311,7 @@ def interpenetrating(
     return press(quadratic(A, B, x, y), material_pair, load=float(hertz_contact.load), options=simplified_options)
 
 
-def touching_places(scene: ContactScene, built_contact: Built) -> list[TouchingPlace]:
+def touching_points(scene: ContactScene, built_contact: Built) -> list[TouchingPlace]:
     """Points at which the profiles of wheel and rail touch."""
     p = scene.profiles
     assert p is not None
@@ -325,20 +329,24 @@ def _profile_by_name(scene: ContactScene, wheel_or_rail: Literal["wheel", "rail"
     """Returns the profile of "wheel" or "rail": a built-in profile, or the profile in the user's file."""
     assert scene.profiles is not None
     name = getattr(scene.profiles, wheel_or_rail)
-    if name in BUILT_IN[wheel_or_rail]:
+    if name in BUILT_IN_PROFILES[wheel_or_rail]:
         return built_in(name)
     if "." not in name:
         raise InputError(
-            scene.file, f"profiles.{wheel_or_rail}", name, "must be a file or built in", tuple(BUILT_IN[wheel_or_rail])
+            scene.file,
+            f"profiles.{wheel_or_rail}",
+            name,
+            "must be a file or built in",
+            tuple(BUILT_IN_PROFILES[wheel_or_rail]),
         )
     return read_profile(
         scene.path(name, f"profiles.{wheel_or_rail}"), wheel_or_rail, smoothing=scene.profiles.smoothing
     )
 
 
-def hertz_of(scene: ContactScene) -> Hertz:
+def hertzian_contact(scene: ContactScene) -> Hertz:
     """Solve the Hertzian contact of a scene from semi-axes, curvatures or radii, under a load or at an approach."""
-    built = scene_contact(scene)
+    built = inputs_of_scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:
         return by_axes(scene.ellipse.a, scene.ellipse.b, pair, load=load, approach=approach)

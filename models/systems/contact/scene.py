@@ -20,28 +20,28 @@ GEOMETRY_TABLES = ("ellipse", "curvatures", "radii", "profiles", "cases")
 """Scene tables that describe the geometry of the contact; a scene has exactly one of them."""
 
 
-class Bodies(Strict):
+class WheelRailBodies(Strict):
     """[bodies]: elastic constants of wheel and rail, by default steel."""
 
     wheel: Material = Field(default=STEEL, description="E in Pa and nu of body 1")
     rail: Material = Field(default=STEEL, description="E in Pa and nu of body 2")
 
 
-class Ellipse(Strict):
+class ContactEllipse(Strict):
     """[ellipse]: semi-axes of the contact area."""
 
     a: float = quantity("m", "semi-axis along x, the direction of rolling")
     b: float = quantity("m", "semi-axis along y")
 
 
-class Curvatures(Strict):
+class ContactCurvatures(Strict):
     """[curvatures]: coefficients A and B of the undeformed distance A x^2 + B y^2 between the bodies."""
 
     A: float = quantity("1/m", "curvature along x, half the sum of both bodies' curvatures")
     B: float = quantity("1/m", "curvature along y, half the sum of both bodies' curvatures")
 
 
-class Radii(Strict):
+class CurvatureRadii(Strict):
     """[radii]: radii of curvature of both bodies, positive where convex; flat in a direction without a radius."""
 
     wheel_x: float | None = quantity("m", "rolling radius of the wheel", default=None, signed=True)
@@ -73,7 +73,7 @@ class Radii(Strict):
         return curvature_pair[0], curvature_pair[1]
 
 
-class Profiles(Strict):
+class WheelRailProfiles(Strict):
     """[profiles]: cross-sections of wheel and rail, and their position relative to each other."""
 
     wheel: str = Field(default="S1002", description="S1002, or a file of a profile")
@@ -88,13 +88,13 @@ class Profiles(Strict):
     smoothing: float = quantity("m", "wavelength of which half is left in profiles from files", default=0.0, zero=True)
 
 
-class Cases(Strict):
+class CasesFile(Strict):
     """[cases]: file of a table in which each row has a contact, its load, friction and creepages."""
 
     file: str = Field(description="CSV file, beside the scene or in the folder in which the command runs")
 
 
-class Contact(Strict):
+class ContactTable(Strict):
     """[contact]: normal load or approach of the bodies, and coefficient of friction."""
 
     load: float | None = quantity("N", "normal load, on profiles the vertical one", default=None)
@@ -102,7 +102,7 @@ class Contact(Strict):
     friction: float = quantity("", "coefficient of friction")
 
 
-class Creepage(Strict):
+class CreepageTable(Strict):
     """[creepage]: velocity of the wheel relative to the rail, divided by the rolling speed."""
 
     xi_x: float = quantity("", "longitudinal creepage", default=0.0, signed=True)
@@ -110,7 +110,7 @@ class Creepage(Strict):
     spin: float = quantity("1/m", "spin by the rolling speed", default=0.0, signed=True)
 
 
-class Sweep(Strict):
+class CreepageSweep(Strict):
     """[sweep]: range through which one creepage is varied; the other creepages are those of [creepage]."""
 
     of: Literal["xi_x", "xi_y", "spin"] = Field(description="the creepage that is swept")
@@ -125,7 +125,7 @@ class Sweep(Strict):
         return spaced(self.start, self.stop, self.count)
 
 
-class Method(Strict):
+class ContactMethod(Strict):
     """[method]: theory of the creep forces, and number of cells along each axis of the contact."""
 
     name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
@@ -155,17 +155,17 @@ class ContactScene(SceneFile):
 
     system: Literal["contact"] = "contact"
     study: str = Field(default="contact", description="the study that runs the scene")
-    bodies: Bodies = Bodies()
-    ellipse: Ellipse | None = Field(default=None, description="semi-axes of the contact area")
-    curvatures: Curvatures | None = Field(default=None, description="of the undeformed distance")
-    radii: Radii | None = Field(default=None, description="of both bodies")
-    profiles: Profiles | None = Field(default=None, description="cross-sections of wheel and rail")
-    cases: Cases | None = Field(default=None, description="a contact in every row of a file")
-    contact: Contact | None = Field(default=None, description="table with load or approach, and friction")
+    bodies: WheelRailBodies = WheelRailBodies()
+    ellipse: ContactEllipse | None = Field(default=None, description="semi-axes of the contact area")
+    curvatures: ContactCurvatures | None = Field(default=None, description="of the undeformed distance")
+    radii: CurvatureRadii | None = Field(default=None, description="of both bodies")
+    profiles: WheelRailProfiles | None = Field(default=None, description="cross-sections of wheel and rail")
+    cases: CasesFile | None = Field(default=None, description="a contact in every row of a file")
+    contact: ContactTable | None = Field(default=None, description="table with load or approach, and friction")
     falling_friction: Falling | None = Field(default=None, description="friction that falls with the speed of slip")
-    creepage: Creepage = Creepage()
-    sweep: Sweep | None = Field(default=None, description="one creepage through a range")
-    method: Method = Method()
+    creepage: CreepageTable = CreepageTable()
+    sweep: CreepageSweep | None = Field(default=None, description="one creepage through a range")
+    method: ContactMethod = ContactMethod()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     @property
@@ -192,7 +192,7 @@ def scene_errors(scene: ContactScene) -> Iterator[None]:
     except InputError as error:
         if error.file:
             raise
-        tables: dict[str, type[Strict]] = {"profiles": Profiles, "contact": Contact}
+        tables: dict[str, type[Strict]] = {"profiles": WheelRailProfiles, "contact": ContactTable}
         within = next((f"{name}." for name, keys in tables.items() if error.place in keys.model_fields), "")
         raise InputError(scene.file, f"{within}{error.place}", error.value, error.allowed, error.choices) from None
 

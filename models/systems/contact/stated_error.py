@@ -17,7 +17,7 @@ from models.core.discretisation import (
 from models.core.result import Result
 from models.systems.contact.scene import ContactScene
 
-MOST_CELLS = 400
+LARGEST_CELL_COUNT = 400
 HALVED_CELLS = "half the cells along each axis"
 BAND_TEXT = "which 95 % of such contacts keep to"
 
@@ -35,7 +35,8 @@ def with_error(
     likely = {"force": [e.likely for e in contact_errors], "mz": [e.moment_likely for e in contact_errors]}
     cells, order = scene.method.cells, min(rolling_contact.order, 1.5)
     estimates = {
-        name: grid_error(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
+        name: grid_error(finite_rms(np.array(likely[name])), *sizes[name], cells, order, LARGEST_CELL_COUNT)
+        for name in likely
     }
     if isinstance(rolling_contact, LinearTheory):
         not_estimated(run_result, "the linear theory has no cells")
@@ -57,7 +58,7 @@ def with_error_of_rows(table_result: Result, scene: ContactScene) -> Result:
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
     with_stated_errors(
         table_result,
-        {"force": grid_error(finite_rms(table_result["error_of_cells"]), force, "N", cells, order, MOST_CELLS)},
+        {"force": grid_error(finite_rms(table_result["error_of_cells"]), force, "N", cells, order, LARGEST_CELL_COUNT)},
         HALVED_CELLS,
     )
     return with_theory_error(

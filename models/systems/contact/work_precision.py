@@ -25,9 +25,9 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
 from models.systems.contact.assumptions import pressing_assumptions
-from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
+from models.systems.contact.run import Progress, hertzian_contact, inputs_of_scene_contact, interpenetration_contact
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.stated_error import MOST_CELLS
+from models.systems.contact.stated_error import LARGEST_CELL_COUNT
 
 CreepageParts = tuple[float, float, float]
 CREEPAGE_KINDS: dict[str, CreepageParts] = {
@@ -157,7 +157,7 @@ def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMot
 
 
 def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
-    pressed = interpenetrating(
+    pressed = interpenetration_contact(
         by_axes(contact_case.a, contact_case.b, contact_case.pair, load=contact_case.load), contact_case.pair
     )
     contact = Simplified(pressed, contact_case.friction)
@@ -225,14 +225,14 @@ def measure_theory(
     errors, seconds = [], []
     for case in contact_cases:
         answer, seconds_taken = _forces_and_seconds(theory_settings.rolled(case, cell_count), case.motion, repeat_count)
-        errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
+        errors.append(float(np.linalg.norm(tangential_force_of(answer) / case.limit - case.force)))
         seconds.append(seconds_taken)
     return TheoryPoint(
         theory_settings.name, cell_count, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds))
     )
 
 
-def force_of(computed_forces: Any) -> Array:
+def tangential_force_of(computed_forces: Any) -> Array:
     """Tangential force (2,) in N from what a theory returns: a tuple of forces and moment, or an object with
     ``force``.
     """
@@ -290,7 +290,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], rep
 
     creepage_levels : sizes of the creepage; at 1 the linear theory reaches mu N.
     """
-    hertz, built = hertz_of(scene), scene_contact(scene)
+    hertz, built = hertzian_contact(scene), inputs_of_scene_contact(scene)
     cases = ellipse_cases(
         float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, creepage_levels
     )
@@ -310,7 +310,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], rep
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
     with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactOnEllipse)))
-    left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
+    left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, LARGEST_CELL_COUNT)
     return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 
 

@@ -5,10 +5,10 @@ import numpy as np
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
-from models.systems.handling.run import Drive, joint_travel
+from models.systems.handling.run import SimulatedDrive, joint_travel
 
 
-def drive_energy(simulated_drive: Drive) -> np.ndarray:
+def drive_energy(simulated_drive: SimulatedDrive) -> np.ndarray:
     """Energy (m,) of a drive in J: kinetic energy from the velocities of all rigid bodies, and potential energy of
     weights, springs and tyres.
     """
@@ -19,7 +19,7 @@ def drive_energy(simulated_drive: Drive) -> np.ndarray:
     return motion + simulated_drive.ledger[:, at.POTENTIAL]
 
 
-def unaccounted_energy(simulated_drive: Drive) -> np.ndarray:
+def unaccounted_energy(simulated_drive: SimulatedDrive) -> np.ndarray:
     """Energy of a drive in J that its work does not explain: energy less its initial value, less the work done since by
     Simpson's rule.
 

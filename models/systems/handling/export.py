@@ -2,7 +2,7 @@
 
 from models.engines.export import Exported, ExportSubject, elements_left_out, export_free_vehicle
 from models.multibody.numbers import Handling
-from models.systems.handling.run import driven_by
+from models.systems.handling.run import driven_model
 from models.systems.handling.scene import HandlingScene
 
 AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
@@ -25,4 +25,4 @@ def export_handling(
     springs, tyres and other forces of the vehicle.
     """
     left_out = [*elements_left_out(handling_model.vehicle), *further_omissions]
-    return export_free_vehicle(engine, driven_by(handling_model), export_subject, left_out)
+    return export_free_vehicle(engine, driven_model(handling_model), export_subject, left_out)

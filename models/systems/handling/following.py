@@ -15,16 +15,16 @@ from models.measured.drive import MeasuredDrive
 from models.multibody.numbers import Control, Controls, Handling
 from models.systems.handling.run import drive_run
 
-ENGINE = "mujoco"
+FOLLOWING_ENGINE = "mujoco"
 SPEED_TOLERANCE = 0.002
 """Largest rms error of the speed, divided by the mean speed, at which the torques are accepted."""
-MOST_MARCHES = 8
+LARGEST_ITERATION_COUNT = 8
 """Most runs in which the torques are corrected."""
-LOW_PASS = 2.0
+LOW_PASS_FREQUENCY = 2.0
 """Cut-off frequency (Hz) of the measured speed, so that torques do not follow the sensor's noise."""
 
 
-def controls_along(
+def controls_following_drive(
     handling_model: Handling, simulated_drive: MeasuredDrive, time_step: float, measured_path: str
 ) -> Controls:
     """Compute steer angle, brake torque and drive torque over time with which the car follows a measured steer angle
@@ -36,15 +36,19 @@ def controls_along(
     """
     period = float(simulated_drive.times[1] - simulated_drive.times[0])
     stride = round(period / time_step)
-    speed = low_passed(simulated_drive.speed[:, None], period, LOW_PASS, measured_path, "manoeuvres.NAME.measured")[
-        :, 0
-    ]
+    speed = low_passed(
+        simulated_drive.speed[:, None], period, LOW_PASS_FREQUENCY, measured_path, "manoeuvres.NAME.measured"
+    )[:, 0]
     mass, radius = sum(body.mass for body in handling_model.vehicle.bodies), handling_model.vehicle.tyres[0].point[2]
     force, resistance = mass * np.gradient(speed, period), 0.0
-    for march in range(MOST_MARCHES):
+    for march in range(LARGEST_ITERATION_COUNT):
         controls = _with_torque(handling_model.controls, simulated_drive, radius * force)
         run = drive_run(
-            ENGINE, handling_model.changed(controls=controls), float(speed[0]), period * (len(speed) - 1), time_step
+            FOLLOWING_ENGINE,
+            handling_model.changed(controls=controls),
+            float(speed[0]),
+            period * (len(speed) - 1),
+            time_step,
         )
         reached = run.velocity()[::stride, 0]
         missing = speed - reached
@@ -56,7 +60,7 @@ def controls_along(
         force = force + mass * np.gradient(missing, period) + resistance * missing
     largest_miss = float(np.abs(missing).max())
     raise RunFailed(
-        ENGINE, f"no torque of the wheels gives the measured speed: it is off by up to {largest_miss:.3g} m/s"
+        FOLLOWING_ENGINE, f"no torque of the wheels gives the measured speed: it is off by up to {largest_miss:.3g} m/s"
     )
 
 

@@ -15,7 +15,7 @@ from models.vehicles.free_vehicle import SWAY, spinning
 from models.vehicles.spatial import Freedom, hitch_of
 
 if TYPE_CHECKING:
-    from models.systems.handling.run import Drive
+    from models.systems.handling.run import SimulatedDrive
 
 STABILITY_LIMIT = 2.78
 """Stability limit of the classical Runge-Kutta method on the negative real axis: step times decay rate."""
@@ -62,7 +62,7 @@ def _rotation_bounds(handling_model: Handling) -> Iterator[tuple[str, tuple[Free
         )
 
 
-def check_step(simulated_drive: "Drive", engine: str) -> None:
+def check_step(simulated_drive: "SimulatedDrive", engine: str) -> None:
     """Raise RunFailed for a time step that is too long for the tyres. Sticking bristles damp a wheel with C / u (C the
     slip stiffness, u the speed of the tread), and steps above the stability limit let the wheel oscillate.
     """

@@ -41,7 +41,7 @@ from models.vehicles.spatial_linear import mass
 if TYPE_CHECKING:
     from models.multibody.plain.rolling import PlainRolling
 
-REFERENCE = "reference"
+REFERENCE_ENGINE = "reference"
 """Name of the independent reference: plain equations that share no force with the engines. It takes half a minute for
 every simulated second.
 """
@@ -83,7 +83,7 @@ MOTION_CHANNELS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class SimulatedDrive:
     """A simulated drive. run : times, positions and rates; tyres (m, w, REPORTED) : forces and slips of each tyre;
     ledger (m, LEDGER) : energies and powers; seconds : CPU time of the run.
     """
@@ -168,7 +168,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     return _with_error(labelled, drive, driven_manoeuvre.speed) if error else labelled
 
 
-def drive_result(scene: HandlingScene, engine: str, manoeuvre_name: str, simulated_drive: Drive) -> Result:
+def drive_result(scene: HandlingScene, engine: str, manoeuvre_name: str, simulated_drive: SimulatedDrive) -> Result:
     """Returns the result of a simulated manoeuvre, with the assumptions that the drive breaks."""
     vehicle = simulated_drive.handling.vehicle
     channels = {
@@ -201,7 +201,7 @@ def drive_result(scene: HandlingScene, engine: str, manoeuvre_name: str, simulat
     return with_assumptions(labelled, assumptions(simulated_drive.handling))
 
 
-def _with_error(run_result: Result, simulated_drive: Drive, start_speed: float) -> Result:
+def _with_error(run_result: Result, simulated_drive: SimulatedDrive, start_speed: float) -> Result:
     """Returns the result with stated errors of its motion and tyre forces, estimated by runs in longer time steps and
     with other numbers of cells.
     """
@@ -230,7 +230,7 @@ class ManoeuvreRerun:
     """
 
     engine: str
-    drive: Drive
+    drive: SimulatedDrive
     speed: float
 
     @property
@@ -262,7 +262,7 @@ class ManoeuvreRerun:
         first = round(min(REPEATED_PART_START, 1.0 - run_share) * (len(run.times) - 1))
         count = max(2, round(run_share * (len(run.times) - 1) / step_factor))
         later = _manoeuvre_from(handling, run.times[first])
-        model = build(self.engine, later, Settings("RK4", step, count * step))
+        model = build_in_engine(self.engine, later, Settings("RK4", step, count * step))
         path = model.run(run.positions[first], run.rates[first])
         return principal_series(drive_of_fixed_steps(later, path, self.engine), run.times[first])
 
@@ -306,7 +306,7 @@ class ManoeuvreRerun:
         return report[:, :, [at.FX, at.FY]]
 
 
-def principal_series(simulated_drive: Drive, start_time: float = 0.0) -> Series:
+def principal_series(simulated_drive: SimulatedDrive, start_time: float = 0.0) -> Series:
     """Time series of the channels whose error is estimated, for a drive that begins at ``start_time`` (s)."""
     motion = dict(zip(UNIT_OF_CHANNEL, simulated_drive.velocity().T, strict=False))
     return Series(
@@ -334,18 +334,18 @@ def _manoeuvre_from(handling_model: Handling, start_time: float) -> Handling:
     )
 
 
-def build(engine: str, handling_model: Handling, solver_settings: Settings | None = None) -> FreeModel:
+def build_in_engine(engine: str, handling_model: Handling, solver_settings: Settings | None = None) -> FreeModel:
     """Build the vehicle in "exudyn" or "mujoco", or as the plain equations of "reference". solver_settings :
     integrator, step and duration, needed for runs only.
     """
-    if engine == REFERENCE:
+    if engine == REFERENCE_ENGINE:
         return Plain(
             engine,
             _plain_equations(handling_model).acceleration,
             len(handling_model.vehicle.coordinates()),
             solver_settings,
         )
-    division, full_forces = towed_division(handling_model, engine), driven_by(handling_model)
+    division, full_forces = towed_division(handling_model, engine), driven_model(handling_model)
     parts = (*full_forces.parts, *division.native)
     return free_model(
         engine, replace(full_forces, numbers=shared_numbers(handling_model, division), parts=parts), solver_settings
@@ -358,7 +358,7 @@ def _plain_equations(handling_model: Handling) -> "PlainRolling":
     return PlainRolling(handling_model)
 
 
-def driven_by(handling_model: Handling) -> Driven:
+def driven_model(handling_model: Handling) -> Driven:
     """Returns what an engine builds of the car: bodies, elements along joint coordinates, and all compiled forces with
     their parameters.
     """
@@ -370,24 +370,26 @@ def driven_by(handling_model: Handling) -> Driven:
 
 def drive_run(
     engine: str, handling_model: Handling, start_speed: float, duration: float, time_step: float = 1e-3
-) -> Drive:
+) -> SimulatedDrive:
     """Simulate a manoeuvre from straight rolling at a speed (m/s) for a duration (s). Raises RunFailed where the
     vehicle turns over, the step (s) is too long or the motion is not finite.
     """
-    model = build(engine, handling_model, Settings("RK4", time_step, duration))
+    model = build_in_engine(engine, handling_model, Settings("RK4", time_step, duration))
     start_time = time.process_time()
     with _failing_as_turnover(handling_model, engine):
         path = model.run(*handling_model.straight(start_speed))
     return drive_of_fixed_steps(handling_model, path, engine, time.process_time() - start_time)
 
 
-def drive_run_adaptive(engine: str, handling_model: Handling, start_speed: float, solver_settings: Settings) -> Drive:
+def drive_run_adaptive(
+    engine: str, handling_model: Handling, start_speed: float, solver_settings: Settings
+) -> SimulatedDrive:
     """Simulate a manoeuvre as ``drive_run`` does, by an integrator of "exudyn" or "reference" that chooses its own time
     steps.
     """
     from models.engines.free_vehicle_adaptive import march_adaptively
 
-    model, start_time = build(engine, handling_model), time.process_time()
+    model, start_time = build_in_engine(engine, handling_model), time.process_time()
     with _failing_as_turnover(handling_model, engine):
         path = march_adaptively(model, *handling_model.straight(start_speed), solver_settings)
     return drive_with_reports(handling_model, path, engine, time.process_time() - start_time)
@@ -408,7 +410,7 @@ def _failing_as_turnover(handling_model: Handling, engine: str) -> Iterator[None
 
 def drive_of_fixed_steps(
     handling_model: Handling, trajectory: Trajectory, engine: str = "", run_seconds: float = 0.0
-) -> Drive:
+) -> SimulatedDrive:
     """Returns the drive of a run in fixed steps, with the tyres' forces and slips. Raises RunFailed where the steps are
     too long for the tyres or the motion.
     """
@@ -420,7 +422,7 @@ def drive_of_fixed_steps(
 
 def drive_with_reports(
     handling_model: Handling, trajectory: Trajectory, engine: str = "", run_seconds: float = 0.0
-) -> Drive:
+) -> SimulatedDrive:
     """Returns the drive of a run, with the tyres' forces and slips. Raises RunFailed where a tyre's force is not
     finite, or the car turns over.
     """
@@ -428,14 +430,14 @@ def drive_with_reports(
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     check_upright(handling_model, trajectory.times, trajectory.positions, engine)
-    return Drive(handling_model, trajectory, report, ledger, run_seconds)
+    return SimulatedDrive(handling_model, trajectory, report, ledger, run_seconds)
 
 
 def _reports_of_run(handling_model: Handling, trajectory: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
     """Forces and slips of the tyres (m, w, REPORTED), and energies and powers (m, LEDGER) of a run; in the reference
     from its own equations.
     """
-    if engine == REFERENCE:
+    if engine == REFERENCE_ENGINE:
         return _plain_equations(handling_model).report(trajectory.times, trajectory.positions, trajectory.rates)
     count, tyres = len(trajectory.times), len(handling_model.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))

@@ -31,7 +31,7 @@ CONTROL_LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "driv
 """Smallest and largest value of each of the driver's controls, with its unit."""
 
 
-class HandlingVehicle(Strict):
+class HandlingVehicleTable(Strict):
     """[vehicle]: file of a vehicle whose chassis has six degrees of freedom, with a cornering stiffness for every tyre;
     it may tow trailers.
     """
@@ -42,7 +42,7 @@ class HandlingVehicle(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class TyreTable(Strict):
+class HandlingTyreTable(Strict):
     """[tyres]: parameters of wheels and tyres that are not in the vehicle file."""
 
     friction: float = quantity("", "coefficient between tyre and road", default=0.9)
@@ -61,7 +61,7 @@ class TyreTable(Strict):
     )
 
 
-class RoadTable(Strict):
+class HandlingRoadTable(Strict):
     """[road]: the rough road surface, the same for all manoeuvres that run on a rough road."""
 
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="A", description="class, its mean level")
@@ -69,7 +69,7 @@ class RoadTable(Strict):
     seed: int = Field(default=1, ge=0, le=2**62, description="of the waves")
 
 
-class RunTable(Strict):
+class HandlingRunTable(Strict):
     """[run]: time step, and which spring forces the engines compute by native elements."""
 
     step: float = quantity(
@@ -114,10 +114,10 @@ class HandlingScene(SceneFile):
 
     system: str = Field(default="handling", pattern="^handling$")
     study: str = Field(default="handling", description="the study that runs the scene")
-    vehicle: HandlingVehicle = HandlingVehicle()
-    tyres: TyreTable = TyreTable()
-    road: RoadTable = RoadTable()
-    run: RunTable = RunTable()
+    vehicle: HandlingVehicleTable = HandlingVehicleTable()
+    tyres: HandlingTyreTable = HandlingTyreTable()
+    road: HandlingRoadTable = HandlingRoadTable()
+    run: HandlingRunTable = HandlingRunTable()
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
@@ -136,9 +136,9 @@ class HandlingScene(SceneFile):
         if not self.manoeuvres[manoeuvre_name].measured:
             return car
         if manoeuvre_name not in self._measured_controls:
-            from models.systems.handling.following import controls_along
+            from models.systems.handling.following import controls_following_drive
 
-            self._measured_controls[manoeuvre_name] = controls_along(
+            self._measured_controls[manoeuvre_name] = controls_following_drive(
                 car, self.drive(manoeuvre_name), self.run.step, self.file
             )
         return car.changed(controls=self._measured_controls[manoeuvre_name])

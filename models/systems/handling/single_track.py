@@ -21,7 +21,7 @@ from models.vehicles.spatial import SpatialVehicle, hitch_of
 
 
 @dataclass(frozen=True)
-class SteadyTurn:
+class SteadyTurnGains:
     """Steady turn per rad of steer angle: yaw rate (rad/s) and lateral velocity (m/s) at the common centre of mass.
 
     ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
@@ -35,7 +35,7 @@ class SteadyTurn:
     towed_headings: tuple[float, ...] = ()
 
 
-def steady_turn(handling_model: Handling, speed: float) -> SteadyTurn:
+def steady_turn_gains(handling_model: Handling, speed: float) -> SteadyTurnGains:
     """Solve the steady turn of the linear single-track model at a speed (m/s), with the static wheel loads."""
     vehicle = handling_model.vehicle
     mass = sum(body.mass for body in vehicle.bodies)
@@ -59,7 +59,7 @@ def steady_turn(handling_model: Handling, speed: float) -> SteadyTurn:
     side, yaw, *headings = np.linalg.solve(matrix, steered).tolist()
     coordinates = [tyre.point[0] for tyre in vehicle.tyres if vehicle.towed_under(tyre.body) is None]
     wheelbase = max(coordinates) - min(coordinates)
-    return SteadyTurn(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
+    return SteadyTurnGains(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
 
 
 def _force_balances(

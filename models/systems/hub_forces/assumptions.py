@@ -8,8 +8,8 @@ from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import Angles, element_travels
-from models.systems.hub_forces.scene import HubScene, Road
+from models.systems.hub_forces.measurement import MeasuredAngles, element_travels
+from models.systems.hub_forces.scene import HubScene, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 
 _SMOOTHER_ROAD_ADVICE = (
@@ -43,7 +43,7 @@ the change of vertical speed (m/s) that a rough road may cause between the ends 
 
 
 def assumptions(
-    scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: Angles | None = None
+    scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: MeasuredAngles | None = None
 ) -> list[Assumption]:
     """Assumptions of a run with a stabiliser (``stabiliser_method``), or of the run on tyres over the road (ON_TYRES).
 
@@ -130,7 +130,7 @@ def _pressing_assumptions(vehicle: CutVehicle, largest_pull: float) -> list[Assu
 
 
 def _assumptions_on_forces(
-    scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: Angles | None
+    scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: MeasuredAngles | None
 ) -> list[Assumption]:
     """Assumptions of a vehicle driven by measured hub forces: it stays upright, forces are balanced and sampled fast
     enough.
@@ -201,7 +201,7 @@ def carried_weight_share(vertical_forces: np.ndarray, vehicle: CutVehicle, durat
     return np.array([1.0 + np.sign(excess) * max(abs(excess) - ROUGH_ROAD_SPEED_CHANGE / (GRAVITY * duration), 0.0)])
 
 
-def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
+def _sampling_assumption(scene: HubScene, road: TwoTrackRoadTable) -> Assumption:
     """Assumption that a virtual measurement samples fast enough to resolve the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
@@ -216,7 +216,7 @@ def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
     )
 
 
-def _angle_differences(run_result: Result, measured_angles: Angles | None) -> Watched:
+def _angle_differences(run_result: Result, measured_angles: MeasuredAngles | None) -> Watched:
     """Roll and pitch (rad) of a run minus the measured angles, by name."""
     assert measured_angles is not None
     angle_times = measured_angles.period * np.arange(len(measured_angles.samples))

@@ -10,25 +10,25 @@ from models.core.discretisation import with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.fatigue.damage import damage_ratio
-from models.systems.hub_forces.run import MOTION_CHANNELS, Measurement, labelled_result, measure
+from models.systems.hub_forces.run import MOTION_CHANNELS, HubMeasurement, labelled_result, measure
 from models.systems.hub_forces.run import run as run_scene
-from models.systems.hub_forces.scene import HubScene, Method
+from models.systems.hub_forces.scene import HubScene, StabiliserMethod
 
 Progress = Callable[[str, float], None]
 FREE_RUN, FILTERED_RUN, PRESCRIBED_RUN = "free", "filter", "prescribed"
-METHOD_OF_RUN: dict[str, Method] = {FREE_RUN: "none", FILTERED_RUN: "kalman", PRESCRIBED_RUN: "prescribed"}
+METHOD_OF_RUN: dict[str, StabiliserMethod] = {FREE_RUN: "none", FILTERED_RUN: "kalman", PRESCRIBED_RUN: "prescribed"}
 """Compared runs by name, with the stabiliser of each."""
 DRIFT_OFF_ANGLE = 0.05
 """Error of roll or pitch (rad) beyond which a run has drifted off, as in the study of the pitch plane."""
 
 
 @dataclass(frozen=True)
-class Comparison:
+class StabiliserComparison:
     """Compared runs of a measurement. runs : results by name; failed : reasons of failed runs by name; truth : the true
     run, None where it is not known.
     """
 
-    measurement: Measurement
+    measurement: HubMeasurement
     runs: dict[str, Result]
     failed: dict[str, str]
     truth: Result | None
@@ -94,9 +94,9 @@ class Comparison:
         return max(float(np.abs(run.detail.states[:rows] - first[:rows]).max()) for run in comparable)
 
 
-def compare(
+def compare_stabilisers(
     scene: HubScene, engines: tuple[str, ...], report_progress: Progress = lambda text, part: None
-) -> Comparison:
+) -> StabiliserComparison:
     """Run the scene's stabiliser in every engine, and the other stabilisers in the last engine, which is the fastest.
 
     Raises RunFailed where even the run with the Kalman filter fails, or where the step is too long for the springs.
@@ -115,10 +115,10 @@ def compare(
             if name == FILTERED_RUN:  # what the others are compared with
                 raise
             failed[name] = str(error)
-    return Comparison(measurement, runs, failed, _true_run(measurement, last_engine))
+    return StabiliserComparison(measurement, runs, failed, _true_run(measurement, last_engine))
 
 
-def _true_run(measurement: Measurement, engine: str) -> Result | None:
+def _true_run(measurement: HubMeasurement, engine: str) -> Result | None:
     """Returns the true run of a virtual measurement as a result with its stated errors; None for measured files."""
     if measurement.truth is None:
         return None
@@ -126,7 +126,7 @@ def _true_run(measurement: Measurement, engine: str) -> Result | None:
     return with_stated_errors(run, measurement.errors, "runs in longer steps") if measurement.errors else run
 
 
-def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
+def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[StabiliserMethod, str]]:
     """Returns stabiliser and engine of every run by the run's name. Runs with a stabiliser in the last engine have a
     name without the engine.
     """

@@ -42,7 +42,7 @@ class HubForces:
 
 
 @dataclass(frozen=True)
-class Angles:
+class MeasuredAngles:
     """Measured angles. samples (m, 4) : roll, pitch (rad) and their rates (rad/s), the first at t = 0; period : time
     (s) between samples.
     """
@@ -50,7 +50,9 @@ class Angles:
     samples: np.ndarray
     period: float
 
-    def with_noise(self, noise_deviations: tuple[float, float], noise_seed: int, noise_path: int = 0) -> "Angles":
+    def with_noise(
+        self, noise_deviations: tuple[float, float], noise_seed: int, noise_path: int = 0
+    ) -> "MeasuredAngles":
         """Returns the angles with white noise on every sample; noise_deviations : of angles (rad) and of rates
         (rad/s).
         """
@@ -58,7 +60,7 @@ class Angles:
         return replace(self, samples=self.samples + noise * np.repeat(noise_deviations, 2))
 
 
-def two_tracks(
+def road_under_wheels(
     vehicle: CutVehicle,
     left_profile: RoadProfile,
     right_profile: RoadProfile,
@@ -99,12 +101,12 @@ def element_travels(vehicle: CutVehicle, hub_run: HubRun) -> dict[str, np.ndarra
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 
 
-def recorded_measurement(hub_run: HubRun, force_frame: str, steps_per_sample: int) -> tuple[HubForces, Angles]:
+def recorded_measurement(hub_run: HubRun, force_frame: str, steps_per_sample: int) -> tuple[HubForces, MeasuredAngles]:
     """Hub forces and angles of a run as a measurement without noise, sampled at every ``steps_per_sample``-th step."""
     n, period = hub_run.states.shape[1] // 2, float(hub_run.times[1]) * steps_per_sample
     angles = hub_run.states[::steps_per_sample, [ROLL, PITCH, n + ROLL, n + PITCH]]
     wrenches = hub_run.wrenches[::steps_per_sample]
-    return HubForces(wrenches.reshape(len(wrenches), -1), period, force_frame), Angles(angles, period)
+    return HubForces(wrenches.reshape(len(wrenches), -1), period, force_frame), MeasuredAngles(angles, period)
 
 
 def hub_model(

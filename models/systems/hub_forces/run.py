@@ -25,12 +25,12 @@ from models.engines.error_control import NO_ESTIMATE
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
-from models.systems.hub_forces.measurement import Angles, HubForces, recorded_measurement, two_tracks
-from models.systems.hub_forces.scene import Frame, HubScene, Method, Road
+from models.systems.hub_forces.measurement import HubForces, MeasuredAngles, recorded_measurement, road_under_wheels
+from models.systems.hub_forces.scene import ForceFrame, HubScene, StabiliserMethod, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
 
 if TYPE_CHECKING:
-    from models.systems.hub_forces.tilt_filter import Tilt
+    from models.systems.hub_forces.tilt_filter import TiltEstimate
 
 STEP_ERROR_ORDER, LIFTING_ORDER = 4.0, 3.0
 """Orders of convergence by which step errors are estimated: that of the classical Runge-Kutta method, and the lower one
@@ -51,7 +51,7 @@ MOTION_CHANNELS = {name: (column, "rad") for name, column in ANGLES.items()} | {
 
 
 @dataclass(frozen=True)
-class Measurement:
+class HubMeasurement:
     """Hub forces and angles that drive the runs of a scene. truth : the true run on tyres; None where files are
     measured.
 
@@ -62,21 +62,21 @@ class Measurement:
     vehicle: CutVehicle
     truth: HubRun | None
     forces: HubForces
-    angles: Angles
+    angles: MeasuredAngles
     errors: dict[str, Estimate] = field(default_factory=dict)
 
     @cached_property
-    def tilt(self) -> "Tilt":
+    def tilt(self) -> "TiltEstimate":
         """The Kalman filter's estimate of roll and pitch. Raises InputError where angles and forces contradict each
         other.
         """
-        from models.systems.hub_forces.tilt_filter import Deviations, estimate
+        from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 
         scene = self.scene
-        deviations = Deviations(scene.deviations(self.vehicle), scene.angles.deviations, scene.stabilise.model)
-        return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
+        deviations = StatedDeviations(scene.deviations(self.vehicle), scene.angles.deviations, scene.stabilise.model)
+        return estimate_tilt(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
-    def hub_inputs(self, stabiliser_method: Method, time_step: float, step_count: int) -> HubInputs:
+    def hub_inputs(self, stabiliser_method: StabiliserMethod, time_step: float, step_count: int) -> HubInputs:
         """Returns the inputs of a run of ``step_count`` steps of ``time_step`` (s): hub forces, and the stabiliser that
         ``stabiliser_method`` names.
 
@@ -103,7 +103,11 @@ class Measurement:
 
 
 def inputs_with_smoothed_angles(
-    hub_inputs: HubInputs, measured_angles: Angles, time_step: float, smoothing_frequency: float, angles_path: str = ""
+    hub_inputs: HubInputs,
+    measured_angles: MeasuredAngles,
+    time_step: float,
+    smoothing_frequency: float,
+    angles_path: str = "",
 ) -> HubInputs:
     """Returns hub inputs that enforce measured roll and pitch, after a low-pass of ``smoothing_frequency`` (Hz); raises
     InputError.
@@ -122,28 +126,28 @@ def inputs_with_angles(
     return replace(hub_inputs, guide=motion.sample(0.0, time_step / 2, len(hub_inputs.hubs)))
 
 
-def measure(scene: HubScene, engine: str, estimate_error: bool = False) -> Measurement:
+def measure(scene: HubScene, engine: str, estimate_error: bool = False) -> HubMeasurement:
     """Returns the measured hub forces and angles of a scene: from files, or from a run on the road with noise added.
 
     estimate_error : whether the errors of the time steps in that run are estimated, by further runs.
     """
     vehicle, road, step = scene.cut_vehicle(), scene.road, scene.run.step
     if road is None:
-        return Measurement(scene, vehicle, None, *scene.measured(vehicle))
+        return HubMeasurement(scene, vehicle, None, *scene.measured(vehicle))
     march = (engine, scene.settings(engine), scene.run.forces)
-    true, errors = on_road(vehicle, road, scene.forces.frame, march, estimate_error and engine not in scene.engines)
+    true, errors = run_on_road(vehicle, road, scene.forces.frame, march, estimate_error and engine not in scene.engines)
     forces, angles = recorded_measurement(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
         forces = forces.with_noise(scene.deviations(vehicle), scene.seed)
     if scene.angles.noise == "white":
         angles = angles.with_noise(scene.angles.deviations, scene.seed)
-    return Measurement(scene, vehicle, true, forces, angles, errors)
+    return HubMeasurement(scene, vehicle, true, forces, angles, errors)
 
 
-def on_road(
+def run_on_road(
     vehicle: CutVehicle,
-    road: Road,
-    force_frame: Frame,
+    road: TwoTrackRoadTable,
+    force_frame: ForceFrame,
     engine_choice: tuple[str, Settings, ForceRoute],
     estimate_error: bool = False,
 ) -> tuple[HubRun, dict[str, Estimate]]:
@@ -156,7 +160,7 @@ def on_road(
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
 
     def hub_inputs(time_step: float, step_count: int) -> HubInputs:
-        return replace(two_tracks(vehicle, left, right, road.speed, time_step, step_count), frame=force_frame)
+        return replace(road_under_wheels(vehicle, left, right, road.speed, time_step, step_count), frame=force_frame)
 
     true = HubModel(engine, vehicle, hub_inputs(settings.step, settings.steps), settings, kind).run()
     return true, errors_of_steps(engine, vehicle, true, hub_inputs, force_route=kind)[0] if estimate_error else {}
@@ -244,8 +248,8 @@ def _moving_channels(
 def run(
     scene: HubScene,
     engine: str,
-    stabiliser_method: Method | None = None,
-    measurement: Measurement | None = None,
+    stabiliser_method: StabiliserMethod | None = None,
+    measurement: HubMeasurement | None = None,
     error: bool = False,
 ) -> Result:
     """Run the vehicle without tyres under its hub forces; the result's detail is the HubRun. Raises InputError,
@@ -286,7 +290,11 @@ def run(
 
 
 def labelled_result(
-    measurement: Measurement, hub_run: HubRun, engine: str, stabiliser_method: str = ON_TYRES, run_seconds: float = 0.0
+    measurement: HubMeasurement,
+    hub_run: HubRun,
+    engine: str,
+    stabiliser_method: str = ON_TYRES,
+    run_seconds: float = 0.0,
 ) -> Result:
     """Returns the result of a run: motion of the chassis, section forces of all elements, moments of the stabiliser on
     roll and pitch, and broken assumptions.

@@ -16,9 +16,9 @@ from models.core.errors import InputError
 from models.core.signals import Sampled
 from models.drift.score import DOUBTFUL_INNOVATION_LIMIT
 from models.multibody.cut_table import HubInputs
-from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.scene import Frame
-from models.systems.hub_forces.tilt_march import Noise, march
+from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
+from models.systems.hub_forces.scene import ForceFrame
+from models.systems.hub_forces.tilt_march import TiltNoise, march
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 
 INNOVATION_LIMIT = 4.0
@@ -45,7 +45,7 @@ SIGNAL_REMEDY = "check signs, units, order of the hubs and frame, or state large
 
 
 @dataclass(frozen=True)
-class Tilt:
+class TiltEstimate:
     """Output of the tilt filter. states (m, 4) : estimated roll, pitch (rad) and their rates (rad/s); deviations :
     their standard deviations; period : between samples (s); normalised_innovation : mean of the normalised innovation
     squared per measured value, 1 where the stated deviations are right; objections : to the measurement, as text.
@@ -59,7 +59,7 @@ class Tilt:
 
 
 @dataclass
-class FilterState:
+class TiltFilterState:
     """State of the tilt filter after a sample. x (4,) : estimate; p (4, 4) : its covariance; squared_innovations : sum
     and number of the normalised innovations squared; rate_variances (2, 2) : sums of the variances of the unexplained
     and of the measured rates of roll and pitch; sums (5, 4) : of innovations, as in ``tilt_march.march``.
@@ -73,7 +73,7 @@ class FilterState:
 
 
 @dataclass(frozen=True)
-class Deviations:
+class StatedDeviations:
     """Stated standard deviations of a measurement. forces (6 h,) : of each force (N) and moment (N m); angles : of the
     angles (rad) and of their rates (rad/s); model : of the acceleration that a rigid vehicle does not have (rad/s^2).
     """
@@ -93,7 +93,7 @@ class TiltFilter:
         vehicle: CutVehicle,
         force_frame: str,
         sample_period: float,
-        stated_deviations: Deviations,
+        stated_deviations: StatedDeviations,
         named_file: str = "",
     ) -> None:
         _check_measurement(force_frame, sample_period, stated_deviations)
@@ -101,9 +101,9 @@ class TiltFilter:
         self.forces_noise = self.rigid.turning(stated_deviations.forces)[:2, :2]
         push = np.vstack([np.eye(2) * sample_period**2 / 2, np.eye(2) * sample_period])
         process = push @ (self.forces_noise + stated_deviations.model**2 * np.eye(2)) @ push.T
-        self.noise = Noise(sample_period, process, np.repeat(stated_deviations.angles, 2) ** 2)
+        self.noise = TiltNoise(sample_period, process, np.repeat(stated_deviations.angles, 2) ** 2)
         self.inverse = np.linalg.inv(self.rigid.inertia)[:2]
-        self.state = FilterState()
+        self.state = TiltFilterState()
 
     def advance(self, hub_wrenches: np.ndarray, measured_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Filter a block of hub forces (n, 6 h) and angles (n, 4), NaN where not measured. Returns estimates (n, 4) and
@@ -206,12 +206,12 @@ class TiltFilter:
                 raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {contradiction}")
 
 
-def _check_measurement(force_frame: str, sample_period: float, stated_deviations: Deviations) -> None:
+def _check_measurement(force_frame: str, sample_period: float, stated_deviations: StatedDeviations) -> None:
     """Raise InputError for an unknown frame, and for a sampling period or deviations that are not
     above 0 and finite.
     """
-    if force_frame not in get_args(Frame):
-        raise InputError("", "frame", force_frame, "is none", get_args(Frame))
+    if force_frame not in get_args(ForceFrame):
+        raise InputError("", "frame", force_frame, "is none", get_args(ForceFrame))
     named_values = {
         "period": (sample_period,),
         "angle_deviations": stated_deviations.angles,
@@ -238,13 +238,13 @@ def _without_slope(value_columns: np.ndarray) -> np.ndarray:
     return value_columns - np.outer(line, line @ value_columns / (line @ line))
 
 
-def estimate(
+def estimate_tilt(
     vehicle: CutVehicle,
     hub_forces: HubForces,
-    measured_angles: Angles,
-    stated_deviations: Deviations,
+    measured_angles: MeasuredAngles,
+    stated_deviations: StatedDeviations,
     named_file: str = "",
-) -> Tilt:
+) -> TiltEstimate:
     """Estimate roll and pitch from measured angles and hub forces by ``TiltFilter``. Raises InputError also where no
     angle was measured.
     """
@@ -259,7 +259,7 @@ def estimate(
         raise InputError(named_file, "angles", None, "hold no number: there is nothing to follow")
     tilt_filter = TiltFilter(vehicle, hub_forces.frame, hub_forces.period, stated_deviations, named_file)
     states, spread = tilt_filter.advance(hub_forces.samples, measured_angles.samples)
-    return Tilt(states, spread, hub_forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
+    return TiltEstimate(states, spread, hub_forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
 
 
 def _wrenches_in_tilted_axes(hub_wrenches: np.ndarray, tilt_angles: np.ndarray) -> np.ndarray:
@@ -276,7 +276,7 @@ def _wrenches_in_tilted_axes(hub_wrenches: np.ndarray, tilt_angles: np.ndarray) 
 def inputs_with_moments(
     hub_inputs: HubInputs,
     vehicle: CutVehicle,
-    tilt_estimate: Tilt,
+    tilt_estimate: TiltEstimate,
     time_step: float,
     pull_bandwidth: float,
     damping_ratio: float = 0.7,

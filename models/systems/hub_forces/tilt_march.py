@@ -7,7 +7,7 @@ import numpy as np
 from models.machine.compiled import njit
 
 
-class Noise(NamedTuple):
+class TiltNoise(NamedTuple):
     """Noise settings of the tilt filter. dt : step (s); process (4, 4) : covariance that is added in every step;
     variances (4,) : of measured roll, pitch and their rates.
     """

@@ -18,7 +18,7 @@ from models.systems.measured.scene import MeasuredScene
 from models.vehicles.cut_vehicle import CutVehicle
 
 if TYPE_CHECKING:
-    from models.systems.measured.run import Examination
+    from models.systems.measured.run import RecordingAnalysis
 
 LARGEST_PULL_SHARE = 0.2
 """Largest downward force at a hub divided by the load at rest: weight and inertia of rim and tyre in the air. A larger
@@ -27,7 +27,7 @@ pull is not caused by the road.
 
 
 def assumptions(
-    scene: MeasuredScene, vehicle: CutVehicle | None, recording_analysis: "Examination | None" = None
+    scene: MeasuredScene, vehicle: CutVehicle | None, recording_analysis: "RecordingAnalysis | None" = None
 ) -> list[Assumption]:
     """Assumptions of the run whose section forces are written to files; recording_analysis : of this run, None to list
     the assumptions only.
@@ -40,7 +40,7 @@ def assumptions(
     ]
 
 
-def _transducer_range_assumption(recording_analysis: "Examination | None") -> Assumption:
+def _transducer_range_assumption(recording_analysis: "RecordingAnalysis | None") -> Assumption:
     """Assumption that transducers stay within their ranges, so that no samples pile up at an extreme value."""
 
     def clipped() -> Watched:
@@ -64,7 +64,7 @@ def _transducer_range_assumption(recording_analysis: "Examination | None") -> As
 
 
 def _cut_vehicle_assumptions(
-    scene: MeasuredScene, vehicle: CutVehicle, recording_analysis: "Examination | None"
+    scene: MeasuredScene, vehicle: CutVehicle, recording_analysis: "RecordingAnalysis | None"
 ) -> list[Assumption]:
     """Assumptions of a spatial vehicle driven by hub forces, checked on the channels of its run."""
 
@@ -125,7 +125,7 @@ def _cut_vehicle_assumptions(
 
 
 def _same_attitude_assumption(
-    scene: MeasuredScene, vehicle: CutVehicle, recording_analysis: "Examination | None"
+    scene: MeasuredScene, vehicle: CutVehicle, recording_analysis: "RecordingAnalysis | None"
 ) -> list[Assumption]:
     """Assumption that a free run has the measured roll and pitch, for forces that keep their directions in space; empty
     where neither angle was measured.

@@ -64,7 +64,7 @@ def _signal_of_entry(
     key_of_place: str,
 ) -> Signal:
     channel, at_hub = (
-        find(measurement_file, mapped_channel.channel, file_name, key_path),
+        find_channel(measurement_file, mapped_channel.channel, file_name, key_path),
         mapped_channel.at in transducer_places.hubs,
     )
     unit, unit_place = mapped_channel.unit, (file_name, f"{key_path}, unit")
@@ -106,7 +106,7 @@ def _signal_of_entry(
     )
 
 
-def find(measurement_file: Source, channel_name: str, file_name: str, key_path: str) -> Channel:
+def find_channel(measurement_file: Source, channel_name: str, file_name: str, key_path: str) -> Channel:
     """Returns the channel of a file by its name. Raises InputError, with the most similar names, if there is not
     exactly one.
     """

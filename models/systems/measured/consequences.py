@@ -3,8 +3,8 @@ finding is corrected.
 
 A finding with a size can be corrected: a late channel is shifted, a wrong factor divided out, a spike removed. The lost
 samples of a gap are unknown; instead the gap's bridge is changed by its standard deviation. The difference of both runs
-is the effect of the finding on every section force, as rms and as damage. Of a long recording ``LONGEST_RERUN`` s are
-run, about the time where the finding is worst.
+is the effect of the finding on every section force, as rms and as damage. Of a long recording
+``LONGEST_RERUN_DURATION`` s are run, about the time where the finding is worst.
 """
 
 import shutil
@@ -26,7 +26,7 @@ from models.measured.signal import Signal
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
-LONGEST_RERUN = 30.0
+LONGEST_RERUN_DURATION = 30.0
 """Longest part (s) of a recording that is run for a finding."""
 FORCE_LIMITS, DAMAGE_LIMITS = (0.05, 0.15), (0.05, 0.25)
 """Limits of the change of a section force: rms of the change divided by the rms of the force without its mean, and
@@ -36,8 +36,8 @@ NEGLIGIBLE_FORCE_SHARE = 0.02
 """Rms of a section force divided by the largest rms in the same unit, below which the force is not compared."""
 SETTLING_DURATION = 1.0
 """Time (s) at the beginning of a run that is not compared, in which the run settles."""
-Samples = dict[Signal, np.ndarray]
-Run = Callable[[Recording, Path], SectionOutcome]
+SamplesBySignal = dict[Signal, np.ndarray]
+RunRecording = Callable[[Recording, Path], SectionOutcome]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Consequence:
 def consequences(
     findings: Iterable[Finding],
     recording: Recording,
-    run_recording: Run,
+    run_recording: RunRecording,
     force_channels: Sequence[SectionChannel],
     work_folder: Path,
 ) -> tuple[Consequence, ...]:
@@ -145,13 +145,13 @@ def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
 
 def _window_of_finding(finding: Finding, recording: Recording) -> tuple[int, int]:
     """First sample and number of samples of the part of a recording that is run for a finding."""
-    count = min(recording.count, round(LONGEST_RERUN / recording.period) + 1)
+    count = min(recording.count, round(LONGEST_RERUN_DURATION / recording.period) + 1)
     middle = finding.times[0] if finding.times else 0.0
-    first = min(max(round((middle - LONGEST_RERUN / 2) / recording.period), 0), recording.count - count)
+    first = min(max(round((middle - LONGEST_RERUN_DURATION / 2) / recording.period), 0), recording.count - count)
     return first, count
 
 
-def samples_as_recording(recording: Recording, samples_by_signal: Samples, columns_folder: Path) -> Recording:
+def samples_as_recording(recording: Recording, samples_by_signal: SamplesBySignal, columns_folder: Path) -> Recording:
     """Write samples of signals into columns in ``columns_folder``, and return them as a recording."""
     columns_folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples_by_signal.values())))
@@ -185,8 +185,8 @@ def _consequence_of_most_changed_force(
 
 
 def _read_later(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     """Samples of signals corrected for a constant delay, or for a clock's drift, which grows from the start on."""
     size, count = finding.size or 0.0, len(next(iter(samples_by_signal.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / sample_period * np.ones(count)
@@ -207,22 +207,22 @@ def _read_at(sampled_values: np.ndarray, samples_later: np.ndarray) -> np.ndarra
 
 
 def _divided_by_factor(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
     return {s: samples_by_signal[s] / factor for s in signals}
 
 
 def _offset_removed(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     return {s: samples_by_signal[s] - (finding.size or 0.0) for s in signals}
 
 
 def _moments_corrected(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     force = {(s.at, s.component): s for s in samples_by_signal if s.quantity == "force" and not s.check}
     across = {"x": ("y", -1.0), "y": ("x", 1.0)}
     return {
@@ -233,15 +233,15 @@ def _moments_corrected(
 
 
 def _channels_exchanged(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     first, second = signals
     return {first: samples_by_signal[second], second: samples_by_signal[first]}
 
 
 def _without_spikes(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     """Samples of signals with spikes of one or two samples replaced by interpolation."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
@@ -252,8 +252,8 @@ def _without_spikes(
 
 
 def _bridge_varied(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: Samples, sample_period: float
-) -> Samples:
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     """Samples of signals with gaps bridged as for the run, plus or minus the bridge's standard deviation, with the sign
     alternating from gap to gap.
     """
@@ -267,7 +267,7 @@ def _bridge_varied(
     return out
 
 
-CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
+CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], SamplesBySignal, float], SamplesBySignal]] = {
     "shift": _read_later,
     "drift": _read_later,
     "gain": _divided_by_factor,

@@ -13,7 +13,7 @@ import numpy as np
 from models.core.discretisation import Estimate, estimate, estimate_rescaled, reference_size, summed_error
 from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, STEP_ERROR_ORDER
 from models.systems.measured.consequences import samples_as_recording
-from models.systems.measured.section_run import SectionOutcome, SectionRun
+from models.systems.measured.section_run import SectionOutcome, SectionRunSettings
 from models.systems.measured.section_run import run as march
 
 REPEATED_SHARE, LONGEST_REPEAT = 0.2, 30.0
@@ -23,7 +23,10 @@ longest duration (s).
 
 
 def errors_of_steps(
-    run_settings: SectionRun, run_outcome: SectionOutcome, earlier_errors: dict[str, Estimate], work_folder: Path
+    run_settings: SectionRunSettings,
+    run_outcome: SectionOutcome,
+    earlier_errors: dict[str, Estimate],
+    work_folder: Path,
 ) -> dict[str, Estimate]:
     """Estimate the errors that the time steps cause in forces of springs, mounts and bars, and in roll and pitch;
     returned by channel name.
@@ -52,7 +55,9 @@ def errors_of_steps(
     return errors
 
 
-def _principal_channels(run_settings: SectionRun, run_outcome: SectionOutcome, is_virtual: bool) -> dict[str, str]:
+def _principal_channels(
+    run_settings: SectionRunSettings, run_outcome: SectionOutcome, is_virtual: bool
+) -> dict[str, str]:
     """Names of the channels whose error is estimated, each with its element ("" for an angle), without channels that
     hardly move.
 
@@ -67,5 +72,5 @@ def _principal_channels(run_settings: SectionRun, run_outcome: SectionOutcome, i
     return {name: element for name, element in names.items() if change[name] > LEAST_CHANGE_SHARE * most[kinds[name]]}
 
 
-def _unit(run_settings: SectionRun, element_name: str) -> str:
+def _unit(run_settings: SectionRunSettings, element_name: str) -> str:
     return next(candidate.unit for candidate in run_settings.vehicle.elements if candidate.name == element_name)

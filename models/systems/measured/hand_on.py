@@ -23,7 +23,7 @@ COUNTED_FIGURES = {"least": "smallest_load", "greatest": "largest_load", "mean":
 """Channels of the result over the section forces, with the attribute of ``CountedLoad`` for each."""
 
 
-def hand_on(
+def write_section_forces(
     run_outcome: SectionOutcome,
     output_folder: Path,
     file_formats: Iterable[str],
@@ -37,7 +37,7 @@ def hand_on(
     The files also have names, units and comments (axes and signs). Returns the paths; raises InputError where a file
     exists or a format has no room for a name.
     """
-    section_channels = forces(run_outcome.answers) if section_channels is None else section_channels
+    section_channels = section_force_channels(run_outcome.answers) if section_channels is None else section_channels
     names, units, comments = (tuple(getattr(a, key) for a in section_channels) for key in ("name", "unit", "comment"))
 
     def blocks() -> Iterator[np.ndarray]:
@@ -55,7 +55,7 @@ def hand_on(
     ]
 
 
-def forces(output_channels: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
+def section_force_channels(output_channels: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
     """Returns those channels that are section forces and moments."""
     return tuple(answer for answer in output_channels if answer.section and answer.unit in ("N", "N m"))
 

@@ -87,7 +87,7 @@ class StepGrid:
         return place // denominator, (place % denominator) / denominator
 
 
-class Inputs:
+class RecordingInputs:
     """Hub forces and angles of a recording that drive a run; check signals are left out."""
 
     def __init__(self, recording: Recording, vehicle: CutVehicle, angles_are_enforced: bool = False) -> None:
@@ -183,7 +183,7 @@ class PrescribedAngles:
     """
 
     def __init__(
-        self, recording_inputs: Inputs, step_grid: StepGrid, smoothing_bandwidth: float, named_file: str = ""
+        self, recording_inputs: RecordingInputs, step_grid: StepGrid, smoothing_bandwidth: float, named_file: str = ""
     ) -> None:
         """Smooth the angles by a low-pass of ``smoothing_bandwidth`` (Hz) over the recording. Raises InputError where
         an angle is missing.

@@ -31,7 +31,7 @@ from models.systems.measured.sections import SectionChannel
 from models.systems.pitch_plane import trust as drift_trust
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
-from models.systems.pitch_plane.trust import Trust
+from models.systems.pitch_plane.trust import TrustPrediction
 
 CHASSIS_NAME = "chassis"
 LONGEST_STEP = 1e-3
@@ -47,7 +47,7 @@ SPRING_NAMES = {"f3": "front spring", "f4": "rear spring"}
 
 
 @dataclass(frozen=True)
-class PlaneJob:
+class PlaneRunSettings:
     """Settings of a recording's run in the pitch plane. parameters : name of a parameter set, or of a TOML file; hold :
     stabiliser of the pitch; step : time step (s).
     """
@@ -70,13 +70,16 @@ class PlaneRun:
     """A run in the pitch plane: its result, the predicted time of trust, the verdict, and the section forces."""
 
     result: Result
-    trust: Trust | None
+    trust: TrustPrediction | None
     verdict: Verdict
     outcome: SectionOutcome
 
 
 def run(
-    run_settings: PlaneJob, scene_folder: Path, verdict_limits: Limits | None = None, estimate_error: bool = False
+    run_settings: PlaneRunSettings,
+    scene_folder: Path,
+    verdict_limits: Limits | None = None,
+    estimate_error: bool = False,
 ) -> PlaneRun:
     """Run a recording on the pitch-plane vehicle; files of its scene are written into a new folder. Raises InputError,
     Refused or RunFailed.
@@ -102,7 +105,7 @@ def run(
 
 
 def _verdict_with_measured_pitch(
-    run_settings: PlaneJob, pitch_plane_result: Result, verdict_limits: Limits, verdict: Verdict
+    run_settings: PlaneRunSettings, pitch_plane_result: Result, verdict_limits: Limits, verdict: Verdict
 ) -> Verdict:
     """Returns the verdict on an accepted free run after its pitch is compared with the measured pitch.
 
@@ -122,12 +125,12 @@ def _verdict_with_measured_pitch(
     return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
 
 
-def _force_frames(run_settings: PlaneJob) -> set[str]:
+def _force_frames(run_settings: PlaneRunSettings) -> set[str]:
     """Frames ("inertial", "body" or "hub") of the vertical forces at both axles."""
     return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(run_settings.recording, axle)}
 
 
-def scene_of(run_settings: PlaneJob, scene_folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
+def scene_of(run_settings: PlaneRunSettings, scene_folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     """Returns a pitch-plane scene of a recording, whose files are written into the folder, and findings on bridged
     gaps.
     """
@@ -161,7 +164,7 @@ def scene_of(run_settings: PlaneJob, scene_folder: Path) -> tuple[Scene, tuple[F
     return scene, tuple(said)
 
 
-def trusted_time(scene: Scene, force_deviation: float) -> Trust | None:
+def trusted_time(scene: Scene, force_deviation: float) -> TrustPrediction | None:
     """Predict how long a pitch-plane scene's run can be trusted, under force noise of standard deviation
     ``force_deviation`` (N); None where the pitch is stabilised.
     """
@@ -173,7 +176,7 @@ def trusted_time(scene: Scene, force_deviation: float) -> Trust | None:
     return replace(bounds, times={**bounds.times, f"noise of {force_deviation:g} N": noise})
 
 
-def _axle_force(run_settings: PlaneJob, axle_name: str, findings: list[Finding]) -> np.ndarray:
+def _axle_force(run_settings: PlaneRunSettings, axle_name: str, findings: list[Finding]) -> np.ndarray:
     """Vertical force (n,) of an axle in N with short gaps bridged. Raises InputError for a long gap
     or a missing wheel.
     """
@@ -185,13 +188,13 @@ def _axle_force(run_settings: PlaneJob, axle_name: str, findings: list[Finding])
     return np.asarray(sum(_samples_without_gaps(run_settings, signal, findings) for signal in signals))
 
 
-def _samples_without_gaps(run_settings: PlaneJob, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
+def _samples_without_gaps(run_settings: PlaneRunSettings, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
     values, _, findings = bridged_signals(run_settings.recording, signal)
     all_findings += findings
     return values
 
 
-def _prescribed_pitch(run_settings: PlaneJob, scene_folder: Path, findings: list[Finding]) -> dict[str, Any]:
+def _prescribed_pitch(run_settings: PlaneRunSettings, scene_folder: Path, findings: list[Finding]) -> dict[str, Any]:
     """Returns the scene table of the effect that stabilises the pitch, and writes the measured pitch and rate, nose up,
     to a file.
     """

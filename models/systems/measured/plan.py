@@ -12,8 +12,8 @@ from models.measured.formats import open_source
 from models.measured.signal import Signal
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.channel_map import mapped_signals
-from models.systems.measured.scene import MeasuredScene, Rig
-from models.systems.measured.virtual import check as check_virtual
+from models.systems.measured.scene import MeasuredRig, MeasuredScene
+from models.systems.measured.virtual import checked_signals as check_virtual
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
 
@@ -40,7 +40,7 @@ def opened_files(scene: MeasuredScene) -> tuple[Source, ...]:
 
 
 def signals_of_files(
-    scene: MeasuredScene, measurement_files: Sequence[Source], measured_rig: Rig
+    scene: MeasuredScene, measurement_files: Sequence[Source], measured_rig: MeasuredRig
 ) -> tuple[Signal, ...]:
     """Returns the signals of all mapped channels. Raises InputError also where a wheel has no vertical force, or the
     stabiliser no angles.
@@ -59,7 +59,7 @@ def signals_of_files(
     return signals
 
 
-def _check_names(scene: MeasuredScene, measured_rig: Rig) -> None:
+def _check_names(scene: MeasuredScene, measured_rig: MeasuredRig) -> None:
     bodies = measured_rig.places.bodies
     named_in_scene = [
         *(
@@ -121,7 +121,7 @@ def describe(scene: MeasuredScene) -> str:
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])
 
 
-def _file_lines(scene: MeasuredScene, measured_rig: Rig) -> list[str]:
+def _file_lines(scene: MeasuredScene, measured_rig: MeasuredRig) -> list[str]:
     """Lines of text on every measurement file and its mapped channels: quantity, place, axes, factor to SI."""
     sources, lines = opened_files(scene), list[str]()
     signals = signals_of_files(scene, sources, measured_rig)

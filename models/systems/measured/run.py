@@ -35,20 +35,26 @@ from models.systems.measured.clock import record_on_clock
 from models.systems.measured.consequences import Consequence, consequences
 from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
-from models.systems.measured.hand_on import FILE_STEM, forces, hand_on, labelled_result
+from models.systems.measured.hand_on import FILE_STEM, labelled_result, section_force_channels, write_section_forces
 from models.systems.measured.holds import FREE_RUN, QUANTITY_OF_NOISE_KEY, stabilisers_of_runs
-from models.systems.measured.pitch_plane import PlaneJob
+from models.systems.measured.pitch_plane import PlaneRunSettings
 from models.systems.measured.pitch_plane import run as run_plane
 from models.systems.measured.plan import opened_files, signals_of_files
-from models.systems.measured.scene import MeasuredScene, Rig
-from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
-from models.systems.measured.section_run import check as check_run
+from models.systems.measured.scene import MeasuredRig, MeasuredScene
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRunSettings
+from models.systems.measured.section_run import check_settings as check_run
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import SectionChannel, Sections, accelerometer_points
 from models.systems.measured.trust import Drift, MeasurementErrors, predicted_drift
-from models.systems.measured.verdict import ChannelComparison, channels_to_compare, compare, filter_doubts, judge
+from models.systems.measured.verdict import (
+    ChannelComparison,
+    channels_to_compare,
+    compare_channel,
+    filter_doubts,
+    judge_run,
+)
 from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
-from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
+from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, TrustPrediction
 from models.vehicles.cut_vehicle import CutVehicle
 
 WORK_FOLDER = "work"
@@ -56,7 +62,7 @@ WORK_FOLDER = "work"
 
 
 @dataclass
-class Examination:
+class RecordingAnalysis:
     """Everything that is computed for a recording, in the order of computation; fields that were not reached are empty.
 
     scene : scene that reads the files, also of a virtual measurement; holds : stabiliser of each run, by name;
@@ -65,14 +71,14 @@ class Examination:
     """
 
     scene: MeasuredScene
-    rig: Rig
+    rig: MeasuredRig
     engine: str
     recording: Recording
     virtual: VirtualMeasurement | None
     holds: dict[str, AttitudeHold]
     findings: tuple[Finding, ...] = ()
     drift: Drift | None = None
-    trust: tuple[tuple[str, Trust], ...] = ()
+    trust: tuple[tuple[str, TrustPrediction], ...] = ()
     runs: dict[str, SectionOutcome] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
@@ -116,18 +122,22 @@ class Examination:
         names none.
         """
         wanted = self.scene.hand_on.sections
-        return [answer for answer in forces(run_outcome.answers) if wanted is None or answer.section in wanted]
+        return [
+            answer
+            for answer in section_force_channels(run_outcome.answers)
+            if wanted is None or answer.section in wanted
+        ]
 
-    def job(self, run_name: str, recording: Recording | None = None) -> SectionRun | PlaneJob:
+    def job(self, run_name: str, recording: Recording | None = None) -> SectionRunSettings | PlaneRunSettings:
         """Returns the settings of a run by its name, also for another recording. The run computes forces at all
         sections in axes of the chassis, and accelerations at accelerometers.
         """
         recording, vehicle = recording or self.recording, self.rig.vehicle
         settings = self.engine, self.holds[run_name], self.scene.run.step, self.scene.file
         if vehicle is None:
-            return PlaneJob(recording, self.rig.name, *settings)
+            return PlaneRunSettings(recording, self.rig.name, *settings)
         sections = Sections(vehicle, points=accelerometer_points(vehicle, recording.signals, self.scene.places))
-        return SectionRun(vehicle, recording, sections, *settings)
+        return SectionRunSettings(vehicle, recording, sections, *settings)
 
     def march(
         self,
@@ -140,7 +150,7 @@ class Examination:
         pitch plane is estimated.
         """
         job = self.job(run_name)
-        if isinstance(job, SectionRun):
+        if isinstance(job, SectionRunSettings):
             return march(job, run_folder, report_progress)
         shutil.rmtree(run_folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
         run = run_plane(job, run_folder, self.scene.limits, estimate_error and run_name == self.chosen_run)
@@ -154,7 +164,7 @@ class Examination:
         job = self.job(run_name, recording)
         return (
             march(job, run_folder / "run")
-            if isinstance(job, SectionRun)
+            if isinstance(job, SectionRunSettings)
             else run_plane(job, run_folder / "run").outcome
         )
 
@@ -198,7 +208,7 @@ def run(
         return labelled
 
 
-def _with_assumptions(run_result: Result, recording_analysis: Examination) -> Result:
+def _with_assumptions(run_result: Result, recording_analysis: RecordingAnalysis) -> Result:
     """Returns the result with its assumptions and the broken ones; in the pitch plane together with the assumptions of
     the pitch-plane run.
     """
@@ -218,10 +228,10 @@ def _with_assumptions(run_result: Result, recording_analysis: Examination) -> Re
     return run_result
 
 
-def _with_error(run_result: Result, recording_analysis: Examination, work_folder: Path) -> Result:
+def _with_error(run_result: Result, recording_analysis: RecordingAnalysis, work_folder: Path) -> Result:
     """Returns the result with the errors of the time steps of the chosen run."""
     job, outcome = recording_analysis.job(recording_analysis.chosen_run), recording_analysis.outcome
-    if outcome is None or not isinstance(job, SectionRun):
+    if outcome is None or not isinstance(job, SectionRunSettings):
         return run_result
     if recording_analysis.chosen_run in recording_analysis.failed:
         return not_estimated(
@@ -237,7 +247,7 @@ def _with_error(run_result: Result, recording_analysis: Examination, work_folder
 
 def _start_examination(
     scene: MeasuredScene, engine: str, output_folder: Path, report_progress: Progress, estimate_error: bool
-) -> Examination:
+) -> RecordingAnalysis:
     """Start an examination: resample the recording from the scene's files, or from those of a virtual measurement."""
     rig, virtual, seconds, start_time = scene.rig(), None, dict[str, float](), time.perf_counter()
     (output_folder / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
@@ -249,7 +259,9 @@ def _start_examination(
         scene = load(output_folder / "scene.toml")
         seconds["virtual measurement"] = time.perf_counter() - start_time
     recording = read_files(scene, output_folder / WORK_FOLDER, lambda text, part: report_progress(text, 0.2 * part))
-    exam = Examination(scene, rig, engine, recording, virtual, stabilisers_of_runs(scene, recording), seconds=seconds)
+    exam = RecordingAnalysis(
+        scene, rig, engine, recording, virtual, stabilisers_of_runs(scene, recording), seconds=seconds
+    )
     _record_seconds(exam, "reading", start_time)
     return exam
 
@@ -264,13 +276,13 @@ def read_files(scene: MeasuredScene, columns_folder: Path, report_progress: Prog
     )
 
 
-def _record_seconds(recording_analysis: Examination, stage_name: str, start_time: float) -> None:
+def _record_seconds(recording_analysis: RecordingAnalysis, stage_name: str, start_time: float) -> None:
     """Record the seconds of a stage that has ended: time since ``start_time`` less the seconds of earlier stages."""
     recording_analysis.seconds[stage_name] = time.perf_counter() - start_time - sum(recording_analysis.seconds.values())
 
 
 def _examine(
-    recording_analysis: Examination, output_folder: Path, report_progress: Progress, estimate_error: bool
+    recording_analysis: RecordingAnalysis, output_folder: Path, report_progress: Progress, estimate_error: bool
 ) -> None:
     """Check the recording, predict the drift, make the runs, judge them, and write section forces to files; stops after
     the checks if these find an error.
@@ -304,7 +316,7 @@ def _examine(
         lap("files")
 
 
-def _predict_drift(recording_analysis: Examination, vehicle: CutVehicle) -> None:
+def _predict_drift(recording_analysis: RecordingAnalysis, vehicle: CutVehicle) -> None:
     """Predict the drift of the free run, which begins level and at rest: from noise, from mean moments that contradict
     the motion, and from the measured initial tilt and rates.
     """
@@ -335,12 +347,12 @@ def _initial_value(recording: Recording, quantity: str, angle_axis: str, chassis
 
 
 def _make_runs(
-    recording_analysis: Examination, work_folder: Path, report_progress: Progress, estimate_error: bool
+    recording_analysis: RecordingAnalysis, work_folder: Path, report_progress: Progress, estimate_error: bool
 ) -> None:
     """Make the free run and the run with the scene's stabiliser; a run that fails keeps its samples up to the
     failure."""
     for name in recording_analysis.holds:
-        if isinstance(job := recording_analysis.job(name), SectionRun):
+        if isinstance(job := recording_analysis.job(name), SectionRunSettings):
             check_run(job)
     for i, name in enumerate(recording_analysis.holds):
         report_progress(f"{name} run", 0.2 + 0.7 * i / len(recording_analysis.holds))
@@ -388,15 +400,15 @@ def _with_time_left(
     return report
 
 
-def _add_verdicts(recording_analysis: Examination) -> None:
+def _add_verdicts(recording_analysis: RecordingAnalysis) -> None:
     """Compare measured check channels with the chosen run, and judge every run."""
     assert recording_analysis.drift is not None
     recording, slopes = recording_analysis.recording, tuple(recording_analysis.scene.hand_on.slopes)
     for name, outcome in recording_analysis.runs.items():
         job = recording_analysis.job(name)
-        assert isinstance(job, SectionRun)
-        comparisons = tuple(compare(recording, outcome, *pair, slopes) for pair in channels_to_compare(job))
-        recording_analysis.verdicts[name] = judge(
+        assert isinstance(job, SectionRunSettings)
+        comparisons = tuple(compare_channel(recording, outcome, *pair, slopes) for pair in channels_to_compare(job))
+        recording_analysis.verdicts[name] = judge_run(
             job,
             outcome,
             recording_analysis.scene.limits,
@@ -408,7 +420,7 @@ def _add_verdicts(recording_analysis: Examination) -> None:
             recording_analysis.channel_comparisons = comparisons
 
 
-def _add_consequences(recording_analysis: Examination, work_folder: Path) -> None:
+def _add_consequences(recording_analysis: RecordingAnalysis, work_folder: Path) -> None:
     """Compute the effect of each finding on the section forces, and revise the verdicts. The chosen run is used, or the
     free run where the chosen run failed.
     """
@@ -432,7 +444,9 @@ def _add_consequences(recording_analysis: Examination, work_folder: Path) -> Non
         }
 
 
-def _save_section_forces(recording_analysis: Examination, run_outcome: SectionOutcome, output_folder: Path) -> None:
+def _save_section_forces(
+    recording_analysis: RecordingAnalysis, run_outcome: SectionOutcome, output_folder: Path
+) -> None:
     """Count the cycles of the section forces, and write the forces in every format of the scene. Existing files of an
     interrupted run are kept.
     """
@@ -444,10 +458,10 @@ def _save_section_forces(recording_analysis: Examination, run_outcome: SectionOu
     formats = [path.suffix[1:] for path in recording_analysis.written_files if not path.exists()]
     run_name, engine = recording_analysis.chosen_run, recording_analysis.engine
     comment = f"{recording_analysis.scene.title}; computed from wheel forces, {run_name} run, {engine}"
-    hand_on(run_outcome, output_folder, formats, answers, recording_analysis.recording.start, comment)
+    write_section_forces(run_outcome, output_folder, formats, answers, recording_analysis.recording.start, comment)
 
 
-def _labelled_result(scene: MeasuredScene, recording_analysis: Examination, output_folder: Path) -> Result:
+def _labelled_result(scene: MeasuredScene, recording_analysis: RecordingAnalysis, output_folder: Path) -> Result:
     """Returns the result of a recording's scene; its detail is the examination."""
     return labelled_result(
         scene,
@@ -463,7 +477,7 @@ def _labelled_result(scene: MeasuredScene, recording_analysis: Examination, outp
     )
 
 
-def _endings_of_runs(recording_analysis: Examination) -> dict[str, str]:
+def _endings_of_runs(recording_analysis: RecordingAnalysis) -> dict[str, str]:
     """Verdicts on the runs and reasons of failures as JSON texts, for the attributes of the result."""
     verdicts = {name: [verdict.word, verdict.reason] for name, verdict in recording_analysis.verdicts.items()}
     return {"verdicts": json.dumps(verdicts), "failed": json.dumps(recording_analysis.failed)}

@@ -25,7 +25,7 @@ from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
-from models.systems.measured.inputs import Inputs, PrescribedAngles, StepGrid
+from models.systems.measured.inputs import PrescribedAngles, RecordingInputs, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid_vehicle
 
@@ -62,7 +62,7 @@ class AttitudeHold:
 
 
 @dataclass(frozen=True)
-class SectionRun:
+class SectionRunSettings:
     """Settings of a recording's run on a vehicle without tyres. hold : stabiliser; step : time step (s), the
     recording's sampling period if None; file : the scene that messages name.
     """
@@ -145,7 +145,7 @@ class Checkpoint:
         write_whole(self.path, buffer.getvalue())
 
 
-def digest_of(*digested_objects: object) -> str:
+def checksum_of(*digested_objects: object) -> str:
     """Checksum of objects: of the bytes of arrays, and of the ``repr`` of other objects."""
     total = hashlib.blake2b(digest_size=16)
     for part in digested_objects:
@@ -157,7 +157,7 @@ def digest_of(*digested_objects: object) -> str:
     return total.hexdigest()
 
 
-def check(run_settings: SectionRun) -> None:
+def check_settings(run_settings: SectionRunSettings) -> None:
     """Raise InputError for settings with which a run is impossible or inaccurate, before any run is made."""
     grid, hold = run_settings.grid, run_settings.hold
     grid.check(run_settings.file)
@@ -185,7 +185,7 @@ def check(run_settings: SectionRun) -> None:
 
 
 def run(
-    run_settings: SectionRun,
+    run_settings: SectionRunSettings,
     run_folder: Path,
     report_progress: Progress = no_progress,
     block_duration: float = CHECKPOINT_INTERVAL,
@@ -197,7 +197,7 @@ def run(
     folder has a run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle
     topples.
     """
-    check(run_settings)
+    check_settings(run_settings)
     march = _March(
         run_settings,
         run_folder,
@@ -214,9 +214,9 @@ def run(
 class _March:
     """A run in progress: ``done`` output samples are on disk; ``state`` (2 n,) is the state at the next sample."""
 
-    def __init__(self, run_settings: SectionRun, run_folder: Path, block_length: int) -> None:
+    def __init__(self, run_settings: SectionRunSettings, run_folder: Path, block_length: int) -> None:
         self.job, self.grid, self.length, hold = run_settings, run_settings.grid, block_length, run_settings.hold
-        self.inputs = Inputs(run_settings.recording, run_settings.vehicle, hold.method == "prescribed")
+        self.inputs = RecordingInputs(run_settings.recording, run_settings.vehicle, hold.method == "prescribed")
         self.filter = self._filter() if hold.method == "kalman" else None
         self.prescribed = None
         if hold.method == "prescribed":
@@ -341,11 +341,11 @@ class _March:
         return state
 
     def _filter(self) -> "TiltFilter":
-        from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
+        from models.systems.hub_forces.tilt_filter import StatedDeviations, TiltFilter
 
         vehicle, hold, period = self.job.vehicle, self.job.hold, self.job.recording.period
         forces = np.tile([hold.force] * 3 + [hold.moment] * 3, len(vehicle.hubs))
-        deviations = Deviations(forces, (hold.angle, hold.rate), hold.model)
+        deviations = StatedDeviations(forces, (hold.angle, hold.rate), hold.model)
         return TiltFilter(vehicle, self.inputs.frame, period, deviations, self.job.file)
 
     def _save(self) -> None:
@@ -353,22 +353,22 @@ class _March:
         self._checkpoint.save(done=np.array(self.done), state=self.state, **known)
 
 
-def _inputs_of(run_settings: SectionRun, recording_inputs: Inputs) -> dict[str, str]:
+def _inputs_of(run_settings: SectionRunSettings, recording_inputs: RecordingInputs) -> dict[str, str]:
     """Checksums of all inputs on which a run's results depend, by names that users understand."""
     library = {"reference": "numpy"}.get(run_settings.engine, run_settings.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
     idle = HubInputs(np.zeros((1, 6 * len(recording_inputs.hubs))))
-    samples = digest_of(run_settings.recording.period, run_settings.recording.count)
+    samples = checksum_of(run_settings.recording.period, run_settings.recording.count)
     for signal in recording_inputs.used_signals:
-        samples = digest_of(samples, signal, run_settings.recording.samples(signal))
+        samples = checksum_of(samples, signal, run_settings.recording.samples(signal))
     return {
-        "vehicle": digest_of(
+        "vehicle": checksum_of(
             table(run_settings.vehicle, idle, run_settings.grid.step), run_settings.vehicle.tree.coordinates()
         ),
         "recording": samples,
         "stabiliser": repr(run_settings.hold),
         "engine": f"{run_settings.engine} {version(library)}",
         "step": repr(run_settings.grid.step),
-        "list of sections": digest_of(run_settings.sections.answers, run_settings.sections.frame),
+        "list of sections": checksum_of(run_settings.sections.answers, run_settings.sections.frame),
         "version": f"{version('twinrig')} {sources}",
     }

@@ -23,7 +23,7 @@ import numpy as np
 
 from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.multibody.cut_kernel import WRENCH
-from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
+from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, TrustPrediction
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, RigidVehicle, rigid_vehicle
 
 SUMMED_TIMES = 2000
@@ -92,13 +92,13 @@ class Drift:
         passed = self.passing_time(self.angle)
         return float(self.times[-1]) if passed is None else passed
 
-    def trust(self, largest_angle: float | None = None) -> Trust:
+    def trust(self, largest_angle: float | None = None) -> TrustPrediction:
         """Returns the time at which each source of error exceeds ``largest_angle`` (rad), by default the limit for
         section forces; 0.05 rad is the limit for the motion.
         """
         limit = self.angle if largest_angle is None else largest_angle
         times = {name: self.passing_time(limit, name) for name in ("noise", *self.mean_errors)}
-        return Trust({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
+        return TrustPrediction({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
 
 
 def predicted_drift(
@@ -128,7 +128,7 @@ def predicted_drift(
     return Drift(law.times, means, spread, law.rates, force_frame)
 
 
-def position(
+def position_error(
     vehicle: CutVehicle,
     measurement_errors: MeasurementErrors,
     sample_period: float,

@@ -29,7 +29,7 @@ from models.drift.score import (
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRun
+from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRunSettings
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
@@ -97,7 +97,7 @@ class ChannelComparison:
     trusted_time: float
 
 
-def channels_to_compare(run_settings: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
+def channels_to_compare(run_settings: SectionRunSettings) -> tuple[tuple[Signal, SectionChannel], ...]:
     """Returns pairs of a measured signal and the run's channel of the same quantity, for check signals and
     accelerations.
 
@@ -109,7 +109,7 @@ def channels_to_compare(run_settings: SectionRun) -> tuple[tuple[Signal, Section
     )
 
 
-def _same_axes(run_settings: SectionRun, signal: Signal) -> bool:
+def _same_axes(run_settings: SectionRunSettings, signal: Signal) -> bool:
     """Whether the run computes a signal's quantity in the axes of the signal."""
     if signal.at in run_settings.vehicle.hubs and signal.quantity in ("force", "moment"):
         return signal.frame == run_settings.sections.frame
@@ -125,7 +125,7 @@ def paired_channels(
     return run_outcome.period * np.arange(len(computed)), measured, computed
 
 
-def compare(
+def compare_channel(
     recording: Recording,
     run_outcome: SectionOutcome,
     signal: Signal,
@@ -196,8 +196,8 @@ def _trusted_time(error_values: np.ndarray, signal_size: float, sample_period: f
     return float(beyond[0] * length * sample_period) if len(beyond) else math.inf
 
 
-def judge(
-    run_settings: SectionRun,
+def judge_run(
+    run_settings: SectionRunSettings,
     run_outcome: SectionOutcome,
     verdict_limits: Limits = RUN_LIMITS,
     trusted_time: float | None = None,
@@ -211,7 +211,7 @@ def judge(
     channel, by name, in SI.
     """
     shares = {
-        channel.signal.name: disagreement(channel, (noise_by_quantity or {}).get(channel.signal.name, 0.0))
+        channel.signal.name: channel_disagreement(channel, (noise_by_quantity or {}).get(channel.signal.name, 0.0))
         for channel in channel_comparisons
     }
     off = {name: share for name, share in shares.items() if not share <= LARGEST_DISAGREEMENT}
@@ -226,7 +226,7 @@ def judge(
         run_outcome.period * (run_outcome.done - 1),
         verdict_limits,
         trusted_time,
-        uncertainty=uncertainty(run_settings.vehicle, run_settings.hold, run_settings.recording.period),
+        uncertainty=angle_uncertainty(run_settings.vehicle, run_settings.hold, run_settings.recording.period),
     )
     return _worded_for_spatial_vehicle(verdict)
 
@@ -298,7 +298,7 @@ def _rms_ratio(part_values: np.ndarray, total_values: np.ndarray) -> float:
     )
 
 
-def uncertainty(vehicle: CutVehicle, attitude_hold: AttitudeHold, sample_period: float) -> float:
+def angle_uncertainty(vehicle: CutVehicle, attitude_hold: AttitudeHold, sample_period: float) -> float:
     """Twice the standard deviation (rad) of roll or pitch in a stabilised run; 0 for a free run.
 
     A moment I (w^2 (measured - angle) + 2 z w (measured rate - rate)) passes white noise of the angle with the factor
@@ -348,7 +348,7 @@ def errors_of_run(
     return RunErrors(damage, force, {}, float(tilt.max()), root_mean_square(tilt), float(height.max()))
 
 
-def disagreement(compared_channel: ChannelComparison, noise_deviation: float = 0.0) -> float:
+def channel_disagreement(compared_channel: ChannelComparison, noise_deviation: float = 0.0) -> float:
     """Rms error of a check channel divided by the channel's rms, after its noise (standard deviation) is removed from
     both.
 

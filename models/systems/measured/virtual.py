@@ -27,8 +27,8 @@ from models.measured.signal import HUB_COMPONENTS, Quantity, Signal
 from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import specific_forces_on_body
 from models.systems.hub_forces.measurement import element_travels
-from models.systems.hub_forces.run import on_road
-from models.systems.hub_forces.scene import Frame, Road
+from models.systems.hub_forces.run import run_on_road
+from models.systems.hub_forces.scene import ForceFrame, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
 
 if TYPE_CHECKING:
@@ -52,11 +52,11 @@ Place = Annotated[list[float], Field(min_length=3, max_length=3)]
 class VirtualTable(Strict):
     """[virtual]: road, duration and sampling of a virtual measurement, its transducers and their faults."""
 
-    road: Road = Field(default=Road(), description="two tracks of a random road")
+    road: TwoTrackRoadTable = Field(default=TwoTrackRoadTable(), description="two tracks of a random road")
     duration: float = quantity("s", "of the measurement", default=15.0)
     step: float = quantity("s", "of Runge-Kutta 4 on the road", default=1e-3)
     sampling_rate: float = quantity("Hz", "of every channel", default=1000.0)
-    frame: Frame = Field(default="hub", description="axes of the hub forces")
+    frame: ForceFrame = Field(default="hub", description="axes of the hub forces")
     accelerometers: dict[str, Place] = Field(
         default={}, description="tri-axial ones on the chassis: name and place x, y, z in the vehicle's design axes, m"
     )
@@ -109,8 +109,8 @@ def virtual_measurement(
 
     estimate_error : whether the error of the time steps is estimated, by further runs.
     """
-    signals = check(vehicle, virtual_settings, scene_path)
-    run, told = on_road(
+    signals = checked_signals(vehicle, virtual_settings, scene_path)
+    run, told = run_on_road(
         vehicle,
         virtual_settings.road,
         virtual_settings.frame,
@@ -128,7 +128,7 @@ def virtual_measurement(
     )
 
 
-def check(vehicle: CutVehicle, virtual_settings: VirtualTable, scene_path: str = "") -> tuple[Signal, ...]:
+def checked_signals(vehicle: CutVehicle, virtual_settings: VirtualTable, scene_path: str = "") -> tuple[Signal, ...]:
     """Returns the signals of all channels of a virtual measurement. Raises InputError for steps that do not divide one
     another, and for names that the vehicle does not have.
     """
@@ -156,7 +156,7 @@ def _signals_of_channels(vehicle: CutVehicle, virtual_settings: VirtualTable) ->
     measured columns.
     """
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
-    rows: list[tuple[str, Quantity, str, str, Frame]] = [
+    rows: list[tuple[str, Quantity, str, str, ForceFrame]] = [
         (f"{hub}_{name.lower()}", quantity, hub, axis, virtual_settings.frame)
         for hub in vehicle.hubs
         for name, quantity, axis, _ in HUB_COMPONENTS

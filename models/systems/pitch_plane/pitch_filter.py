@@ -30,9 +30,9 @@ from models.engines.assembly import Assembly
 from models.engines.reference import compiled_closure, march_of
 from models.engines.stability import first_order, linearised
 
-KEPT_STATES = np.array([0, 1, 3, 4, 5, 7])
+FILTERED_STATES = np.array([0, 1, 3, 4, 5, 7])
 """Indices of z1, z2, pitch and their rates in the vehicle's state (8,)."""
-RELATIVE_STATES = np.eye(8)[KEPT_STATES]
+RELATIVE_STATES = np.eye(8)[FILTERED_STATES]
 RELATIVE_STATES[0:2, 2] = RELATIVE_STATES[3:5, 6] = -1.0
 """Matrix (6, 8) that maps the vehicle's state to z1 - z3, z2 - z3, pitch and their rates."""
 PITCH_INERTIA = 5
@@ -106,12 +106,12 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
         for column in range(12):
             for sign in (1.0, -1.0):
                 y, pushed, nudge = np.zeros(8), force_inputs, sign * DIFFERENCE_WIDTHS[column]
-                y[KEPT_STATES] = filter_state[:6]
+                y[FILTERED_STATES] = filter_state[:6]
                 parameters[PITCH_INERTIA] = vehicle_parameters[PITCH_INERTIA] / (
                     1.0 + filter_state[6] + (nudge if column == 7 else 0.0)
                 )
                 if 0 < column < 7:
-                    y[KEPT_STATES[column - 1]] += nudge
+                    y[FILTERED_STATES[column - 1]] += nudge
                 elif column > 7:
                     pushed = force_inputs.copy()
                     pushed[:, (column - 8) % 2] += nudge * sample_weights[:, (column - 8) // 2]
@@ -119,7 +119,7 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
                 end, share = states[step_count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):
                     heave = end[2] if row < 2 else end[6] if 2 < row < 5 else 0.0
-                    transition[row, column] += share * (end[KEPT_STATES[row]] - heave)
+                    transition[row, column] += share * (end[FILTERED_STATES[row]] - heave)
         transition[6, 0], transition[6, 7] = filter_state[6], 1.0
         return transition
 
@@ -133,7 +133,7 @@ KNOWN_DEVIATION = 1e-6
 
 
 @dataclass(frozen=True)
-class Measurement:
+class PitchMeasurement:
     """Measurement of the pitch, the pitch rate, or both.
 
     values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
@@ -195,7 +195,7 @@ class PitchFilter(ExtendedKalmanFilter):
         start_state: np.ndarray,
         start_covariance: np.ndarray,
         force_variance: float,
-        pitch_measurement: Measurement,
+        pitch_measurement: PitchMeasurement,
     ) -> None:
         """Start from a state (7,) and a covariance (7, 7); force_variance : variance (N^2) of a force sample, per step
         of the filter.
@@ -245,9 +245,9 @@ class PitchFilter(ExtendedKalmanFilter):
         )
 
 
-def estimate(
+def estimate_pitch(
     vehicle_assembly: Assembly,
-    pitch_measurement: Measurement,
+    pitch_measurement: PitchMeasurement,
     force_deviation: float,
     *,
     start_deviation: float = 0.0,

@@ -60,7 +60,7 @@ def instant_numbers(row_times: np.ndarray, sampling_rate: float) -> np.ndarray:
     return np.floor(row_times * sampling_rate + INSTANT_TOLERANCE).astype(np.int64)
 
 
-def read_samples(
+def sample_and_hold(
     row_times: np.ndarray, exact_values: np.ndarray, sampling_rate: float, scene: Scene, key_path: str
 ) -> np.ndarray:
     """Sample-and-hold of values (n,): for each row the value at the sensor's last sampling time at or before it.
@@ -92,7 +92,7 @@ def noisy_reading(
             :, 0
         ]
     )
-    return read_samples(row_times, exact_values, sensor_parameters.sampling_rate, scene, key_path) + noise[number]
+    return sample_and_hold(row_times, exact_values, sensor_parameters.sampling_rate, scene, key_path) + noise[number]
 
 
 def within_range(
@@ -116,7 +116,9 @@ def within_range(
     )
 
 
-def write(result: Result, channel_by_column: Mapping[str, str], sampling_rate: float, output_path: Path) -> None:
+def write_samples(
+    result: Result, channel_by_column: Mapping[str, str], sampling_rate: float, output_path: Path
+) -> None:
     """Write samples of a result at a rate (Hz) to a file that other effects read; ``channel_by_column`` : channel of
     the result by column name.
 

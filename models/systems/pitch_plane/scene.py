@@ -29,7 +29,7 @@ def parameter_sets() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in PARAMETER_SET_FOLDER.glob("*.py") if path.stem != "__init__"))
 
 
-class VehicleTable(Strict):
+class PitchPlaneVehicleTable(Strict):
     """[vehicle]: a published parameter set or the user's parameter file, and values that replace some parameters."""
 
     parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
@@ -38,7 +38,7 @@ class VehicleTable(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class RunTable(Strict):
+class PitchPlaneRunTable(Strict):
     """[run]: duration, time step, and spacing of the saved rows."""
 
     duration: float = quantity("s", "length of the run")
@@ -62,8 +62,8 @@ class Scene(SceneFile):
 
     system: Literal["pitch-plane"] = "pitch-plane"
     study: str = Field(default="single_run", description="the study that runs the scene")
-    vehicle: VehicleTable = VehicleTable()
-    run: RunTable = Field(description="table with at least the duration")
+    vehicle: PitchPlaneVehicleTable = PitchPlaneVehicleTable()
+    run: PitchPlaneRunTable = Field(description="table with at least the duration")
     start: dict[str, float] = Field(default_factory=dict, description="initial states beside the static equilibrium")
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)

@@ -27,7 +27,7 @@ DRIFT_OFF_PITCH = 0.05
 """Difference (rad) from the measured pitch beyond which a run has drifted off."""
 
 
-class Options(Strict):
+class SixRunOptions(Strict):
     """[options] of the study of six runs: sampling rate, noise, perturbed models, seed."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
@@ -39,11 +39,11 @@ class Options(Strict):
     seed: int = Field(1, ge=0, lt=2**63, description="seed of noise and models")
 
 
-def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
+def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> SixRunOptions:
     """Reads the scene's options. Raises InputError, before any file is written, for options with which a run of the
     study is impossible.
     """
-    options = read(Options, scene.options, scene.file, "options")
+    options = read(SixRunOptions, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     return options
 

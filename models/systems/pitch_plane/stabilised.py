@@ -51,13 +51,13 @@ from models.systems.pitch_plane.virtual_measurement import (
 from models.vehicles.pitch_plane import Parameters
 
 Progress = Callable[[str, float], None]
-Row = dict[str, Any]
+FiguresRow = dict[str, Any]
 
 DAMPING_RATIO = 0.7
 """Damping ratio of stabilising springs and high-pass filters."""
 
 
-class Options(Strict):
+class StabiliserOptions(Strict):
     """[options] of the study of stabilisers: measurement, perturbed model, stabilisers, limits of the score."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
@@ -80,11 +80,11 @@ class Options(Strict):
     limits: Limits = Limits()
 
 
-def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
+def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> StabiliserOptions:
     """Reads the scene's options. Raises InputError, before any file is written, for options with which a run of the
     study is impossible.
     """
-    options = read(Options, scene.options, scene.file, "options")
+    options = read(StabiliserOptions, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     check_steps(scene, engines)
     if scene.run.step > COARSEST_SPACING or scene.run.duration < FEWEST_ROWS * scene.run.step:
@@ -99,12 +99,12 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
         for value in getattr(options, name):
             if not 0.0 < value < math.inf:
                 raise InputError(scene.file, f"options.{name}", value, "must be above 0 and finite")
-    for on_road in roads(scene, options).values():
+    for on_road in scenes_by_road(scene, options).values():
         assembly_of_scene(on_road)
     return options
 
 
-def roads(scene: Scene, study_options: Options) -> dict[str, Scene]:
+def scenes_by_road(scene: Scene, study_options: StabiliserOptions) -> dict[str, Scene]:
     """Returns the scene on its road and, where options.grade is set, on the same road with that grade, by name."""
     if study_options.grade is None:
         return {"road": scene}
@@ -115,18 +115,19 @@ def roads(scene: Scene, study_options: Options) -> dict[str, Scene]:
     return {"road": scene, "grade": changed_scene(scene, effects={"road": {**road, "grade": study_options.grade}})}
 
 
-def compare(
+def compare_stabilisers(
     scene: Scene, engines: tuple[str, ...], output_folder: Path, report_study_progress: Progress
-) -> tuple["list[Bench]", list[Row], dict[str, str]]:
+) -> tuple["list[StabiliserBench]", list[FiguresRow], dict[str, str]]:
     """Run all stabilisers on all roads. Returns the benches, a row of figures for each run, and reasons of failed runs
     by name.
 
     The first engine runs all stabilisers; the other engines run, on the scene's road, the free run and
     those that are accepted.
     """
-    options, failed, rows = options_of(scene, engines), dict[str, str](), list[Row]()
+    options, failed, rows = options_of(scene, engines), dict[str, str](), list[FiguresRow]()
     benches = [
-        Bench(on_road, road, options, output_folder, scene.error) for road, on_road in roads(scene, options).items()
+        StabiliserBench(on_road, road, options, output_folder, scene.error)
+        for road, on_road in scenes_by_road(scene, options).items()
     ]
     for i, bench in enumerate(benches):
 
@@ -137,7 +138,7 @@ def compare(
     return benches, rows, failed
 
 
-class Bench:
+class StabiliserBench:
     """Virtual measurement on a road, and runs of the perturbed model with each stabiliser on the measured files.
 
     trusted : time (s) until which a free run can be trusted; holding : stiffness (N m/rad) of a spring that prevents
@@ -146,7 +147,12 @@ class Bench:
     """
 
     def __init__(
-        self, scene: Scene, road_name: str, study_options: Options, output_folder: Path, estimate_error: bool = False
+        self,
+        scene: Scene,
+        road_name: str,
+        study_options: StabiliserOptions,
+        output_folder: Path,
+        estimate_error: bool = False,
     ) -> None:
         self.road, self.options, self.folder = road_name, study_options, output_folder / road_name
         self.folder.mkdir()
@@ -216,11 +222,11 @@ class Bench:
 
     def score(
         self, engine: str, other_engines: tuple[str, ...], failures: dict[str, str], report_progress: Progress
-    ) -> list[Row]:
+    ) -> list[FiguresRow]:
         """Run all stabilisers in an engine, and the free run and the accepted ones in the other engines. Returns a row
         of figures per run; reasons of failed runs are added to ``failures``.
         """
-        rows: list[Row] = []
+        rows: list[FiguresRow] = []
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
         for i, (name, effects) in enumerate(self.methods.items()):
             report_progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
@@ -236,7 +242,7 @@ class Bench:
 
     def _rows_of_run(
         self, engine: str, stabiliser_name: str, stabiliser_effects: dict[str, Any], failures: dict[str, str]
-    ) -> list[Row]:
+    ) -> list[FiguresRow]:
         """Run a stabiliser in an engine. Returns its row of figures, or nothing if the run fails."""
         start = time.perf_counter()
         try:
@@ -263,7 +269,7 @@ class Bench:
         noise = {"force_noise": {"deviation": self.deviation, "seed": self.options.seed}}
         return self.follow(self.override, noise | stabiliser_effects)
 
-    def row(self, stabiliser_name: str, stabiliser_effects: dict[str, Any], run_result: Result) -> Row:
+    def row(self, stabiliser_name: str, stabiliser_effects: dict[str, Any], run_result: Result) -> FiguresRow:
         """Figures and verdicts of a run by name. A run whose vehicle tumbled has no damage ratios,
         which would mislead.
         """

@@ -27,7 +27,7 @@ from models.machine.compiled import named_closure
 from models.vehicles.pitch_plane import STATES, Parameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension_forces
 
-LONGEST_STEP = 1e-3
+LONGEST_TIME_STEP = 1e-3
 """Longest time step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs steps below 4 ms."""
 
 MODEL_DIFFERENCE_SHARE = 1e-6
@@ -216,7 +216,7 @@ class TangentPath:
         return self.step * np.arange(self.steps + 1)
 
 
-def path_of(vehicle_assembly: Assembly, longest_step: float = LONGEST_STEP) -> TangentPath:
+def tangent_path_of(vehicle_assembly: Assembly, longest_step: float = LONGEST_TIME_STEP) -> TangentPath:
     """Returns the path of a free force-excited run, in steps of at most ``longest_step`` (s). Raises ValueError for
     a run of another kind.
     """
@@ -282,8 +282,8 @@ class CovarianceOverTime:
         return np.sqrt(self.matrices[:, i, i])
 
 
-def covariance(
-    vehicle_assembly: Assembly, force_deviation: float, longest_step: float = LONGEST_STEP
+def covariance_over_time(
+    vehicle_assembly: Assembly, force_deviation: float, longest_step: float = LONGEST_TIME_STEP
 ) -> CovarianceOverTime:
     """Covariance of the state along a free force-excited run under white noise on the wheel forces, of standard
     deviation ``force_deviation`` (N) per sample.
@@ -291,7 +291,7 @@ def covariance(
     longest_step : longest time step (s). Raises ValueError for any other run, and for spline interpolation of
     samples, as every sample of a spline acts on all periods.
     """
-    path = path_of(vehicle_assembly, longest_step)
+    path = tangent_path_of(vehicle_assembly, longest_step)
     if vehicle_assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
     return CovarianceOverTime(

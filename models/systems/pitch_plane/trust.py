@@ -25,7 +25,7 @@ from models.drift.growth import (
     sinh_law_rate,
 )
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.tangent import LONGEST_STEP, TangentPath, path_of
+from models.systems.pitch_plane.tangent import LONGEST_TIME_STEP, TangentPath, tangent_path_of
 from models.vehicles.pitch_plane import Parameters
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def _watched_allowed_error(largest_pitch_error: float, run_result: Result) -> Wa
 
 
 @dataclass(frozen=True)
-class Growth:
+class PitchErrorGrowth:
     """Growth of a pitch error along the wheel forces of a run, computed before the run.
 
     times (n,) : of the samples (s); rate : mean growth rate (1/s); sinh_rate (n,) : the rate in the sinh law at each
@@ -86,18 +86,18 @@ class GrowthCurve:
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
 
-def pitch_error_growth(vehicle_assembly: Assembly) -> Growth:
+def pitch_error_growth(vehicle_assembly: Assembly) -> PitchErrorGrowth:
     """Computes the growth of a pitch error along a free force-excited run; raises ValueError for a
     run of another kind.
     """
-    path = path_of(vehicle_assembly)
+    path = tangent_path_of(vehicle_assembly)
     sample_times = path.forces.period * np.arange(path.samples + 1)
     if vehicle_assembly.mode == "force-body" or vehicle_assembly.vehicle.geometry == "linear":
-        return Growth(sample_times, 0.0, np.zeros(len(sample_times)))
+        return PitchErrorGrowth(sample_times, 0.0, np.zeros(len(sample_times)))
     values, p = _covering_samples(path), vehicle_assembly.parameters
     rate = pitch_rate_of_forces(values, path.forces.period, p)
     arguments = (rate, path.forces.period, p)
-    return Growth(sample_times, growth_rate(*arguments), sinh_law_rate(*arguments))
+    return PitchErrorGrowth(sample_times, growth_rate(*arguments), sinh_law_rate(*arguments))
 
 
 def _covering_samples(tangent_path: TangentPath) -> np.ndarray:
@@ -112,7 +112,7 @@ def noise_error_curve(vehicle_assembly: Assembly, force_deviation: float) -> Gro
     """Pitch error over time from white noise of ``force_deviation`` (N) on each force sample: median magnitude over
     noise paths.
     """
-    growing, period = pitch_error_growth(vehicle_assembly), path_of(vehicle_assembly).forces.period
+    growing, period = pitch_error_growth(vehicle_assembly), tangent_path_of(vehicle_assembly).forces.period
     intensity = rigid_pitch(vehicle_assembly.parameters).noise_intensity(force_deviation, period)
     return GrowthCurve(
         growing.times, MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity))
@@ -138,14 +138,14 @@ def interpolation_error(tangent_path: TangentPath) -> np.ndarray:
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation_error_curve(vehicle_assembly: Assembly, longest_step: float = LONGEST_STEP) -> GrowthCurve:
+def interpolation_error_curve(vehicle_assembly: Assembly, longest_step: float = LONGEST_TIME_STEP) -> GrowthCurve:
     """Pitch error over time from the interpolation between force samples alone; 0 for a run with too few samples."""
-    path = path_of(vehicle_assembly, longest_step)
+    path = tangent_path_of(vehicle_assembly, longest_step)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
 
 def model_error_curve(
-    vehicle_assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_STEP
+    vehicle_assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_TIME_STEP
 ) -> GrowthCurve:
     """Pitch error over time of a run with ``wrong_parameters`` instead of the assembly's parameters.
 
@@ -158,7 +158,7 @@ def model_error_curve(
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
     return _growth_by_parameters(
-        path_of(replace(vehicle_assembly, parameters=mean), longest_step), wrong_parameters=shifted
+        tangent_path_of(replace(vehicle_assembly, parameters=mean), longest_step), wrong_parameters=shifted
     )
 
 
@@ -174,7 +174,7 @@ def rounding_error_curve(vehicle_assembly: Assembly) -> GrowthCurve:
     """Pitch error over time from rounding alone, median magnitude: each step rounds the pitch rate. No solver can do
     better.
     """
-    growing, path = pitch_error_growth(vehicle_assembly), path_of(vehicle_assembly)
+    growing, path = pitch_error_growth(vehicle_assembly), tangent_path_of(vehicle_assembly)
     rate = pitch_rate_of_forces(_covering_samples(path), path.forces.period, vehicle_assembly.parameters)
     rounding_deviation = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
     return GrowthCurve(
@@ -184,7 +184,7 @@ def rounding_error_curve(vehicle_assembly: Assembly) -> GrowthCurve:
 
 
 @dataclass(frozen=True)
-class Trust:
+class TrustPrediction:
     """Prediction of how long a run can be trusted. times : time (s) at which each source of error exceeds ``angle``
     (rad), None where it never does; rate : mean growth rate of a pitch error (1/s).
 
@@ -214,13 +214,13 @@ class Trust:
         return f"trusted until about {time:.3g} s ({grown}, {name}){remarks}"
 
 
-def predict_trust(vehicle_assembly: Assembly, largest_pitch_error: float = UNTRUSTED_PITCH) -> Trust | None:
+def predict_trust(vehicle_assembly: Assembly, largest_pitch_error: float = UNTRUSTED_PITCH) -> TrustPrediction | None:
     """Predict how long a scene's run can be trusted, up to a pitch error ``largest_pitch_error`` (rad). None for a run
     with prescribed pitch, with a pitch spring or on a road, whose errors do not grow.
     """
     forces = vehicle_assembly.input
     try:
-        path_of(vehicle_assembly)
+        tangent_path_of(vehicle_assembly)
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
@@ -235,7 +235,7 @@ def predict_trust(vehicle_assembly: Assembly, largest_pitch_error: float = UNTRU
         times_of_causes[named] = noise_error_curve(vehicle_assembly, added.deviation).passing_time(largest_pitch_error)
     times_of_causes |= _steady_drift_time(vehicle_assembly, largest_pitch_error)
     times_of_causes["rounding"] = rounding_error_curve(vehicle_assembly).passing_time(largest_pitch_error)
-    return Trust(
+    return TrustPrediction(
         times_of_causes,
         pitch_error_growth(vehicle_assembly).rate,
         largest_pitch_error,
@@ -269,7 +269,7 @@ def _axles(vehicle_assembly: Assembly) -> "AxleForces":
     """Returns the wheel forces of a run in the form that the checks of recordings take."""
     from models.measured.axle_forces import AxleForces
 
-    path, turn = path_of(vehicle_assembly), vehicle_assembly.mode == "force-body"
+    path, turn = tangent_path_of(vehicle_assembly), vehicle_assembly.mode == "force-body"
     forces, lasts = _covering_samples(path), vehicle_assembly.scene.run.duration
     return AxleForces(forces, path.forces.period, vehicle_assembly.parameters, ((), ()), lasts, turns_with_chassis=turn)
 

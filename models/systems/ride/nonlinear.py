@@ -33,17 +33,17 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import MotionInRun, Spectral, checked_speeds, watched_vehicle
+from models.systems.ride.watched import MotionInRun, SpectralMotion, checked_speeds, watched_vehicle
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 
-LONGEST_STEP = 2e-3
+LONGEST_TIME_STEP = 2e-3
 """Longest time step (s) of runs in engines; stiff springs need a shorter step."""
 Progress = Callable[[str, float], None]
 
 
-class Sampling(Strict):
+class RunSampling(Strict):
     """Settings of runs in time: number and length of copies, time step, speeds and seed."""
 
     beside: list[float] = Field(default_factory=list, description="speeds in m/s for Monte Carlo; the middle if none")
@@ -61,7 +61,7 @@ class Sampling(Strict):
 
 
 @dataclass(frozen=True)
-class Nonlinear:
+class NonlinearRide:
     """Results of a nonlinear ride. small_motion (speeds, outputs) : standard deviations with slopes at rest;
     linearised_vehicles : by statistical linearisation, one per speed; copies : Monte Carlo copies by speed (m/s).
 
@@ -89,12 +89,12 @@ class Nonlinear:
 def linearised_result(
     scene: RideScene,
     vehicle: SpatialVehicle,
-    run_sampling: Sampling,
+    run_sampling: RunSampling,
     report_progress: Progress,
     estimate_error: bool = False,
 ) -> Result:
     """Compute standard deviations by small motion and by statistical linearisation at all speeds, and by Monte Carlo
-    copies at some; the result's detail is ``Nonlinear``.
+    copies at some; the result's detail is ``NonlinearRide``.
 
     estimate_error : whether errors are estimated, by further copies in longer steps.
     """
@@ -108,11 +108,9 @@ def linearised_result(
         replaced.append(statistically_linear(on_road, road, speed))
     shown = run_sampling.shown(speeds)
     compared_speeds = run_sampling.beside or [shown]
-    copies = _copies_by_speed(
-        scene, CopiesBySpeed(vehicle, road, tuple(compared_speeds), run_sampling), report_progress
-    )
+    copies = _copies_by_speed(scene, CopiesJob(vehicle, road, tuple(compared_speeds), run_sampling), report_progress)
     at_shown = statistically_linear(on_road, road, shown)
-    linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
+    linear_runs = NonlinearRide(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
     by_speed |= {field_name: linear_runs.quantity_by_speed(field_name) for field_name in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
@@ -151,7 +149,7 @@ def linearised_result(
 
 
 @dataclass(frozen=True)
-class CopiesBySpeed:
+class CopiesJob:
     """Job for worker processes (see ``models.ensemble.runner``) whose path i is all Monte Carlo copies at the i-th
     speed (m/s).
     """
@@ -159,7 +157,7 @@ class CopiesBySpeed:
     vehicle: SpatialVehicle
     road: Excitation
     speeds: tuple[float, ...]
-    sampling: Sampling
+    sampling: RunSampling
 
     def __call__(self, speed_indices: range) -> Arrays:
         """Returns the fields of ``Copies`` as arrays, with the speed as their first axis."""
@@ -178,9 +176,7 @@ class CopiesBySpeed:
         return {}
 
 
-def _copies_by_speed(
-    scene: RideScene, copies_job: CopiesBySpeed, report_study_progress: Progress
-) -> dict[float, Copies]:
+def _copies_by_speed(scene: RideScene, copies_job: CopiesJob, report_study_progress: Progress) -> dict[float, Copies]:
     """Compute Monte Carlo copies by the scene's worker processes; returns them by speed (m/s)."""
 
     def report_progress(finished_blocks: Done) -> None:
@@ -215,7 +211,7 @@ def _equivalent_at_speed(
 
 def _motion_of_equivalents(
     vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, linearised_vehicles: list[StatisticallyLinear]
-) -> Spectral:
+) -> SpectralMotion:
     """Returns the Gaussian motion of the parts of statistically linearised vehicles; springs move about their mean
     travels.
     """
@@ -225,34 +221,34 @@ def _motion_of_equivalents(
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
         for name in linearised_vehicles[0].springs
     }
-    return Spectral(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
+    return SpectralMotion(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
 
 
 def engine_result(
     scene: RideScene,
     engine: str,
     vehicle: SpatialVehicle,
-    run_sampling: Sampling,
+    run_sampling: RunSampling,
     estimate_error: bool = False,
     road_heights: np.ndarray | None = None,
 ) -> Result:
     """Run the vehicle in an engine over a random road, at the speed of ``Sampling.shown``; the result's detail is
-    ``Ride``.
+    ``EngineRide``.
 
     estimate_error : whether the error of the steps is estimated, by runs in longer steps on the same road; road_heights
     : a road in place of the drawn one, as ``RoadPath.wheel_heights_and_rates`` has it.
     """
     assert scene.speeds is not None
     speed, road = run_sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    path = road_path(road, speed, min(run_sampling.step or LONGEST_STEP, longest_resolving_step(vehicle, speed)))
+    path = road_path(road, speed, min(run_sampling.step or LONGEST_TIME_STEP, longest_resolving_step(vehicle, speed)))
     start_time, row_interval, skipped = (
         time.process_time(),
-        max(1, round(2.0 * LONGEST_STEP / path.step)),
+        max(1, round(2.0 * LONGEST_TIME_STEP / path.step)),
         run_sampling.skipped,
     )
     if road_heights is None:
         road_heights = path.wheel_heights_and_rates(int(np.ceil(run_sampling.driven / path.step)), run_sampling.seed)
-    ride = ride_over(engine, vehicle, path, road_heights, skipped_time=skipped, steps_per_output=row_interval)
+    ride = ride_over_heights(engine, vehicle, path, road_heights, skipped_time=skipped, steps_per_output=row_interval)
     labelled = result(
         scene,
         {"output_value": Channel(("time", "output"), ride.outputs)},
@@ -295,7 +291,7 @@ def _with_error_of_steps(
     steps = len(road_heights) // 2
     first = STEPS_BETWEEN_ROWS * int(min(skipped_time / road_path.step, FIRST_ROW_SHARE * steps) / STEPS_BETWEEN_ROWS)
 
-    def series(ride: Ride, begin_time: float) -> Series:
+    def series(ride: EngineRide, begin_time: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
         return Series(begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
@@ -307,7 +303,9 @@ def _with_error_of_steps(
         count = int(REPEATED_SHARE * run_share * steps / step_factor)
         read = road_heights[:: round(step_factor)] if step_factor >= 1.0 else _road_at_half_spacing(road_heights)
         begin = first * road_path.step
-        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped_time=begin, steps_per_output=stride)
+        ride = ride_over_heights(
+            engine, vehicle, longer, read[: 2 * count + 1], skipped_time=begin, steps_per_output=stride
+        )
         return series(ride, begin)
 
     outputs = outputs_at_other_steps(
@@ -325,7 +323,7 @@ def _road_at_half_spacing(road_heights: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Ride:
+class EngineRide:
     """A ride in an engine: states at every time step (``run``), and outputs (m, p) at ``times`` (m,) in s from the
     first output on.
 
@@ -370,17 +368,17 @@ def drive_over_road(
     road_seed: int = 0,
     skipped_time: float = 0.0,
     steps_per_output: int = 1,
-) -> Ride:
+) -> EngineRide:
     """Simulate a ride in an engine over a random road, from rest for about ``duration`` (s). Outputs begin after
     ``skipped_time`` (s) and are ``steps_per_output`` steps apart.
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     table = road.wheel_heights_and_rates(int(np.ceil(duration / road.step)), road_seed)
-    return ride_over(engine, vehicle, road, table, skipped_time=skipped_time, steps_per_output=steps_per_output)
+    return ride_over_heights(engine, vehicle, road, table, skipped_time=skipped_time, steps_per_output=steps_per_output)
 
 
-def ride_over(
+def ride_over_heights(
     engine: str,
     vehicle: SpatialVehicle,
     road: RoadPath,
@@ -388,7 +386,7 @@ def ride_over(
     *,
     skipped_time: float = 0.0,
     steps_per_output: int = 1,
-) -> Ride:
+) -> EngineRide:
     """Simulate a ride in an engine over the road heights in ``road_heights``, otherwise as ``drive_over_road``."""
     check_rates(vehicle, road.excitation)
     steps = len(road_heights) // 2
@@ -410,7 +408,7 @@ def outputs_at_other_steps(
     road_heights: np.ndarray,
     trajectory: Trajectory,
     step_indices: np.ndarray,
-) -> Ride:
+) -> EngineRide:
     """Computes the outputs of an engine's run at other steps, ``step_indices`` (m,)."""
     return _outputs_at_steps(
         _engine_model(engine, vehicle, road, road_heights), vehicle, road, road_heights, trajectory, step_indices
@@ -424,7 +422,7 @@ def _outputs_at_steps(
     road_heights: np.ndarray,
     trajectory: Trajectory,
     step_indices: np.ndarray,
-) -> Ride:
+) -> EngineRide:
     """Computes the outputs of a run at the steps ``step_indices`` (m,) with a built model."""
     linear = linearise(vehicle, road.speed)
     accelerations = np.array(
@@ -455,7 +453,9 @@ def _outputs_at_steps(
             )
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
-    return Ride(linear.names, trajectory, step_indices * road.step - step_indices[0] * road.step, outputs, step_indices)
+    return EngineRide(
+        linear.names, trajectory, step_indices * road.step - step_indices[0] * road.step, outputs, step_indices
+    )
 
 
 def factors_of_output(output: Output) -> np.ndarray:

@@ -58,7 +58,7 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
     return {name: float(np.sqrt(isotropic / plain) - 1.0) for name, plain, isotropic in pairs if plain > 0}
 
 
-def largest_gap(sweep: Sweep, reference_sweep: Sweep) -> float:
+def largest_deviation_difference(sweep: Sweep, reference_sweep: Sweep) -> float:
     """Largest difference of standard deviations between two sweeps, where both are finite, divided by the output's
     largest standard deviation on any road.
     """
@@ -70,7 +70,9 @@ def largest_gap(sweep: Sweep, reference_sweep: Sweep) -> float:
     return float(np.max(np.abs(compared_deviations - known) / np.where(largest > 0, largest, 1.0)))
 
 
-def largest_errors(sweep: Sweep, case_index: int, true_deviations: np.ndarray, output_names: list[str]) -> np.ndarray:
+def largest_deviation_errors(
+    sweep: Sweep, case_index: int, true_deviations: np.ndarray, output_names: list[str]
+) -> np.ndarray:
     """Largest relative error (outputs,) over the speeds of the standard deviations in a case of a sweep, compared with
     true standard deviations (speeds, outputs).
 
@@ -86,7 +88,7 @@ def largest_errors(sweep: Sweep, case_index: int, true_deviations: np.ndarray, o
     return errors
 
 
-def quasi_stationary_gaps(
+def quasi_stationary_errors(
     varying_speed_deviations: VaryingSpeed, quasi_stationary_deviations: np.ndarray
 ) -> np.ndarray:
     """Errors (instants, outputs) of quasi-stationary standard deviations along a drive, divided by each output's

@@ -61,7 +61,7 @@ class ReducedScene:
 
 
 @dataclass(frozen=True)
-class Effect:
+class OmissibleEffect:
     """An effect of a ride scene that can be left out. without : function that leaves it out; says : text on what
     leaving it out means.
 
@@ -81,7 +81,7 @@ class Effect:
     has_table: bool = False
 
 
-def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
+def refusal_reason(omitted_effects: Iterable[OmissibleEffect]) -> str:
     """Returns the reason why some effects may not be left out together, with the remedy; empty where they may."""
     omitted_effects = tuple(omitted_effects)
     names = {effect.name for effect in omitted_effects}
@@ -95,7 +95,7 @@ def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
     return ""
 
 
-def reduced_without(reduced_scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
+def reduced_without(reduced_scene: ReducedScene, omitted_effects: Iterable[OmissibleEffect]) -> ReducedScene:
     """Returns the scene without some effects. Effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:

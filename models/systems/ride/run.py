@@ -17,16 +17,22 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED_LAW_ACCURACY, MATRIX_ACCURACY, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, needs_run_in_time, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, checked_speeds, watched_deviations
+from models.systems.ride.watched import (
+    JUDGED_SPEEDS,
+    MotionAlongDrive,
+    SpectralMotion,
+    checked_speeds,
+    watched_deviations,
+)
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
 if TYPE_CHECKING:
-    from models.systems.ride.nonlinear import Progress, Sampling
+    from models.systems.ride.nonlinear import Progress, RunSampling
 
-AS_WRITTEN = "as in the scene"
+CORRELATIONS_AS_WRITTEN = "as in the scene"
 """Name of the scene's correlation of the road in a result."""
-ANY_SPEED = 1.0
+ARBITRARY_SPEED = 1.0
 """Speed (m/s) at which a vehicle of a drive at varying speed is linearised: its matrices do not depend on the speed."""
 QUASI_STATIONARY_SPEEDS = 90
 """Number of constant speeds, from standstill on, between which quasi-stationary deviations of a drive are
@@ -43,7 +49,7 @@ class SweepPoints:
     """
 
     speeds: Sequence[float] | None = None
-    correlations: Mapping[str, tuple[str, str] | None] = field(default_factory=lambda: {AS_WRITTEN: None})
+    correlations: Mapping[str, tuple[str, str] | None] = field(default_factory=lambda: {CORRELATIONS_AS_WRITTEN: None})
 
 
 def run(
@@ -52,7 +58,7 @@ def run(
     *,
     vehicle: SpatialVehicle | None = None,
     sweep_points: SweepPoints | None = None,
-    sampling: "Sampling | None" = None,
+    sampling: "RunSampling | None" = None,
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
 ) -> Result:
@@ -65,7 +71,8 @@ def run(
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
     are always checked.
 
-    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, for an engine in time, a ``Ride``.
+    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``NonlinearRide`` or, for an engine in time, a
+    ``EngineRide``.
     """
     engine = engine or "reference"
     with scene_errors(scene):
@@ -77,7 +84,7 @@ def run(
             )
         from models.systems.ride import nonlinear
 
-        vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
+        vehicle, sampling = vehicle_of(scene), sampling or nonlinear.RunSampling()
         if engine == "reference":
             return nonlinear.linearised_result(scene, vehicle, sampling, progress, error)
         return nonlinear.engine_result(scene, engine, vehicle, sampling, error)
@@ -109,9 +116,9 @@ def _deviations_by_speed(
         seconds=time.process_time() - start_time,
         detail=swept,
     )
-    road = roads.get(AS_WRITTEN, [*roads.values()][-1])
+    road = roads.get(CORRELATIONS_AS_WRITTEN, [*roads.values()][-1])
     with_assumptions(
-        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, checked_speeds(swept.speeds), {}))
+        labelled, assumptions(scene, vehicle, SpectralMotion(vehicle, linear, road, checked_speeds(swept.speeds), {}))
     )
     if not estimate_error:
         return labelled
@@ -132,7 +139,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, es
 
     assert scene.drive is not None
     start_time, weightings = time.process_time(), scene.weighting
-    linear, road = linear_vehicle(vehicle, engine)(ANY_SPEED), excitation_of(scene, wheels(vehicle))
+    linear, road = linear_vehicle(vehicle, engine)(ARBITRARY_SPEED), excitation_of(scene, wheels(vehicle))
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY_SPEEDS)
     quasi_stationary_deviations = quasi_stationary(linear, road, speeds, weightings=weightings)
@@ -164,7 +171,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, es
         seconds=time.process_time() - start_time,
         detail=drive,
     )
-    spectral = Spectral(
+    spectral = SpectralMotion(
         vehicle, lambda _: linear, road, checked_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
     )
     with_assumptions(

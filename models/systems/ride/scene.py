@@ -20,7 +20,7 @@ FrontRearCorrelation = Literal["delayed", "uncorrelated", "equal"]
 WheelTracks = Literal["own", "tracks"]
 
 
-class RideVehicle(Strict):
+class RideVehicleTable(Strict):
     """[vehicle]: a vehicle file, and the operating point about which the vehicle is linearised."""
 
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
@@ -29,7 +29,7 @@ class RideVehicle(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class Road(Strict):
+class RideRoadTable(Strict):
     """[road]: random road of two tracks, made of a mean and a roll process, with published values or fitted to a
     measured road.
     """
@@ -54,7 +54,7 @@ class Road(Strict):
     wheels: WheelTracks = Field(default="own", description="each at its own y, or in the front wheels' tracks")
 
 
-class Drive(Strict):
+class DriveTable(Strict):
     """[drive]: a speed that varies over time, linear between points."""
 
     time: list[float] = Field(description="times in s, rising")
@@ -72,10 +72,10 @@ class RideScene(SceneFile):
 
     system: Literal["ride"] = "ride"
     study: str = Field(default="ride", description="the study that runs the scene")
-    vehicle: RideVehicle
-    road: Road = Road()
+    vehicle: RideVehicleTable
+    road: RideRoadTable = RideRoadTable()
     speeds: Speeds | None = Field(default=None, description="constant speeds")
-    drive: Drive | None = Field(default=None, description="a speed that varies")
+    drive: DriveTable | None = Field(default=None, description="a speed that varies")
     weighting: dict[str, Literal["Wk", "Wd"]] = Field(default_factory=dict, description="ISO 2631-1, output by output")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
@@ -109,7 +109,7 @@ KEYS_REPLACED_BY_FILE = ("level", "iso8608", "q_mean", "q_roll", "corner_mean", 
 """Keys of [road] whose values are fitted where a measured road file is given."""
 
 
-def _check_road(scene_path: str, road_table: Road) -> None:
+def _check_road(scene_path: str, road_table: RideRoadTable) -> None:
     foreign = KEYS_OF_ROAD_FILE if road_table.file is None else KEYS_REPLACED_BY_FILE
     for name in foreign:
         if name in road_table.model_fields_set:
@@ -124,7 +124,7 @@ def _check_road(scene_path: str, road_table: Road) -> None:
             raise InputError(scene_path, "road.cutoff", road_table.cutoff, allowed)
 
 
-def _check_intensities(scene_path: str, road_table: Road) -> None:
+def _check_intensities(scene_path: str, road_table: RideRoadTable) -> None:
     given_intensities = [name for name in ("q_mean", "q_roll") if getattr(road_table, name) is not None]
     if len(given_intensities) == 1:
         missing_intensity = "q_roll" if given_intensities == ["q_mean"] else "q_mean"

@@ -85,7 +85,7 @@ def checked_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Spectral:
+class SpectralMotion:
     """Gaussian motion of a vehicle's parts from covariances at constant speeds (m/s). ``means`` (speeds,) : of motions
     whose mean is not the rest position, by name.
     """
@@ -123,7 +123,7 @@ class MotionAlongDrive:
     """
 
     deviations: Mapping[str, np.ndarray]
-    speed_by_speed: Spectral
+    speed_by_speed: SpectralMotion
 
     def motion_of_part(self, motion_name: str) -> Gaussian:
         """Returns the Gaussian statistics of a part's motion at every instant of the drive, or at some speeds."""

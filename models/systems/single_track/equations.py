@@ -27,7 +27,7 @@ TURNING_SLIP_WIDTH = 0.02
 """Range of slip angle (rad) over which friction changes from its value in right turns to its value in left turns."""
 
 
-class Axle(NamedTuple):
+class AxleTyres(NamedTuple):
     """Tyres of an axle. stiffness : cornering stiffness divided by load (1/rad); friction : largest side force divided
     by load, mu; bend_sharpness : exponent n of the bend; side : share by which friction is larger in left turns and
     smaller in right turns; lift_coefficient : upward air force divided by speed squared (N s^2/m^2), negative for
@@ -42,7 +42,7 @@ class Axle(NamedTuple):
     rise: float
 
 
-class Car(NamedTuple):
+class SingleTrackCar(NamedTuple):
     """Parameters of a car in the plane. mass (kg); front_arm, rear_arm : distances from the centre of mass to the axles
     (m); inertia : yaw inertia about the centre of mass (kg m^2); height : of the centre of mass (m); drag : air drag
     divided by speed squared (N s^2/m^2); front_braking_share, front_driving_share : shares of the front axle in
@@ -60,7 +60,7 @@ class Car(NamedTuple):
 
 
 @compiled
-def axle_force(axle_tyres: Axle, axle_load: float, forward_force: float, slip_angle: float) -> float:
+def axle_force(axle_tyres: AxleTyres, axle_load: float, forward_force: float, slip_angle: float) -> float:
     """Side force (N, left positive) of an axle at a slip angle (rad), under a load (N) and a forward force (N)."""
     grip = axle_tyres.friction * axle_load * (1.0 - axle_tyres.side * np.tanh(slip_angle / TURNING_SLIP_WIDTH))
     across = grip * np.sqrt(max(1.0 - (forward_force / grip) ** 2, LEAST_SHARE))
@@ -71,7 +71,11 @@ def axle_force(axle_tyres: Axle, axle_load: float, forward_force: float, slip_an
 
 @compiled
 def forces(
-    car: Car, front_tyres: Axle, rear_tyres: Axle, motion: tuple[float, float], driven_input: tuple[float, float, float]
+    car: SingleTrackCar,
+    front_tyres: AxleTyres,
+    rear_tyres: AxleTyres,
+    motion: tuple[float, float],
+    driven_input: tuple[float, float, float],
 ) -> tuple:
     """Returns side force of all tyres (N), yaw moment (N m), then loads (N), side forces (N) and slip angles (rad) of
     the axles, front before rear.
@@ -106,7 +110,11 @@ def forces(
 
 @compiled
 def motion_rates(
-    car: Car, front_tyres: Axle, rear_tyres: Axle, motion: tuple[float, float], driven_input: tuple[float, float, float]
+    car: SingleTrackCar,
+    front_tyres: AxleTyres,
+    rear_tyres: AxleTyres,
+    motion: tuple[float, float],
+    driven_input: tuple[float, float, float],
 ) -> tuple:
     """Rates of the lateral velocity (m/s^2) and of the yaw rate (rad/s^2) of the single-track car."""
     resultants = forces(car, front_tyres, rear_tyres, motion, driven_input)
@@ -115,9 +123,9 @@ def motion_rates(
 
 @compiled
 def march(
-    car: Car,
-    front_tyres: Axle,
-    rear_tyres: Axle,
+    car: SingleTrackCar,
+    front_tyres: AxleTyres,
+    rear_tyres: AxleTyres,
     input_samples: np.ndarray,
     time_step: float,
     initial_motion: tuple[float, float],
@@ -144,7 +152,7 @@ def march(
 
 @compiled
 def motion_reports(
-    car: Car, front_tyres: Axle, rear_tyres: Axle, input_samples: np.ndarray, motion: np.ndarray
+    car: SingleTrackCar, front_tyres: AxleTyres, rear_tyres: AxleTyres, input_samples: np.ndarray, motion: np.ndarray
 ) -> np.ndarray:
     """Lateral acceleration (m/s^2), loads (N), side forces (N) and slip angles (rad) of a motion, shape (n, 7); of each
     pair the front axle stands first.

@@ -19,7 +19,7 @@ from models.core.smoothing import low_passed
 from models.measured.drive import MeasuredDrive, read_drive
 from models.systems.single_track.assumptions import assumptions
 from models.systems.single_track.equations import march, motion_reports
-from models.systems.single_track.scene import SensorTable, SingleTrackScene
+from models.systems.single_track.scene import SensorErrorTable, SingleTrackScene
 
 SETTLING_DURATION = 1.0
 """Time (s) for which the first sample's steer angle and speed act before the drive, so that the drive begins in a
@@ -147,7 +147,7 @@ def simulated_motion(
 
 
 def sensor_channels(
-    sensor_errors: SensorTable, input_samples: np.ndarray, motion: np.ndarray, lateral_acceleration: np.ndarray
+    sensor_errors: SensorErrorTable, input_samples: np.ndarray, motion: np.ndarray, lateral_acceleration: np.ndarray
 ) -> dict[str, Channel]:
     """Readings of the car's sensors, offsets included, by the channel names of a measurement.
 

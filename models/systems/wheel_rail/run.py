@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.rail.contact_table import PatchReport, WheelsetContact, WheelsetPlacement, rolling_radius_difference
 from models.systems.wheel_rail.assumptions import WHEEL_NAMES, assumptions
-from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
+from models.systems.wheel_rail.scene import LARGEST_CELL_COUNT, WheelRailScene
 
 INPUTS_OF_DEEP_CONTACT = ("distance", "load")
 """Inputs that the contact theories refuse where the contact grows beyond the computed surroundings of the profiles."""
@@ -122,7 +122,7 @@ def _with_error(run_result: Result, scene: WheelRailScene, wheelset_contact: Whe
     of_fine, of_coarse = (np.array([wheel_sums(placed) for placed in placements]) for placements in (fine, coarse))
     errors, sizes = (np.sqrt(np.mean(values**2, axis=(0, 1))) for values in (of_fine - of_coarse, of_fine))
     estimates = {
-        name: grid_error(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
+        name: grid_error(float(error), float(size), unit, scene.method.cells, 1.0, LARGEST_CELL_COUNT)
         for (name, unit), error, size in zip(WHEEL_QUANTITIES.items(), errors, sizes, strict=True)
     }
     return with_stated_errors(

@@ -13,9 +13,9 @@ from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 from models.rail.contact_table import CELLS_PER_STRIP, WheelsetContact
 from models.rail.laid_profiles import Profiles
-from models.systems.contact.scene import Bodies
+from models.systems.contact.scene import WheelRailBodies
 
-MOST_CELLS = 300
+LARGEST_CELL_COUNT = 300
 """Most cells along each axis of a patch in the computation of creep forces."""
 
 
@@ -27,7 +27,7 @@ class WheelsetOnRails(Strict):
     speed: float = quantity("m/s", "of the wheelset along the track", default=2.0)
 
 
-class Positions(Strict):
+class LateralPositions(Strict):
     """[positions]: lateral displacements of the wheelset, evenly spaced, positive to the right."""
 
     start: float = quantity("m", "first displacement", default=0.0, signed=True)
@@ -39,7 +39,7 @@ class Positions(Strict):
         return np.linspace(self.start, self.stop, self.count)
 
 
-class Case(Strict):
+class WheelRailCase(Strict):
     """[cases.NAME]: yaw of the wheelset, and friction if it rolls."""
 
     yaw: float = quantity("rad/m", "yaw for each metre of displacement", default=0.0, signed=True)
@@ -48,11 +48,14 @@ class Case(Strict):
     )
 
 
-class Method(Strict):
+class PatchCells(Strict):
     """[method]: number of cells with which contacts are computed."""
 
     cells: int = Field(
-        default=CELLS_PER_STRIP, ge=9, le=MOST_CELLS, description="along each axis of a patch, more on normal pressures"
+        default=CELLS_PER_STRIP,
+        ge=9,
+        le=LARGEST_CELL_COUNT,
+        description="along each axis of a patch, more on normal pressures",
     )
 
 
@@ -61,14 +64,14 @@ class WheelRailScene(SceneFile):
 
     system: Literal["wheel-rail"] = "wheel-rail"
     study: str = Field(default="manchester", description="the study that runs the scene")
-    bodies: Bodies = Bodies()
+    bodies: WheelRailBodies = WheelRailBodies()
     profiles: Profiles = Profiles()
     wheelset: WheelsetOnRails = WheelsetOnRails()
-    positions: Positions = Positions()
-    method: Method = Method()
-    cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
+    positions: LateralPositions = LateralPositions()
+    method: PatchCells = PatchCells()
+    cases: dict[str, WheelRailCase] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
-    def contact(self, rail_case: Case) -> WheelsetContact:
+    def contact(self, rail_case: WheelRailCase) -> WheelsetContact:
         """Returns the contact problem of the wheelset on the track in a case; raises InputError for files that are no
         profiles.
         """

@@ -62,7 +62,7 @@ def _checked_wheelset(parameter_values: dict[str, Any], named_file: str, named_t
         raise InputError(named_file, key_path, error.value, error.allowed) from None
 
 
-def implementation(engine: str) -> type[Equations]:
+def equations_class(engine: str) -> type[Equations]:
     """Returns the class of the equations of motion in "reference", "exudyn" or "mujoco"; no other engine is
     imported.
     """
@@ -72,14 +72,14 @@ def implementation(engine: str) -> type[Equations]:
 
 def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
     """Equations of motion of the scene's wheelset, with its law of creep, at a speed (m/s)."""
-    return implementation(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
+    return equations_class(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
 
 
 @lru_cache(32)
 def _initial_state(
     engine: str, wheelset: Wheelset, speed: float, creep_law: Any, cell_count: int, lateral_shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
-    equations = implementation(engine)(wheelset, speed, creep_law, cell_count)
+    equations = equations_class(engine)(wheelset, speed, creep_law, cell_count)
     state = equations.displaced_state(lateral_shift)
     state[YAW] = yaw
     return equations, state

@@ -33,16 +33,22 @@ from models.systems.wheelset.assumptions import assumptions, branch_assumptions,
 from models.systems.wheelset.of_scene import (
     SPEED_SHARES,
     equations_and_start,
+    equations_class,
     equations_of,
-    implementation,
     path_speeds,
     wheelset_of,
 )
 from models.systems.wheelset.scene import WheelsetScene
 from models.systems.wheelset.stated_error import FEWEST_CELLS, with_error, with_error_of_cycles
 
-STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {"normal": ("load", "N"), "fx": ("fx", "N"), "fy": ("fy", "N"), "mz": ("mz", "N m"), "power": ("power", "W")}
+STATE_CHANNELS = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
+CONTACT_CHANNELS = {
+    "normal": ("load", "N"),
+    "fx": ("fx", "N"),
+    "fy": ("fy", "N"),
+    "mz": ("mz", "N m"),
+    "power": ("power", "W"),
+}
 """Channels of every path: states with their index, quantities of the contact patches with their field, and units."""
 SPEED: SoughtQuantity = "speed"
 AMPLITUDE: SoughtQuantity = "amplitude"
@@ -72,9 +78,13 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
     speed = path_speeds(scene)[0] if speed is None else speed
     equations_and_start(scene, engine, speed)  # kept: its seconds are none of the path
     start_time = time.process_time()
-    motion = path(scene, engine, speed)
+    motion = simulated_path(scene, engine, speed)
     labelled = path_result(scene, engine, speed, motion, seconds=time.process_time() - start_time)
-    return with_error(labelled, scene, lambda changed_scene: path(changed_scene, engine, speed)) if error else labelled
+    return (
+        with_error(labelled, scene, lambda changed_scene: simulated_path(changed_scene, engine, speed))
+        if error
+        else labelled
+    )
 
 
 def path_result(
@@ -85,7 +95,7 @@ def path_result(
     return with_assumptions(_labelled_result(scene, engine, wheelset_path, **result_fields), assumptions(equations))
 
 
-def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
+def simulated_path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
     """Simulate the wheelset at a speed (m/s) from the scene's initial displacement and yaw; states at every step."""
     equations, start = equations_and_start(scene, engine, speed)
     return equations.run(start, scene.run.duration, scene.run.step)
@@ -93,10 +103,10 @@ def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
 
 def _labelled_result(scene: WheelsetScene, engine: str, wheelset_path: WheelsetPath, **result_fields: Any) -> Result:
     steps, time_axis = len(wheelset_path.times) - 1, Channel("time", wheelset_path.times, "s")
-    channels = {name: Channel("time", wheelset_path.states[:, k], unit) for name, (k, unit) in STATES.items()}
+    channels = {name: Channel("time", wheelset_path.states[:, k], unit) for name, (k, unit) in STATE_CHANNELS.items()}
     channels |= {
         name: Channel(("time", "patch"), wheelset_path.contacts[field], unit)
-        for name, (field, unit) in CONTACTS.items()
+        for name, (field, unit) in CONTACT_CHANNELS.items()
     }
     counts = {"steps": steps, "force calls": 4 * steps}
     return result(
@@ -143,7 +153,7 @@ def linearised_result(scene: WheelsetScene, engine: str, *, estimate_error: bool
 
     estimate_error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
     """
-    kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
+    kind, wheelset, speeds = equations_class(engine), wheelset_of(scene), scene.speeds.all()
     linear = LinearisedMotion(
         speeds,
         root_locus(kind, wheelset, speeds),

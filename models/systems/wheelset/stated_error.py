@@ -28,7 +28,7 @@ from models.core.result import Result
 from models.rail.equations import YAW, WheelsetPath, Y
 from models.rail.limit_cycle import Orbit
 from models.systems.wheelset.assumptions import sums_by_wheel
-from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
+from models.systems.wheelset.scene import LARGEST_CELL_COUNT, WheelsetScene
 
 UNIT_OF_CHANNEL = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
 """Channels whose error is stated, with their units; forces are the sum over the patches of a wheel."""
@@ -46,11 +46,11 @@ steps.
 """
 FEWEST_CELLS = 5
 """Fewest cells per strip that can be halved."""
-March = Callable[[WheelsetScene], WheelsetPath]
+SimulatePath = Callable[[WheelsetScene], WheelsetPath]
 """Function that simulates a scene in one engine at one speed, and returns the path."""
 
 
-def with_error(run_result: Result, scene: WheelsetScene, simulate_path: March) -> Result:
+def with_error(run_result: Result, scene: WheelsetScene, simulate_path: SimulatePath) -> Result:
     """Returns the result of a path with the stated errors of its principal channels. Raises RunFailed where the errors
     are too large for the result to be used.
     """
@@ -74,7 +74,7 @@ def with_error(run_result: Result, scene: WheelsetScene, simulate_path: March) -
     estimates = _step_errors(scene, simulate_path, fine, coarse, sizes)
     for name, unit in UNIT_OF_CHANNEL.items():
         gap = _rms_difference(fine, coarse, name)
-        estimates[f"{name} of cells"] = grid_error(gap, sizes[name], unit, cells, CELL_ERROR_ORDER, MOST_CELLS)
+        estimates[f"{name} of cells"] = grid_error(gap, sizes[name], unit, cells, CELL_ERROR_ORDER, LARGEST_CELL_COUNT)
     return with_stated_errors(run_result, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
@@ -114,7 +114,7 @@ def with_step_factor(
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse_series(scene: WheelsetScene, simulate_path: March, cell_count: int) -> Series:
+def _coarse_series(scene: WheelsetScene, simulate_path: SimulatePath, cell_count: int) -> Series:
     """Time series of the path on another number of cells, in twice the time step where this is possible."""
     with suppress(InputError, RunFailed):
         return principal_series(simulate_path(with_step_factor(scene, 2.0, cell_count=cell_count)))
@@ -123,7 +123,7 @@ def _coarse_series(scene: WheelsetScene, simulate_path: March, cell_count: int) 
 
 def _step_errors(
     scene: WheelsetScene,
-    simulate_path: March,
+    simulate_path: SimulatePath,
     fine_series: Series,
     coarse_series: Series,
     channel_sizes: Mapping[str, float],
@@ -197,7 +197,9 @@ def with_error_of_cycles(
                 for k, coarse_orbit in coarse_limit_cycles.items()
             ]
             left = LIKELY_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
-            estimates[f"{name} of cells"] = grid_error(left, size, unit, cell_count, CELL_ERROR_ORDER, MOST_CELLS)
+            estimates[f"{name} of cells"] = grid_error(
+                left, size, unit, cell_count, CELL_ERROR_ORDER, LARGEST_CELL_COUNT
+            )
     cells_text = (
         f", and half the cells at {len(coarse_limit_cycles)} of {len(limit_cycles)} cycles"
         if coarse_limit_cycles

@@ -65,7 +65,7 @@ def _random_scene(generator: np.random.Generator) -> tuple[WheelsetScene, str, f
 
 
 def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
-    marched, march = list[float](), system.path
+    marched, march = list[float](), system.simulated_path
 
     def counted(other_scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
         path = march(other_scene, engine, speed)

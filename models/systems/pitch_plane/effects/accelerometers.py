@@ -21,7 +21,7 @@ from models.systems.pitch_plane.sampling import (
     SEED_FIELD,
     check_rate,
     instant_numbers,
-    read_samples,
+    sample_and_hold,
     within_range,
 )
 
@@ -93,7 +93,7 @@ class Accelerometers:
     def __call__(self, vehicle_assembly: Assembly, trajectory: Trajectory, engine_model: Model) -> Channels:
         """Returns three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
         p, number = self.parameters, instant_numbers(trajectory.times, self.parameters.sampling_rate)
-        row = read_samples(
+        row = sample_and_hold(
             trajectory.times, np.arange(len(trajectory.times)), p.sampling_rate, vehicle_assembly.scene, RATE_KEY
         )
         values = self._readings(vehicle_assembly, trajectory, engine_model, np.unique(row))[number]

@@ -31,7 +31,7 @@ from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
 
 if TYPE_CHECKING:
-    from models.systems.pitch_plane.pitch_filter import Measurement, PitchEstimate
+    from models.systems.pitch_plane.pitch_filter import PitchEstimate, PitchMeasurement
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_and_pitch")
@@ -145,7 +145,7 @@ def guide_of(vehicle_assembly: Assembly, filter_parameters: Parameters) -> Guidi
     """Returns the estimated pitch that a force-excited assembly follows. Raises InputError for an unusable file, and
     RunFailed from the filter.
     """
-    from models.systems.pitch_plane.pitch_filter import estimate
+    from models.systems.pitch_plane.pitch_filter import estimate_pitch
 
     measured, forces, p_vehicle = (
         _measurement(vehicle_assembly, filter_parameters),
@@ -157,7 +157,7 @@ def guide_of(vehicle_assembly: Assembly, filter_parameters: Parameters) -> Guidi
     kind = vehicle_assembly.mode, vehicle_assembly.vehicle.geometry, vehicle_assembly.scene.run.duration
     key = pickle.dumps((kind, p_vehicle.array(), vehicle_assembly.initial, signal, measured, filter_parameters))
     if key not in _LATEST_GUIDE:
-        estimated = estimate(
+        estimated = estimate_pitch(
             vehicle_assembly,
             measured,
             filter_parameters.force_deviation,
@@ -171,15 +171,15 @@ def guide_of(vehicle_assembly: Assembly, filter_parameters: Parameters) -> Guidi
 
 
 def _guiding_estimate(
-    vehicle_assembly: Assembly, pitch_estimate: "PitchEstimate", pitch_measurement: "Measurement"
+    vehicle_assembly: Assembly, pitch_estimate: "PitchEstimate", pitch_measurement: "PitchMeasurement"
 ) -> GuidingEstimate:
-    from models.systems.pitch_plane.pitch_filter import INERTIA_SHARE, KEPT_STATES, PITCH, PITCH_RATE
+    from models.systems.pitch_plane.pitch_filter import FILTERED_STATES, INERTIA_SHARE, PITCH, PITCH_RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
     deviations = np.sqrt(pitch_estimate.error_covariances()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
     share, names = pitch_estimate.states[:, INERTIA_SHARE], {PITCH: "pitch", PITCH_RATE: "pitch_rate"}
     relative = np.zeros((8, len(share)))
-    relative[KEPT_STATES] = pitch_estimate.states[:, :6].T
+    relative[FILTERED_STATES] = pitch_estimate.states[:, :6].T
     moment = suspension_loads(relative, vehicle_assembly.parameters, vehicle_assembly.vehicle.geometry)[2]
     fits = consistency(pitch_estimate.innovations, [names[column] for column in pitch_measurement.columns])
     return GuidingEstimate(
@@ -196,12 +196,12 @@ def _guiding_estimate(
     )
 
 
-def _measurement(vehicle_assembly: Assembly, filter_parameters: Parameters) -> "Measurement":
+def _measurement(vehicle_assembly: Assembly, filter_parameters: Parameters) -> "PitchMeasurement":
     """Reads the measured pitch and pitch rate of the file, with their standard deviations. Raises InputError for files
     that the filter cannot use.
     """
     from models.core.time_series import read_time_series
-    from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, Measurement
+    from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, PitchMeasurement
 
     scene, key_path = vehicle_assembly.scene, "effects.kalman_filter"
     known = (
@@ -228,7 +228,7 @@ def _measurement(vehicle_assembly: Assembly, filter_parameters: Parameters) -> "
             f"is sampled every {period:g} s and the forces every {vehicle_assembly.input.period:g} s: one must be "
             "a multiple of the other",
         )
-    return Measurement(
+    return PitchMeasurement(
         values,
         period,
         tuple(fields[1] for fields in read_columns.values()),
