@@ -116,7 +116,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         values, estimated = stop.vehicle_results(), estimated or not single_scene.controller.true_speed
         shown = {head: values[quantity] for head, quantity in SHOWN_QUANTITIES.items()}
         answer.append(
-            dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.locks().time.max())}
+            dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.lock_times().time.max())}
         )
     _save_stops(scene, answer, folder, results)
     _figure(scene, answer, folder / "controllers.png", results)

@@ -215,7 +215,9 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: StopH
             surfaces_named.add(surface)
     axis.plot(x, y, color=DARK, label="centre of mass")
     units = stop.units
-    for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
+    for i in np.searchsorted(
+        stop.distance_travelled, np.linspace(0.0, stop.distance_travelled[-1], 6 - len(drawn) // 2)
+    ).clip(0, len(x) - 1):
         for unit, corners in drawn:
             axis.plot(*positions_on_road(unit, corners, units[i], plane).T, color=DARK, lw=0.7)
     axis.set(

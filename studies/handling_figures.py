@@ -78,7 +78,7 @@ def _plot_friction_circle(axis: Axes, drive: SimulatedDrive) -> None:
     """Plot the horizontal force of each tyre divided by mu N, which lies inside the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
-    bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)
+    bound = np.where(drive["load"] > 0.0, drive.largest_tyre_forces(), 1.0)
     for i, (side, longitudinal) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
         axis.plot(side, longitudinal, **_tyre_style(i), lw=0.9)
     axis.set(

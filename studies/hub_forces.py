@@ -59,7 +59,7 @@ def _table_lines(scene: HubScene, comparison: StabiliserComparison) -> list[str]
     for name, path in comparison.runs.items():
         largest = np.abs(comparison.errors(path)).max(axis=0)
         roll, pitch = np.sqrt(np.mean(path["holding_moment"] ** 2, axis=0))
-        ratios, drifted = comparison.damages(path["section_force"]).values(), comparison.drift_off(path)
+        ratios, drifted = comparison.relative_damages(path["section_force"]).values(), comparison.drift_off_time(path)
         lines.append(
             f"  {name:<18}"
             + "".join(f"{1e3 * v:>9.3g}" for v in largest[:3])

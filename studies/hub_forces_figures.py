@@ -59,7 +59,7 @@ def damage_figure(comparison: StabiliserComparison, title: str, path: Path) -> N
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.6))
     shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):
-        ratios = comparison.damages(comparison.runs[run]["section_force"])
+        ratios = comparison.relative_damages(comparison.runs[run]["section_force"])
         x_positions = np.arange(len(ratios)) + (k - (len(shown) - 1) / 2) * 0.26
         axis.plot(x_positions, [*ratios.values()], "os^"[k % 3], color=colour, label=label, markersize=4)
         values += ratios.values()

@@ -88,7 +88,7 @@ def _page_figures(examination: RecordingAnalysis, folder: Path) -> dict[str, Any
     channels that were not inputs of the run."""
     figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
     figures["findings"] = [
-        (finding, draw.figure_of_finding(finding, examination.evidence, folder / f"finding_{i}.png"))
+        (finding, draw.figure_of_finding(finding, examination.evidence_for_checks, folder / f"finding_{i}.png"))
         for i, finding in enumerate(examination.findings)
         if finding.weight != "note"
     ]

@@ -98,7 +98,7 @@ def _deviation_results(scene: RideScene, reduced_scene: ReducedScene) -> dict[st
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
     vehicle = replace(reduced_scene.vehicle, limits=reduced_scene.limits)
     if reduced_scene != ReducedScene.complete(scene):
-        results["what is left"] = run_scene(reduced_scene.ride, "reference", vehicle=vehicle, error=scene.error)
+        results["what is left"] = run_scene(reduced_scene.ride_scene, "reference", vehicle=vehicle, error=scene.error)
     return results
 
 

@@ -88,8 +88,8 @@ def _save_table(linear_results: dict[str, LinearisedMotion], folder: Path) -> No
     columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
     for engine, linear_run in linear_results.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
-        columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting.real)
-        columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting.imag / (2.0 * np.pi))
+        columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting_eigenvalue.real)
+        columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting_eigenvalue.imag / (2.0 * np.pi))
     write_table(folder / "over_speed.csv", columns)
 
 

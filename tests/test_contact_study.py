@@ -321,7 +321,7 @@ def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
     case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
     for one in (case, unseen[4]):
         assert np.linalg.norm(with_exact_forces(one, (20,)).force - one.force) < 0.01
-    assert case.limit == FRICTION * LOAD
+    assert case.friction_limit == FRICTION * LOAD
 
 
 def test_the_quick_rows_of_the_price_pass(tmp_path):

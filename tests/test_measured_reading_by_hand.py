@@ -196,7 +196,7 @@ def group_of(timing, *signals):
 def test_a_clock_s_times_and_values_in_si_units():
     assert ClockGrid(2.5, 0.25, 4).times.tolist() == [2.5, 2.75, 3.0, 3.25]
     group = group_of(timing_of(), signal_of(sign=-1, factor=1e3, zero=0.25), signal_of("fr", factor=0.5, zero=-1.0))
-    assert group.si(np.array([[0.75, 2.0], [0.25, -1.0]])).tolist() == [[-500.0, 1.5], [0.0, 0.0]]
+    assert group.values_in_si(np.array([[0.75, 2.0], [0.25, -1.0]])).tolist() == [[-500.0, 1.5], [0.0, 0.0]]
 
 
 def test_the_clock_is_that_of_the_forces_from_the_moment_that_the_scene_names(tmp_path):

@@ -187,7 +187,7 @@ def test_engines_agree_where_springs_are_bent():
     assert np.abs(one.run.rates - other.run.rates).max() < 1e-12
     # the strut is all that pulls at the body: its output would be -m a, and is not read by a gain
     assert np.isnan(one.output_values("strut force front left")).all()
-    assert one.interval == pytest.approx(20 * road.step)
+    assert one.output_interval == pytest.approx(20 * road.step)
     travel = one.run.positions[::20, 1] - one.run.positions[::20, 0]
     assert one.output_values("travel front left") == pytest.approx(travel, abs=1e-15)
 

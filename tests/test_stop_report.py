@@ -27,7 +27,7 @@ def test_a_circle_to_the_left_has_its_signs_and_sizes(circle: StopHistory) -> No
     """Chords are shorter than arcs by (v dt / R)^2 / 24 = 3e-9, changes of velocity by as little."""
     assert np.allclose(circle.side_slip, SLIP, rtol=1e-12)
     assert np.allclose(circle.lateral_acceleration, SPEED**2 / RADIUS, rtol=1e-7)
-    assert circle.way == pytest.approx(SPEED * circle.times, rel=1e-8)
+    assert circle.distance_travelled == pytest.approx(SPEED * circle.times, rel=1e-8)
     told = circle.vehicle_results()
     assert told["stopping distance [m]"] == pytest.approx(2.0 * SPEED, rel=1e-8)
     assert told["final yaw [deg]"] == pytest.approx(np.degrees(2.0 * SPEED / RADIUS), rel=1e-12)

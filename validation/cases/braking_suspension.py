@@ -194,7 +194,7 @@ def _ice_rows() -> list[Row]:
             "braking_suspension.ice.locks",
             SYSTEM,
             "longest time for which a wheel locks above 15 km/h on ice, bang-bang slip controller",
-            float(stops[0].locks().longest_lock.max()),
+            float(stops[0].lock_times().longest_lock.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(

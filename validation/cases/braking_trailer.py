@@ -123,7 +123,7 @@ def _slip_control_rows() -> list[Row]:
             "braking_trailer.ice.locks",
             SYSTEM,
             "longest time for which a wheel of car or caravan locks above 15 km/h on ice, bang-bang slip controller",
-            float(controlled.locks().longest_lock.max()),
+            float(controlled.lock_times().longest_lock.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(

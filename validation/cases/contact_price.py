@@ -141,7 +141,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
     for case in cases:
         contact = case.contact(Fastsim, **BEST_CHOICES)
         answers, error = rolled(contact, case.motion, 21)
-        limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
+        limit, moment = case.friction_limit, case.friction_limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
         stated.append((error.total, error.moment + MOMENT_ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
@@ -217,7 +217,8 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED_CELLS)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
-            np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + MOMENT_ROUNDING * case.limit
+            np.array(off)
+            > np.array(remaining_errors(contact, case.motion, cells, fine)) + MOMENT_ROUNDING * case.friction_limit
         )
     return [float(value) for value in np.mean(answers, axis=0)]
 

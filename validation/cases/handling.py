@@ -184,14 +184,14 @@ def _locked_stop_rows() -> list[Row]:
     handling = Handling(R19_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEELS))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
-    left = drive["fx"] + drive.grip()
+    left = drive["fx"] + drive.largest_tyre_forces()
     stopped = (speed**2 - ahead[-1] ** 2) / (2.0 * mu * GRAVITY)  # sliding friction alone
     return [
         Observed(
             "handling.slide",
             SYSTEM,
             "braking force of four locked wheels: deviation from mu N, relative to mu N",
-            float(np.abs(left / drive.grip()).max()),
+            float(np.abs(left / drive.largest_tyre_forces()).max()),
             "",
         ).at_most(1e-9, "at every step of a stop", "closed form"),
         Observed(

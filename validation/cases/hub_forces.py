@@ -296,12 +296,12 @@ def _stabilised_rows(frame: str, comparison: StabiliserComparison) -> list[Row]:
             f"hub_forces.drift_off_{frame}",
             SYSTEM,
             f"time at which the free run leaves the true roll or pitch by 0.05 rad (8 s: never), frame {frame!r}",
-            min(comparison.drift_off(comparison.runs["free, mujoco"]), 8.0),
+            min(comparison.drift_off_time(comparison.runs["free, mujoco"]), 8.0),
             "s",
         ).beside("", "stated"),
     ]
     for name in (name for name in comparison.runs if "exudyn" not in name):
-        ratios = comparison.damages(comparison.runs[name]["section_force"]).values()
+        ratios = comparison.relative_damages(comparison.runs[name]["section_force"]).values()
         for end, value in (("least", min(ratios)), ("most", max(ratios))):
             what = (
                 f"{end} ratio of the damage of {len(ratios)} springs, mounts and bars to the "
@@ -324,7 +324,7 @@ def _prescribed_angles_row(frame: str, comparison: StabiliserComparison) -> Row:
         measurement.forces.hub_inputs(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP
     )
     run = build("mujoco", measurement.vehicle, hub_inputs, STEP, steps * STEP).run()
-    ratios = np.array([*comparison.damages(run.elements).values()])
+    ratios = np.array([*comparison.relative_damages(run.elements).values()])
     return Observed(
         f"hub_forces.prescribed_{frame}",
         SYSTEM,

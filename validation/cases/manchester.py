@@ -81,7 +81,7 @@ def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacem
     Wall time would count other cases that run at the same time."""
     positions = LateralPositions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
-    return placed_run.detail.placed, placed_run.seconds / len(shifts)
+    return placed_run.detail.placements, placed_run.seconds / len(shifts)
 
 
 def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:

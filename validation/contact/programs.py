@@ -32,7 +32,7 @@ def compare_programs(cases: list[ContactCase]) -> dict[str, Any]:
         return roll(pressed[case.a, case.b], case.friction, *case.motion)
 
     def error(case: ContactCase, forces: Creep | Rolling) -> float:
-        return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.limit - case.force)))
+        return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.friction_limit - case.force)))
 
     errors = {
         "1982": [error(case, program_1982(case)) for case in cases],

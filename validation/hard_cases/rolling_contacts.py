@@ -133,7 +133,7 @@ def car_run(implementation: str, handling: Handling, speed: float, duration: flo
 def violates_friction(run: SimulatedDrive) -> bool:
     """Whether a tyre contact of a run gains energy, or its force exceeds mu N."""
     force = np.hypot(run["fx"], run["fy"])
-    return bool(run["power"].max() > 0.0 or (force > run.grip() * (1.0 + 1e-9)).any())
+    return bool(run["power"].max() > 0.0 or (force > run.largest_tyre_forces() * (1.0 + 1e-9)).any())
 
 
 def energy_balance_error(run: SimulatedDrive) -> float:
@@ -164,7 +164,7 @@ def creep_when_parked(implementation: str, folder: Path) -> float:
 def locked_wheel_error(implementation: str, folder: Path) -> float:
     """Case: a car with locked wheels. Error: relative difference of the tyre forces from mu N against the sliding."""
     run = car_run(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
-    return float(np.abs(run["fx"] / run.grip() + 1.0).max())
+    return float(np.abs(run["fx"] / run.largest_tyre_forces() + 1.0).max())
 
 
 def roll_back_error(implementation: str, folder: Path) -> float:

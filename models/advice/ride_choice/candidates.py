@@ -88,7 +88,7 @@ class Candidates:
         """For a quantity, the row of the vehicle's output and the name of its weighting filter, "" if it has none."""
         weighted = {
             f"{name} {weighting_name}": (name, weighting_name)
-            for name, weighting_name in self.scene.ride.weighting.items()
+            for name, weighting_name in self.scene.ride_scene.weighting.items()
         }
         name, weighting_name = weighted.get(quantity, (quantity, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), weighting_name

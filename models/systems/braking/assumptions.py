@@ -363,7 +363,7 @@ def _drag_work_share(scene: BrakingScene, vehicle_mass: float, run_result: Resul
     """
     truck, stop = vehicle_of(scene), StopHistory(run_result.detail)
     drag = 0.5 * AIR_DENSITY * DRAG_COEFFICIENT * truck.front.track * 2.0 * truck.height
-    work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
+    work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.distance_travelled)))
     return {"vehicle": np.full(1, work / (0.5 * vehicle_mass * stop.speed[0] ** 2))}
 
 

@@ -171,7 +171,7 @@ def motion_channels(braking_path: BrakingPath, times: np.ndarray) -> MotionChann
 def motion_and_distance(braking_path: BrakingPath, times: np.ndarray) -> MotionChannels:
     """Channels of the motion at times (n,) in s, and the stopping distance (1,) in m if the vehicle comes to rest."""
     return motion_channels(braking_path, times) | (
-        {STOPPING_DISTANCE: StopHistory(braking_path).way[-1:]} if braking_path.ended_at_rest else {}
+        {STOPPING_DISTANCE: StopHistory(braking_path).distance_travelled[-1:]} if braking_path.ended_at_rest else {}
     )
 
 

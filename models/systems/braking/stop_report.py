@@ -57,7 +57,7 @@ class StopHistory:
         return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
 
     @property
-    def way(self) -> np.ndarray:
+    def distance_travelled(self) -> np.ndarray:
         """Distance (n,) in m along the path since the start."""
         steps = np.diff(self.path.states[:, 0, :2], axis=0)
         return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
@@ -81,7 +81,7 @@ class StopHistory:
 
     def vehicle_results(self) -> dict[str, float]:
         """Results of the vehicle over a stop, by name and unit: distance, time, decelerations, yaw, side slip."""
-        path, speed, distances = self.path, self.speed, self.way
+        path, speed, distances = self.path, self.speed, self.distance_travelled
         slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.lateral_acceleration)
         time, distance = float(path.times[-1]), float(distances[-1])
         return {
@@ -163,7 +163,7 @@ class StopHistory:
             f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / fast_duration
             for limit in SLIP_LIMITS
         }
-        locks = self.locks()
+        locks = self.lock_times()
         return wheels | {
             "locked above 15 km/h [s]": locks.time,
             "longest lock [s]": locks.longest_lock,
@@ -191,7 +191,7 @@ class StopHistory:
             "side slip [deg]": float(np.degrees(slip)),
         }
 
-    def locks(self) -> Locks:
+    def lock_times(self) -> Locks:
         """Times for which wheels lock at speeds above 15 km/h."""
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 

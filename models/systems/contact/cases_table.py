@@ -222,11 +222,11 @@ def _force_errors(
     )
     left = cells_error(relative, relative_coarse, contact_method.cells, contact_method.order)
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
-    theory = wider * friction_limit * band(contact_method.band, used, spin_share_of_creepage)
+    theory = wider * friction_limit * band(contact_method.error_band_name, used, spin_share_of_creepage)
     moment = (
         wider
         * moment_limit
-        * moment_band(contact_method.band, used_with_moment(used, relative[2]), spin_share_of_creepage)
+        * moment_band(contact_method.error_band_name, used_with_moment(used, relative[2]), spin_share_of_creepage)
     )
     return [friction_limit * left, theory, moment_limit * left, moment]
 

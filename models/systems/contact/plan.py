@@ -62,7 +62,7 @@ def describe(scene: ContactScene) -> str:
         heads["creepage"] = _values_text(scene.creepage)
     if scene.sweep is not None:
         heads["sweep"] = _values_text(scene.sweep)
-    method = _values_text(scene.method, {"name", *scene.method.unread()})
+    method = _values_text(scene.method, {"name", *scene.method.unread_keys()})
     heads["theory"] = THEORY_TEXTS[scene.method.name] + (f"; {method}" if method else "")
     lines = [scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)]
     return "\n".join([*lines, *assumption_lines(_contact_assumptions(scene))])

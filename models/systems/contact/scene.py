@@ -140,11 +140,11 @@ class ContactMethod(Strict):
         return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
 
     @property
-    def band(self) -> str:
+    def error_band_name(self) -> str:
         """Name of the theory's error band in ``models.contact.accuracy``."""
         return f"{self.flexibilities} {self.bound}" if self.name == "fastsim" else self.name
 
-    def unread(self) -> frozenset[str]:
+    def unread_keys(self) -> frozenset[str]:
         """Keys of [method] that have no meaning for the scene's theory."""
         fastsim = {"march", "bound", "flexibilities"}
         return frozenset({"fastsim": set(), "linear": {"cells", *fastsim}}.get(self.name, fastsim))
@@ -308,7 +308,7 @@ def _method_refusals(scene: ContactScene) -> Refusals:
     geometry.
     """
     method = scene.method
-    for key in sorted(method.model_fields_set & method.unread()):
+    for key in sorted(method.model_fields_set & method.unread_keys()):
         yield f"method.{key}", getattr(method, key), f"has no meaning for {method.name}"
     if scene.cases is not None and method.name != "fastsim":
         yield "method.name", method.name, "a table of cases is computed by fastsim"

@@ -71,7 +71,7 @@ class ContactCase:
     error: float = np.nan
 
     @property
-    def limit(self) -> float:
+    def friction_limit(self) -> float:
         """Largest tangential force (N): coefficient of friction times load."""
         return self.friction * self.load
 
@@ -82,7 +82,7 @@ class ContactCase:
         """
         c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
         parts = np.array(self.parts)
-        unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
+        unit = self.friction_limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
 
     @property
@@ -103,7 +103,7 @@ def with_exact_forces(contact_case: ContactCase, finest_cell_counts: tuple[int, 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
     """
     contact = contact_case.contact(ExactOnEllipse)
-    scale = contact_case.limit * np.array([1.0, 1.0, np.sqrt(contact_case.a * contact_case.b)])
+    scale = contact_case.friction_limit * np.array([1.0, 1.0, np.sqrt(contact_case.a * contact_case.b)])
     best, error = np.full(3, np.nan), np.inf
     for fine in finest_cell_counts:
         try:
@@ -225,7 +225,7 @@ def measure_theory(
     errors, seconds = [], []
     for case in contact_cases:
         answer, seconds_taken = _forces_and_seconds(theory_settings.rolled(case, cell_count), case.motion, repeat_count)
-        errors.append(float(np.linalg.norm(tangential_force_of(answer) / case.limit - case.force)))
+        errors.append(float(np.linalg.norm(tangential_force_of(answer) / case.friction_limit - case.force)))
         seconds.append(seconds_taken)
     return TheoryPoint(
         theory_settings.name, cell_count, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds))

@@ -135,13 +135,15 @@ class SimulatedDrive:
         """
         return np.arctan2(-self["slip_y"], np.abs(self["tread"] + self["slip_x"]))
 
-    def grip(self) -> np.ndarray:
+    def largest_tyre_forces(self) -> np.ndarray:
         """Largest horizontal force (m, w) of each tyre in N: friction times load."""
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
         """Utilised friction (m, w): horizontal force of each tyre divided by friction times load, 0 in the air."""
-        return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
+        return np.hypot(self["fx"], self["fy"]) / np.where(
+            self.largest_tyre_forces() > 0.0, self.largest_tyre_forces(), 1.0
+        )
 
     def power(self) -> np.ndarray:
         """Power (m,) in W of all work on the vehicle: dampers, drag and pushes, driver's torques, steering, and

@@ -56,7 +56,7 @@ class StabiliserComparison:
             errors_of_motion[:, i] = run_result[name] - np.interp(run_result.times, angle_times, tilt.states[:, i])
         return errors_of_motion
 
-    def damages(self, section_forces: np.ndarray) -> dict[str, float]:
+    def relative_damages(self, section_forces: np.ndarray) -> dict[str, float]:
         """Fatigue damage of every element under section forces (m, e), divided by its damage in the true run, or in the
         run with the Kalman filter where no true run is known.
         """
@@ -64,7 +64,7 @@ class StabiliserComparison:
         names = (element.name for element in self.measurement.vehicle.elements)
         return {name: damage_ratio(section_forces[:, i], true[:, i]) for i, name in enumerate(names)}
 
-    def drift_off(self, run_result: Result) -> float:
+    def drift_off_time(self, run_result: Result) -> float:
         """First time (s) at which a run's error of roll or pitch exceeds DRIFT_OFF_ANGLE; infinite if it never does."""
         has_drifted = np.abs(self.errors(run_result)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
         return float(run_result.times[np.argmax(has_drifted)]) if has_drifted.any() else float("inf")
@@ -79,7 +79,7 @@ class StabiliserComparison:
             figures[name] = {
                 **dict(zip(MOTION_CHANNELS, map(float, np.abs(self.errors(run)).max(axis=0)), strict=True)),
                 "moments": np.sqrt(np.mean(run["holding_moment"] ** 2, axis=0)).tolist(),
-                "damage": self.damages(run["section_force"]),
+                "damage": self.relative_damages(run["section_force"]),
             }
         return figures
 
@@ -90,7 +90,7 @@ class StabiliserComparison:
         kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHOD_OF_RUN]
         comparable = max(kinds, key=len)
         first, common_times = comparable[0].detail.states, comparable[0].times
-        rows = int(min(min(map(self.drift_off, comparable)), common_times[-1]) / common_times[1]) + 1
+        rows = int(min(min(map(self.drift_off_time, comparable)), common_times[-1]) / common_times[1]) + 1
         return max(float(np.abs(run.detail.states[:rows] - first[:rows]).max()) for run in comparable)
 
 

@@ -58,7 +58,7 @@ class ClockGroup:
         """Names of the channels in the file."""
         return tuple(signal.channel for signal in self.signals)
 
-    def si(self, file_values: np.ndarray) -> np.ndarray:
+    def values_in_si(self, file_values: np.ndarray) -> np.ndarray:
         """Converts values (n, signals) of the file to SI units: zero subtracted, times sign and factor."""
         zeros, factors = np.array([(signal.zero, signal.sign * signal.factor) for signal in self.signals]).T
         return (file_values - zeros) * factors
@@ -338,7 +338,7 @@ def _write_unchanged(
         inside = (at >= done) & (at < clock_grid.count)
         if inside.any():
             last = int(at[inside][-1]) + 1
-            put(last, at[inside], clock_group.si(block.values[inside]))
+            put(last, at[inside], clock_group.values_in_si(block.values[inside]))
             done = last
     put(clock_grid.count, np.empty(0, np.int64), np.empty((0, len(names))))
     for signal in clock_group.signals:
@@ -361,7 +361,7 @@ def _write_resampled(
     count = next(channel.count for channel in clock_group.source.channels if channel.name == clock_group.names[0])
     raw = Columns(work_folder / RAW_COLUMNS_FILE, clock_group.names, count)
     for block in clock_group.source.blocks(clock_group.names):
-        raw.put(clock_group.names, block.first, clock_group.si(block.values))
+        raw.put(clock_group.names, block.first, clock_group.values_in_si(block.values))
     for signal in clock_group.signals:
         values = raw.read(signal.channel)[slice(None) if clock.order is None else clock.order]
         values, finding = without_impossible_values(signal, values, clock.times - clock_grid.start)

@@ -91,7 +91,7 @@ class RecordingAnalysis:
     temporary_folder: "TemporaryDirectory[str] | None" = None
 
     @cached_property
-    def evidence(self) -> Evidence:
+    def evidence_for_checks(self) -> Evidence:
         """Recording, vehicle and stated noise in the form that the checks of recordings take."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in QUANTITY_OF_NOISE_KEY.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
@@ -128,7 +128,9 @@ class RecordingAnalysis:
             if wanted is None or answer.section in wanted
         ]
 
-    def job(self, run_name: str, recording: Recording | None = None) -> SectionRunSettings | PlaneRunSettings:
+    def settings_of_run(
+        self, run_name: str, recording: Recording | None = None
+    ) -> SectionRunSettings | PlaneRunSettings:
         """Returns the settings of a run by its name, also for another recording. The run computes forces at all
         sections in axes of the chassis, and accelerations at accelerometers.
         """
@@ -149,7 +151,7 @@ class RecordingAnalysis:
         """Make a run by its name, or complete the run in a folder. estimate_error : whether the error of a run in the
         pitch plane is estimated.
         """
-        job = self.job(run_name)
+        job = self.settings_of_run(run_name)
         if isinstance(job, SectionRunSettings):
             return march(job, run_folder, report_progress)
         shutil.rmtree(run_folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
@@ -161,7 +163,7 @@ class RecordingAnalysis:
 
     def rerun(self, run_name: str, recording: Recording, run_folder: Path) -> SectionOutcome:
         """Run another recording with the stabiliser of a run, given by its name."""
-        job = self.job(run_name, recording)
+        job = self.settings_of_run(run_name, recording)
         return (
             march(job, run_folder / "run")
             if isinstance(job, SectionRunSettings)
@@ -230,7 +232,7 @@ def _with_assumptions(run_result: Result, recording_analysis: RecordingAnalysis)
 
 def _with_error(run_result: Result, recording_analysis: RecordingAnalysis, work_folder: Path) -> Result:
     """Returns the result with the errors of the time steps of the chosen run."""
-    job, outcome = recording_analysis.job(recording_analysis.chosen_run), recording_analysis.outcome
+    job, outcome = recording_analysis.settings_of_run(recording_analysis.chosen_run), recording_analysis.outcome
     if outcome is None or not isinstance(job, SectionRunSettings):
         return run_result
     if recording_analysis.chosen_run in recording_analysis.failed:
@@ -291,7 +293,7 @@ def _examine(
         _record_seconds, recording_analysis, start_time=time.perf_counter() - sum(recording_analysis.seconds.values())
     )
     report_progress("checks", 0.2)
-    recording_analysis.findings = findings_of_all_checks(recording_analysis.evidence)
+    recording_analysis.findings = findings_of_all_checks(recording_analysis.evidence_for_checks)
     lap("checks")
     if recording_analysis.has_error_findings:
         return
@@ -325,12 +327,14 @@ def _predict_drift(recording_analysis: RecordingAnalysis, vehicle: CutVehicle) -
         [_initial_value(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
         for what in ("angle", "angular rate")
     )
-    couple = mean_hub_moments(recording_analysis.evidence)  # that the motion does not bear out, at the first hub
+    couple = mean_hub_moments(
+        recording_analysis.evidence_for_checks
+    )  # that the motion does not bear out, at the first hub
     bias = np.concatenate([np.zeros(3), couple, np.zeros(WRENCH * len(vehicle.hubs) - 5)]) if couple.any() else None
     frame = next(s.frame for s in recording.signals if s.at in vehicle.hubs)
     level = MeasurementErrors(free.force, free.moment, bias, tilt, rate)
     recording_analysis.drift = predicted_drift(vehicle, level, recording.period, recording.duration, frame)
-    lacking = recording_analysis.evidence.missing_data_text
+    lacking = recording_analysis.evidence_for_checks.missing_data_text
     unchecked_text = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
     recording_analysis.trust = tuple(
         (what, replace(recording_analysis.drift.trust(angle), unchecked_text=unchecked_text))
@@ -352,7 +356,7 @@ def _make_runs(
     """Make the free run and the run with the scene's stabiliser; a run that fails keeps its samples up to the
     failure."""
     for name in recording_analysis.holds:
-        if isinstance(job := recording_analysis.job(name), SectionRunSettings):
+        if isinstance(job := recording_analysis.settings_of_run(name), SectionRunSettings):
             check_run(job)
     for i, name in enumerate(recording_analysis.holds):
         report_progress(f"{name} run", 0.2 + 0.7 * i / len(recording_analysis.holds))
@@ -405,7 +409,7 @@ def _add_verdicts(recording_analysis: RecordingAnalysis) -> None:
     assert recording_analysis.drift is not None
     recording, slopes = recording_analysis.recording, tuple(recording_analysis.scene.hand_on.slopes)
     for name, outcome in recording_analysis.runs.items():
-        job = recording_analysis.job(name)
+        job = recording_analysis.settings_of_run(name)
         assert isinstance(job, SectionRunSettings)
         comparisons = tuple(compare_channel(recording, outcome, *pair, slopes) for pair in channels_to_compare(job))
         recording_analysis.verdicts[name] = judge_run(

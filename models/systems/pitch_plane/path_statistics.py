@@ -51,7 +51,7 @@ class PathStatistics:
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
 
     @property
-    def fan(self) -> np.ndarray:
+    def pitch_error_percentiles(self) -> np.ndarray:
         """Percentiles FAN_PERCENTILES of the magnitude of the pitch error (rad), shape (5, rows), each within
         ``streamed.QUANTILE_ACCURACY``.
         """

@@ -148,23 +148,23 @@ def march_along(compile_march: Any, drive_mode: str, geometry: str) -> Any:
 class TangentPath:
     """A force-excited run along which small errors are propagated, in fixed steps that divide the sampling period.
 
-    per_sample : number of steps between force samples; samples : number of sampling periods of the run.
+    steps_per_sample : number of steps between force samples; samples : number of sampling periods of the run.
     """
 
     assembly: Assembly
     forces: Sampled | Smooth
-    per_sample: int
+    steps_per_sample: int
     samples: int
 
     @property
     def step(self) -> float:
         """Time step of the path (s)."""
-        return self.forces.period / self.per_sample
+        return self.forces.period / self.steps_per_sample
 
     @property
     def steps(self) -> int:
         """Number of time steps of the path."""
-        return self.per_sample * self.samples
+        return self.steps_per_sample * self.samples
 
     @property
     def forces_at_stages(self) -> np.ndarray:
@@ -304,14 +304,14 @@ def noise_covariances(tangent_path: TangentPath, force_deviation: float) -> np.n
     ``force_deviation`` (N); 0 at the start.
     """
     matrices = np.zeros((tangent_path.samples + 1, 8, 8))
-    stages = np.arange(2 * tangent_path.per_sample + 1) / (2 * tangent_path.per_sample)
+    stages = np.arange(2 * tangent_path.steps_per_sample + 1) / (2 * tangent_path.steps_per_sample)
     weights = np.zeros((len(stages), 12, 2))  # force errors of 1 N in the sample at the start and in that at the end
     for wheel in range(2):
         weights[:, 8 + wheel, wheel] = 1.0 if tangent_path.forces.held else 1.0 - stages
         weights[:, 10 + wheel, wheel] = 0.0 if tangent_path.forces.held else stages
     tangent_path.march(_compile_covariance)(
         tangent_path.assembly.initial.copy(),
-        tangent_path.per_sample,
+        tangent_path.steps_per_sample,
         tangent_path.stage_forces(weights),
         tangent_path.assembly.parameters.array(),
         force_deviation**2,

@@ -343,7 +343,7 @@ class EngineRide:
         return self.outputs[:, self.names.index(output_name)]
 
     @property
-    def interval(self) -> float:
+    def output_interval(self) -> float:
         """Time (s) between rows of outputs."""
         return float(self.times[1] - self.times[0])
 
@@ -354,7 +354,7 @@ class EngineRide:
         """
         from scipy.signal import welch
 
-        f, density = welch(self.outputs, 1 / self.interval, nperseg=round(4 / self.interval), axis=0)
+        f, density = welch(self.outputs, 1 / self.output_interval, nperseg=round(4 / self.output_interval), axis=0)
         shown = (f > 0.4) & (f <= highest_frequency)
         return f[shown], density[shown]
 

@@ -33,8 +33,8 @@ def effects_of(reduced_scene: ReducedScene) -> tuple[OmissibleEffect, ...]:
     """Returns all effects of a scene that can be left out, from vehicle, road and tables [effects.NAME], sorted by the
     names of their kinds.
     """
-    system = reduced_scene.ride.system
-    tables = {name: module_of(system, name) for name in tables_of(reduced_scene.ride)}
+    system = reduced_scene.ride_scene.system
+    tables = {name: module_of(system, name) for name in tables_of(reduced_scene.ride_scene)}
     effects = {name: find(reduced_scene) for name, find in EFFECTS_BY_KIND.items()}
     effects |= {
         name: [
@@ -99,7 +99,7 @@ def body_mass_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     groups = {f"mass of the wheels of axle {i + 1}": bodies for i, bodies in enumerate(axles)}
 
     def effect(effect_name: str, massless_bodies: list[str], excluded_effects: tuple[str, ...]) -> OmissibleEffect:
-        white = reduced_scene.ride.road.cutoff is None and any(
+        white = reduced_scene.ride_scene.road.cutoff is None and any(
             t.damping and t.body in massless_bodies for t in vehicle.tyres
         )
         needs = (TYRE_DAMPING,) if white else ()
@@ -175,14 +175,14 @@ def linear_law_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
             is_singular=True,
         )
         for law, name in LAW_TEXTS.items()
-        if not reduced_scene.ride.vehicle.small_motion
+        if not reduced_scene.ride_scene.vehicle.small_motion
         and any(getattr(spring, law) for spring in reduced_scene.vehicle.springs)
     ]
 
 
 def delay_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     """Returns the effect that leaves out the delay from front to rear axle; none where no axle follows another."""
-    follows = len(reduced_scene.vehicle.axles) > 1 and reduced_scene.ride.road.front_rear == "delayed"
+    follows = len(reduced_scene.vehicle.axles) > 1 and reduced_scene.ride_scene.road.front_rear == "delayed"
     equal = OmissibleEffect(
         "delay front to rear", partial(on_road, front_rear="equal"), "all axles meet the same at once"
     )
@@ -235,7 +235,7 @@ def second_corner_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     """Returns the effect that leaves out the road spectrum's second corner; none where it has none. White noise would
     then reach damped tyres, so that tyre damping must be left out, too.
     """
-    if reduced_scene.ride.road.cutoff is None:
+    if reduced_scene.ride_scene.road.cutoff is None:
         return []
     needs = (TYRE_DAMPING,) if any(tyre.damping for tyre in reduced_scene.vehicle.tyres) else ()
     says, why = "road filters of first order", "for it would pass white noise"
@@ -247,7 +247,7 @@ def second_track_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     tracks are not correlated as modelled.
     """
     wide = len({tyre.point[1] for tyre in reduced_scene.vehicle.tyres}) > 1
-    if not wide or reduced_scene.ride.road.left_right != "modelled":
+    if not wide or reduced_scene.ride_scene.road.left_right != "modelled":
         return []
     says = "left and right meet the same"
     return [OmissibleEffect("second track", partial(on_road, left_right="equal"), says, is_singular=True)]

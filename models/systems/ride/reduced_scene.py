@@ -17,7 +17,7 @@ class ReducedScene:
     degrees of freedom, and nonlinear spring laws that are replaced by gains (``linearised_laws``).
     """
 
-    ride: RideScene
+    ride_scene: RideScene
     vehicle: SpatialVehicle
     massless: frozenset[str] = frozenset()
     rigid: frozenset[str] = frozenset()
@@ -42,19 +42,19 @@ class ReducedScene:
 
     def on_road(self, **road_changes: object) -> "ReducedScene":
         """Returns the reduced scene with other values of keys of [road]."""
-        road = self.ride.road.model_copy(update=road_changes)
-        return replace(self, ride=self.ride.model_copy(update={"road": road}))
+        road = self.ride_scene.road.model_copy(update=road_changes)
+        return replace(self, ride_scene=self.ride_scene.model_copy(update={"road": road}))
 
     def without_tables(self, *table_names: str) -> "ReducedScene":
         """Returns the reduced scene without some of its tables [effects.NAME]."""
-        ride = without_own(self.ride, *table_names)
-        return replace(self, ride=ride, vehicle=vehicle_of(ride))
+        ride = without_own(self.ride_scene, *table_names)
+        return replace(self, ride_scene=ride, vehicle=vehicle_of(ride))
 
     def excitation(self) -> Excitation:
         """Returns the road's excitation of the wheels; axles that meet the same heights at the same time share one
         filter.
         """
-        road = excitation_of(self.ride, wheels(self.vehicle))
+        road = excitation_of(self.ride_scene, wheels(self.vehicle))
         if road.independent or any(road.lengths):
             return road
         return replace(road, heights=(sum(road.heights),), lengths=(0.0,))  # type: ignore[arg-type]

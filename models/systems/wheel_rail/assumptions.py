@@ -36,7 +36,7 @@ def _extreme_of_patches(
     worst = max if take_largest else min
 
     def watched(run_result: Result) -> Watched:
-        placed = run_result.detail.placed
+        placed = run_result.detail.placements
         return {
             f"{wheel} wheel": np.array([worst(map(patch_value, getattr(position, wheel))) for position in placed])
             for wheel in WHEEL_NAMES

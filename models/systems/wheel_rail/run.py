@@ -57,11 +57,11 @@ PATCH_QUANTITIES: dict[str, tuple[str, float, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class ContactsOfCase:
-    """Contacts of a case. placed : contacts of the wheelset at each position where they were computed; failures :
+    """Contacts of a case. placements : contacts of the wheelset at each position where they were computed; failures :
     reasons for the positions that failed, by lateral displacement (mm); seconds : processor time of each position.
     """
 
-    placed: list[WheelsetPlacement] = field(default_factory=list)
+    placements: list[WheelsetPlacement] = field(default_factory=list)
     failures: dict[float, str] = field(default_factory=dict)
     seconds: list[float] = field(default_factory=list)
 
@@ -88,7 +88,7 @@ def run(
         report_progress(1e3 * shift, i / scene.positions.count)
         start_time = time.process_time()
         try:
-            contacts.placed.append(contact.at(shift, yaw * shift))
+            contacts.placements.append(contact.at(shift, yaw * shift))
         except (InputError, RunFailed) as failure:
             deep = isinstance(failure, InputError) and failure.place in INPUTS_OF_DEEP_CONTACT
             contacts.failures[1e3 * shift] = (
@@ -100,7 +100,7 @@ def run(
             )
         contacts.seconds.append(time.process_time() - start_time)
     labelled = with_assumptions(_labelled_result(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
-    return _with_error(labelled, scene, contact) if error and contacts.placed else labelled
+    return _with_error(labelled, scene, contact) if error and contacts.placements else labelled
 
 
 def _with_error(run_result: Result, scene: WheelRailScene, wheelset_contact: WheelsetContact) -> Result:
@@ -111,7 +111,7 @@ def _with_error(run_result: Result, scene: WheelRailScene, wheelset_contact: Whe
     refer to the root mean square.
     """
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
-    for placed in run_result.detail.placed[::ERROR_POSITION_STRIDE]:
+    for placed in run_result.detail.placements[::ERROR_POSITION_STRIDE]:
         with suppress(InputError, RunFailed):
             coarse.append(
                 replace(wheelset_contact, cell_factor=2.0 * wheelset_contact.cell_factor).at(placed.shift, placed.yaw)
@@ -126,7 +126,7 @@ def _with_error(run_result: Result, scene: WheelRailScene, wheelset_contact: Whe
         for (name, unit), error, size in zip(WHEEL_QUANTITIES.items(), errors, sizes, strict=True)
     }
     return with_stated_errors(
-        run_result, estimates, f"half the cells at {len(fine)} of {len(run_result.detail.placed)} positions"
+        run_result, estimates, f"half the cells at {len(fine)} of {len(run_result.detail.placements)} positions"
     )
 
 
@@ -144,7 +144,7 @@ def wheel_sums(wheelset_placement: WheelsetPlacement) -> np.ndarray:
 
 
 def _labelled_result(scene: WheelRailScene, case_name: str, contacts_of_case: ContactsOfCase) -> Result:
-    positions = [position_quantities(placed) for placed in contacts_of_case.placed]
+    positions = [position_quantities(placed) for placed in contacts_of_case.placements]
     most_patches = max((len(position[wheel]) for position in positions for wheel in WHEEL_NAMES), default=0)
     missing = dict.fromkeys(PATCH_QUANTITIES, np.nan)
     rows = [

@@ -143,7 +143,7 @@ class LinearisedMotion:
     no_critical_reason: str
 
     @property
-    def hunting(self) -> np.ndarray:
+    def hunting_eigenvalue(self) -> np.ndarray:
         """Eigenvalue (speeds,) in 1/s of the least damped oscillation, the hunting motion."""
         return hunting_eigenvalue(self.values)
 
@@ -168,7 +168,7 @@ def linearised_result(scene: WheelsetScene, engine: str, *, estimate_error: bool
     with_assumptions(labelled, linear_motion_assumptions(wheelset))
     left = hunting_uncertainty(kind, wheelset, float(speeds[-1])) if estimate_error else math.nan
     if math.isfinite(left):
-        estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
+        estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting_eigenvalue[-1]), 4.0, 1.0)
         with_stated_errors(
             labelled,
             {"hunting eigenvalue": estimate_of_hunting},

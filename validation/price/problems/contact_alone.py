@@ -102,7 +102,7 @@ class ContactAlone:
 
     def _run(self, theory: TheorySettings, cells: int) -> ContactResult:
         forces = np.array(
-            [tangential_force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases]
+            [tangential_force_of(theory.rolled(case, cells)(case.motion)) / case.friction_limit for case in self._cases]
         )
         linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
