@@ -17,7 +17,7 @@ from models.systems.braking.of_scene import measured_pressures_of, plane_of
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import Stop, wheel_names
+from models.systems.braking.stop_report import StopHistory, wheel_names
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -54,7 +54,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
                 table.append(f"  {name}: stands within two samples of {scene.run.sample:g} s: it has no figures")
             continue
         all_stops |= {name if len(engines) == 1 else f"{name}, {engine}": stop for engine, stop in results.items()}
-        stop = Stop(next(iter(results.values())).detail)
+        stop = StopHistory(next(iter(results.values())).detail)
         radius = plane_of(scene).radius
         measured, rims = measured_pressures_of(scene, name, radius.size), stop.path.turning * radius
         write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
@@ -86,7 +86,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
 
 def rim_speed_differences(
-    measured_pressures: MeasuredPressures | None, stop: Stop, rim_speeds: np.ndarray
+    measured_pressures: MeasuredPressures | None, stop: StopHistory, rim_speeds: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Rms differences (m/s) between the computed and the measured rim speed of each wheel; empty if none were measured.
     rim_speeds (n, W) : computed, in m/s, of the W wheels."""
@@ -95,7 +95,7 @@ def rim_speed_differences(
     return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, rim_speeds)}
 
 
-def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:
+def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: StopHistory) -> list[str]:
     """Line for the screen, in a list, that warns if the run lasts longer than its file of measured pressures; else an
     empty list."""
     if measured_pressures is None or measured_pressures.times[-1] > stop.times[-2]:
@@ -118,7 +118,7 @@ def comparison_lines(results: dict[str, Result]) -> list[str]:
     return rows
 
 
-def figures_lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
+def figures_lines(name: str, stop: StopHistory, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
     """Lines for the screen on one procedure: a table of figures for the vehicle, and a table with a column per
     wheel."""
     remaining_text = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"

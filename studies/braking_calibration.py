@@ -20,7 +20,7 @@ from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stops import Scatter, Stops, scatter_of, statistical_errors
+from models.systems.braking.stops import SampleScatter, StopEnsemble, scatter_of, statistical_errors
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -127,8 +127,8 @@ def fitted_scene(scene: BrakingScene, options: Options, friction_scale: float, s
 
 def _means_of_stops(
     scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None
-) -> dict[str, Scatter]:
-    job = Stops(
+) -> dict[str, SampleScatter]:
+    job = StopEnsemble(
         scene.table(),
         scene.file,
         scene.folder,
@@ -140,7 +140,7 @@ def _means_of_stops(
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
-def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
+def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, SampleScatter]) -> list[str]:
     """Lines for the screen: the fitted parameters, and each figure beside the paper's values."""
     lines = [
         f"  calibration: friction of {options.surface} times {friction_scale:.4f}, steer angle {steer:.5f} rad",

@@ -16,8 +16,8 @@ from models.core.whole_files import write_whole
 from models.systems.braking.plan import check as check_scene
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
-from models.systems.braking.scene import BrakingScene, ControllerTable, RoadTable, Stretch
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.scene import BrakingRoadTable, BrakingScene, ControllerTable, RoadStretch
+from models.systems.braking.stop_report import StopHistory
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -82,7 +82,7 @@ def _single_procedure(
         procedure = procedure.model_copy(update={"right": right_surface})
     return scene.model_copy(
         update={
-            "road": RoadTable(stretches=[Stretch(left=surface)]),
+            "road": BrakingRoadTable(stretches=[RoadStretch(left=surface)]),
             "controller": controller,
             "procedures": {name: procedure},
         }
@@ -106,7 +106,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         progress(name, i / len(scenes))
         try:
             results[name] = drive(single_scene, error=scene.error)
-            stop = Stop(results[name].detail)
+            stop = StopHistory(results[name].detail)
         except RunFailed as error:
             failed[name] = str(error)
             continue
@@ -116,7 +116,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         values, estimated = stop.vehicle_results(), estimated or not single_scene.controller.true_speed
         shown = {head: values[quantity] for head, quantity in SHOWN_QUANTITIES.items()}
         answer.append(
-            dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.locks().time.max())}
+            dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.lock_times().time.max())}
         )
     _save_stops(scene, answer, folder, results)
     _figure(scene, answer, folder / "controllers.png", results)

@@ -20,10 +20,10 @@ from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene, build
 from models.systems.braking.stops import (
-    KEPT_QUANTITIES,
-    Scatter,
-    Stops,
-    Welch,
+    SAVED_QUANTITIES,
+    SampleScatter,
+    StopEnsemble,
+    WelchResult,
     scatter_of,
     statistical_errors,
     welch_test,
@@ -71,15 +71,17 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     singles = [drive(scene_of_ensemble, procedure=options.procedure, error=scene.error) for scene_of_ensemble in scenes]
     with Crew.of(scene).at_work(blocks.count(options.runs), *folders_for_workers(scene)) as pool:
         for i, table in enumerate(tables):
-            job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
+            job = StopEnsemble(
+                table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i
+            )
 
             def tell(finished: Done, i: int = i) -> None:
                 progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
 
             store = folder / BLOCKS_FOLDER / options.names[i]
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
-    units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}}
-    scatters = [{key: scatter_of(arrays[key]) for key in KEPT_QUANTITIES} for arrays in ensembles]
+    units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in SAVED_QUANTITIES.items()}}
+    scatters = [{key: scatter_of(arrays[key]) for key in SAVED_QUANTITIES} for arrays in ensembles]
     for name, scene_of_ensemble, single, arrays, means in zip(
         options.names, scenes, singles, ensembles, scatters, strict=False
     ):
@@ -89,7 +91,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
     tests = (
-        {key: welch_test(scatters[0][key], scatters[1][key]) for key in KEPT_QUANTITIES} if len(ensembles) > 1 else {}
+        {key: welch_test(scatters[0][key], scatters[1][key]) for key in SAVED_QUANTITIES} if len(ensembles) > 1 else {}
     )
     _figure(scene, options, ensembles, scatters, tests, results, folder)
     return {
@@ -99,13 +101,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "results": results,
         "table": ensemble_lines(options, scatters, tests),
         "answer": {
-            "means": [{key: means[key].mean for key in KEPT_QUANTITIES} for means in scatters],
+            "means": [{key: means[key].mean for key in SAVED_QUANTITIES} for means in scatters],
             "p": {key: test.p_value for key, test in tests.items()},
         },
     }
 
 
-def ensemble_lines(options: Options, scatters: list[dict[str, Scatter]], tests: dict[str, Welch]) -> list[str]:
+def ensemble_lines(
+    options: Options, scatters: list[dict[str, SampleScatter]], tests: dict[str, WelchResult]
+) -> list[str]:
     """Lines for the screen: means with standard errors, scatter, and Welch's test of the difference."""
     lines = [
         f"  {options.runs} stops in each ensemble, initial speed scatters by {100 * options.speed_spread:g} %",
@@ -113,7 +117,7 @@ def ensemble_lines(options: Options, scatters: list[dict[str, Scatter]], tests: 
         + " " * 26
         + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in zip(options.names, scatters, strict=False)),
     ]
-    for key, label in KEPT_QUANTITIES.items():
+    for key, label in SAVED_QUANTITIES.items():
         parts = "".join(
             f"{figures[key].mean:>14.3f} +- {figures[key].error:<6.3f}{figures[key].deviation:>10.3f}"
             for figures in scatters
@@ -123,7 +127,7 @@ def ensemble_lines(options: Options, scatters: list[dict[str, Scatter]], tests: 
         test = tests[key]
         if np.isfinite(test.t) and test.half_width > 0.0:
             lines.append(
-                f"  difference of {KEPT_QUANTITIES[key]}: {test.difference:+.3f}, 95 % interval "
+                f"  difference of {SAVED_QUANTITIES[key]}: {test.difference:+.3f}, 95 % interval "
                 f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
                 f"p = {test.p_value:.2g}"
             )
@@ -134,8 +138,8 @@ def _figure(
     scene: BrakingScene,
     options: Options,
     ensembles: list[dict[str, np.ndarray]],
-    scatters: list[dict[str, Scatter]],
-    tests: dict[str, Welch],
+    scatters: list[dict[str, SampleScatter]],
+    tests: dict[str, WelchResult],
     results: Results,
     folder: Path,
 ) -> None:

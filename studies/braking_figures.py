@@ -27,7 +27,7 @@ from models.systems.braking.measured_pressures import MeasuredPressures
 from models.systems.braking.of_scene import plane_of, surfaces_of_stretch, vehicle_of
 from models.systems.braking.plan import controller_text
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import SLOWEST_SLIP_SPEED, Stop, wheel_names
+from models.systems.braking.stop_report import SLOWEST_SLIP_SPEED, StopHistory, wheel_names
 
 WHEEL_COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND_COLOURS = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
@@ -43,7 +43,7 @@ def stop_figure(
     """Save a figure of the first engine's stop: speeds, slips, pressures and torques over time, and the path from
     above. Lateral motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a
     suspension."""
-    procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
+    procedure, stop = scene.procedures[name], StopHistory(next(iter(results.values())).detail)
     leaves_straight, lean = _moves_laterally(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
     rows += ([["angles", "across"]] if leaves_straight else []) + ([["lean", "loads"]] if lean is not None else [])
@@ -97,14 +97,16 @@ STRAIGHT_LIMIT = 0.05
 """Angle (degrees) and lateral acceleration (m/s^2) up to which a stop is straight and lateral motion is not drawn."""
 
 
-def _moves_laterally(stop: Stop) -> bool:
+def _moves_laterally(stop: StopHistory) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST_SLIP_SPEED
     sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.lateral_acceleration
     return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in sideways)
 
 
-def _plot_speeds(axis: Axes, stop: Stop, rim_speeds: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
+def _plot_speeds(
+    axis: Axes, stop: StopHistory, rim_speeds: np.ndarray, measured_pressures: MeasuredPressures | None
+) -> None:
     for i, (name, values) in enumerate(zip(wheel_names(rim_speeds.shape[1]), rim_speeds.T, strict=True)):
         axis.plot(stop.times, values, color=WHEEL_COLOURS[i], lw=0.8, label=name)
     if measured_pressures is not None and measured_pressures.speeds is not None:
@@ -137,7 +139,7 @@ def _plot_lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
     axis.legend(fontsize=SMALL_TEXT)
 
 
-def _plot_angles(axis: Axes, stop: Stop) -> None:
+def _plot_angles(axis: Axes, stop: StopHistory) -> None:
     """Plot the yaw and side-slip angles over time and, for a train, the hitch angle."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
     slip = np.where(stop.speed > SLOWEST_SLIP_SPEED, np.degrees(stop.side_slip), np.nan)
@@ -186,7 +188,7 @@ def _box_outline(front: float, rear: float) -> np.ndarray:
     )
 
 
-def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
+def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: StopHistory) -> None:
     """Draw the path from above on the road's surfaces, with the vehicle's outline at a few times."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
@@ -213,7 +215,9 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop)
             surfaces_named.add(surface)
     axis.plot(x, y, color=DARK, label="centre of mass")
     units = stop.units
-    for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
+    for i in np.searchsorted(
+        stop.distance_travelled, np.linspace(0.0, stop.distance_travelled[-1], 6 - len(drawn) // 2)
+    ).clip(0, len(x) - 1):
         for unit, corners in drawn:
             axis.plot(*positions_on_road(unit, corners, units[i], plane).T, color=DARK, lw=0.7)
     axis.set(

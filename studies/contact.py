@@ -16,8 +16,8 @@ from models.core.result import Result
 from models.core.strict import Strict, read
 from models.machine.seconds import cost, duration
 from models.systems import run as run_scene
-from models.systems.contact.run import ContactResults, cells_of, scene_contact, touching_places
-from models.systems.contact.scene import ContactScene, Method
+from models.systems.contact.run import ContactResults, fields_by_cell, inputs_of_scene_contact, touching_points
+from models.systems.contact.scene import ContactMethod, ContactScene
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -44,7 +44,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     check(scene, engines)
     forces = run_scene(scene, error=scene.error, fields=True, progress=progress)
     rolls: ContactResults = forces.detail
-    for name, saved in (("forces", forces), ("fields", cells_of(scene, rolls))):
+    for name, saved in (("forces", forces), ("fields", fields_by_cell(scene, rolls))):
         if saved is not None:
             saved.save(folder / f"{name}.nc")
             saved.save_table(folder / f"{name}.csv")
@@ -108,7 +108,7 @@ THEORY_NAMES = {
 }
 
 
-def theory_text(method: Method) -> str:
+def theory_text(method: ContactMethod) -> str:
     """Name of a contact theory, with its number of cells along each axis if it has cells."""
     return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
@@ -124,7 +124,7 @@ def _contact_point_lines(scene: ContactScene) -> list[str]:
     return [
         f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
         f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
-        for touch in touching_places(scene, scene_contact(scene))
+        for touch in touching_points(scene, inputs_of_scene_contact(scene))
     ]
 
 
@@ -172,7 +172,11 @@ def _exact_checks(scene: ContactScene, contact_results: ContactResults) -> dict[
     """Results of the exact theory at a few creepages of a sweep, by the number of the creepage. Empty if the contact is
     no Hertzian ellipse, is exact already, or has falling friction."""
     body, points = contact_results.contact, read(Options, scene.options, scene.file, "options").exact
-    if not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or scene_contact(scene).falling is not None:
+    if (
+        not isinstance(body, OnEllipse)
+        or isinstance(body, ExactOnEllipse)
+        or inputs_of_scene_contact(scene).falling is not None
+    ):
         return {}
     exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
     chosen = np.unique(np.linspace(0, len(contact_results.motions) - 1, points).round().astype(int))

@@ -28,7 +28,7 @@ from models.drawing.figures import (
     save,
     subplots,
 )
-from models.systems.contact.scene import Sweep
+from models.systems.contact.scene import CreepageSweep
 from models.systems.contact.work_precision import ERROR_TARGETS, TheoryPoint
 
 MILLIMETRES_PER_METRE, MEGAPASCAL_PER_PASCAL = 1e3, 1e-6
@@ -132,7 +132,9 @@ CREEPAGE_LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepag
 FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
-def sweep_figure(sweep: Sweep, forces: Result, exact_results: dict[int, Rolled], title: str, path: Path) -> None:
+def sweep_figure(
+    sweep: CreepageSweep, forces: Result, exact_results: dict[int, Rolled], title: str, path: Path
+) -> None:
     """Save a figure of creep forces and moment over a creepage, with error bands and some results of the exact theory.
 
     forces : those of the scene, and their errors; exact_results : results of the exact theory by the number of the

@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from models.core.strict import Strict, read
 from models.core.whole_files import write_whole
 from models.machine.seconds import cost
-from models.systems.contact.run import scene_contact
+from models.systems.contact.run import inputs_of_scene_contact
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.work_precision import TheoryPoint, cheapest_lines, priced_theories
 
@@ -35,7 +35,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     for name in ("creepage", "sweep", "method"):
         if name in scene.model_fields_set:
             raise InputError(scene.file, name, None, "this study goes through all of them itself: drop this table")
-    if scene_contact(scene).falling is not None:
+    if inputs_of_scene_contact(scene).falling is not None:
         raise InputError(scene.file, "falling_friction", None, "the exact theory here has constant friction: drop this")
     if not all(0 < level <= 100 for level in options.levels):
         raise InputError(scene.file, "options.levels", options.levels, "must be above 0 and at most 100")

@@ -244,7 +244,7 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8), width_ratios=(3, 2))
-    draw_quantile_bands(fan, times[1:], statistics.fan[:, 1:])
+    draw_quantile_bands(fan, times[1:], statistics.pitch_error_percentiles[:, 1:])
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )

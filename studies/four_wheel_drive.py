@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.whole_files import write_whole
-from models.systems.handling.run import Drive
+from models.systems.handling.run import SimulatedDrive
 from models.systems.handling.run import run as run_handling
 from models.systems.handling.scene import build
 
@@ -41,14 +41,14 @@ def random_controls() -> dict[str, Knots]:
     return {"steer": steer, "drive": drive, "brake": brake}
 
 
-def simulated_drive() -> Drive:
+def simulated_drive() -> SimulatedDrive:
     """The run with random steer, drive and brake inputs, computed in MuJoCo."""
     manoeuvre = {"speed": START_SPEED, "duration": DURATION, "front_brake": 0.6, **random_controls()}
     table = {"title": "a drive that is made", "system": "handling", "manoeuvres": {"drive": manoeuvre}}
     return run_handling(build(table), "mujoco").detail
 
 
-def measured_columns(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
+def measured_columns(drive: SimulatedDrive) -> dict[str, tuple[str, np.ndarray]]:
     """Columns (unit, sampled values) of a run, as a logger in the car would write them: inputs, speed and noisy
     sensors."""
     stride = round(1.0 / (SAMPLING_RATE * float(drive.run.times[1] - drive.run.times[0])))

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from models.core.told import Results
 from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, SKY, VERMILION, add_heading, legend_below, panels, save
-from models.systems.handling.run import Drive
+from models.systems.handling.run import SimulatedDrive
 
 TYRE_COLOURS, TYRE_LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
 """Colours of four tyres, and line styles of the first four tyres, the next four (of towed bodies) and so on."""
@@ -28,7 +28,7 @@ CORNER_NAMES = {
 def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     """Save a figure of the first run of a manoeuvre: path, channels over time, and friction circle, a colour per
     tyre."""
-    drive: Drive = next(iter(runs.values())).detail
+    drive: SimulatedDrive = next(iter(runs.values())).detail
     figure, axes = panels(8, 2, 2.15)
     over_time, (path_axis, circle_axis) = [axes[i] for i in (1, 2, 3, 4, 5, 6)], (axes[0], axes[7])
     steer, turning, across, slips, loads, moments = over_time
@@ -62,7 +62,7 @@ def _tyre_style(tyre_number: int) -> dict[str, Any]:
     return {"color": TYRE_COLOURS[tyre_number % 4], "linestyle": TYRE_LINES[tyre_number // 4 % 4]}
 
 
-def _plot_path(axis: Axes, drive: Drive) -> None:
+def _plot_path(axis: Axes, drive: SimulatedDrive) -> None:
     x, y, _ = drive.path.T
     axis.plot(x, y, color=DARK)
     x, y_few, yaw = drive.path[:: max(1, len(x) // 8)].T
@@ -74,11 +74,11 @@ def _plot_path(axis: Axes, drive: Drive) -> None:
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
 
 
-def _plot_friction_circle(axis: Axes, drive: Drive) -> None:
+def _plot_friction_circle(axis: Axes, drive: SimulatedDrive) -> None:
     """Plot the horizontal force of each tyre divided by mu N, which lies inside the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
-    bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)
+    bound = np.where(drive["load"] > 0.0, drive.largest_tyre_forces(), 1.0)
     for i, (side, longitudinal) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
         axis.plot(side, longitudinal, **_tyre_style(i), lw=0.9)
     axis.set(

@@ -9,7 +9,7 @@ import numpy as np
 from models.core.result import join_results
 from models.core.strict import Strict, read
 from models.core.time_series import write_time_series
-from models.systems.hub_forces.comparison import METHOD_OF_RUN, Comparison, Progress, compare
+from models.systems.hub_forces.comparison import METHOD_OF_RUN, Progress, StabiliserComparison, compare_stabilisers
 from models.systems.hub_forces.run import MOTION_CHANNELS
 from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene
 
@@ -30,7 +30,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
     Saves the measurement, all runs and two figures; returns the summary."""
     from studies.hub_forces_figures import damage_figure, drift_figure
 
-    comparison = compare(scene, engines, progress)
+    comparison = compare_stabilisers(scene, engines, progress)
     save(comparison, folder)
     drift_figure(comparison, scene.title, folder / "drift.png")
     damage_figure(comparison, scene.title, folder / "damage.png")
@@ -45,7 +45,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
     }
 
 
-def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
+def _table_lines(scene: HubScene, comparison: StabiliserComparison) -> list[str]:
     known, tilt = comparison.truth is not None, comparison.measurement.tilt
     error_heading = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"
@@ -59,7 +59,7 @@ def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
     for name, path in comparison.runs.items():
         largest = np.abs(comparison.errors(path)).max(axis=0)
         roll, pitch = np.sqrt(np.mean(path["holding_moment"] ** 2, axis=0))
-        ratios, drifted = comparison.damages(path["section_force"]).values(), comparison.drift_off(path)
+        ratios, drifted = comparison.relative_damages(path["section_force"]).values(), comparison.drift_off_time(path)
         lines.append(
             f"  {name:<18}"
             + "".join(f"{1e3 * v:>9.3g}" for v in largest[:3])
@@ -76,7 +76,7 @@ def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
     return lines
 
 
-def save(comparison: Comparison, folder: Path) -> None:
+def save(comparison: StabiliserComparison, folder: Path) -> None:
     """Save the measurement as CSV files of a user, all runs as ``runs.nc``, and the motion of the chassis as
     ``runs.csv``."""
     measurement = comparison.measurement

@@ -17,7 +17,7 @@ from models.drawing.figures import (
     scale_about_one,
     subplots,
 )
-from models.systems.hub_forces.comparison import Comparison
+from models.systems.hub_forces.comparison import StabiliserComparison
 
 METHOD_COLOURS = {"free": VERMILION, "filter": BLUE, "prescribed": GREEN}
 DAMAGE_TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
@@ -25,14 +25,14 @@ DAMAGE_TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
 METHOD_LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and pitch prescribed"}
 
 
-def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
+def _drawn_runs(comparison: StabiliserComparison) -> list[tuple[str, str, str]]:
     """Name, label and colour of each run to draw; of the free runs, which look alike, only the last is drawn."""
     free = [(name, "free") for name in comparison.runs if name.startswith("free")][-1:]
     stabilised = [(name, label) for name, label in METHOD_LABELS.items() if name in comparison.runs]
     return [(name, label, METHOD_COLOURS[name.split(",")[0]]) for name, label in (*free, *stabilised)]
 
 
-def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
+def drift_figure(comparison: StabiliserComparison, title: str, path: Path) -> None:
     """Save a figure of roll, pitch, heading and position of every run over time, with the true motion if it is
     known."""
     figure, axes = subplots(2, 3, figsize=(COLUMN_WIDTH, 5.0), sharex=True)
@@ -53,13 +53,13 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
     save(figure, path)
 
 
-def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
+def damage_figure(comparison: StabiliserComparison, title: str, path: Path) -> None:
     """Save a figure of the damage ratio of every section force: damage divided by the true damage or, if this is
     unknown, by the damage of the run with the Kalman filter."""
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.6))
     shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):
-        ratios = comparison.damages(comparison.runs[run]["section_force"])
+        ratios = comparison.relative_damages(comparison.runs[run]["section_force"])
         x_positions = np.arange(len(ratios)) + (k - (len(shown) - 1) / 2) * 0.26
         axis.plot(x_positions, [*ratios.values()], "os^"[k % 3], color=colour, label=label, markersize=4)
         values += ratios.values()

@@ -46,12 +46,12 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
     options = read(Options, scene.options, scene.file, "options")
     branched = branch_result(
-        scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error
+        scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), estimate_error=scene.error
     )
     orbits, notes = branched.detail, json.loads(branched.data.attrs["doubts"])
     speed = options.speed or cycle_speed(scene, orbits)
     progress(f"cycle at {speed:g} m/s", 0.6)
-    results, failed = cycles_of_engines(scene, engines, speed, error=scene.error)
+    results, failed = cycles_of_engines(scene, engines, speed, estimate_error=scene.error)
     by_engine: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     for engine, result in results.items():
         result.save(folder / f"cycle_{engine}.nc")

@@ -60,18 +60,18 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
-            scene, case=name, progress=partial(_report_progress, progress, scene, k), error=scene.error
+            scene, case=name, report_progress=partial(_report_progress, progress, scene, k), error=scene.error
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
-        table += [f"  {name}: {text}", *_table_lines(contacts.placed)]
-        if contacts.placed:
+        table += [f"  {name}: {text}", *_table_lines(contacts.placements)]
+        if contacts.placements:
             _save_tables(name, result, folder)
-    if drawn := {name: result for name, result in results.items() if result.detail.placed}:
+    if drawn := {name: result for name, result in results.items() if result.detail.placements}:
         _figure(scene, drawn, folder / "manchester.png")
     answer = {
-        name: [position_quantities(placed) for placed in result.detail.placed] for name, result in results.items()
+        name: [position_quantities(placed) for placed in result.detail.placements] for name, result in results.items()
     }
     return {
         "scene": scene.title,
@@ -95,7 +95,7 @@ def _save_tables(name: str, result: Result, folder: Path) -> None:
     result.save(folder / f"{name}.nc")
     result.save_table(folder / f"{name}.csv", *POSITION_UNITS)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH_QUANTITIES.items()}}
-    positions = [position_quantities(placed) for placed in result.detail.placed]
+    positions = [position_quantities(placed) for placed in result.detail.placements]
     for wheel in WHEEL_NAMES:
         rows = [
             {"shift": position["shift"], "patch": k, **patch}

@@ -42,7 +42,7 @@ from models.sensors.rotations import GimbalLock
 from models.sensors.sensor_array import SensorArray, sensor_array
 from models.systems.pitch_plane.effects.accelerometers import Parameters, channels_of_sensors
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.sampling import write
+from models.systems.pitch_plane.sampling import write_samples
 from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]
@@ -170,7 +170,7 @@ def _readings_of_run(scene: Scene, engine: str, folder: Path) -> Source:
     p = scene.effects["accelerometers"]
     computed = simulate(scene, engine, error=scene.error)
     path = folder / f"{engine} readings.csv"
-    write(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
+    write_samples(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
     source = _readings_of_file(engine, path, p)
     rows = np.searchsorted(computed.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in COMPARED_CHANNELS.items()} | {"heave rate": "z3_rate"}

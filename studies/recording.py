@@ -10,7 +10,7 @@ from models.core.finding import findings_as_dicts, merged_findings
 from models.core.strict import Strict, read
 from models.drift.score import root_mean_square
 from models.systems.measured.consequences import consequence_texts
-from models.systems.measured.run import WORK_FOLDER, Examination
+from models.systems.measured.run import WORK_FOLDER, RecordingAnalysis
 from models.systems.measured.run import run as run_scene
 from models.systems.measured.scene import MeasuredScene
 
@@ -32,7 +32,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.recording_page import write
 
     result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
-    exam: Examination = result.detail
+    exam: RecordingAnalysis = result.detail
     result.save(folder / "recording.nc")
     page = write(exam, folder / "recording.html", result)
     return {
@@ -50,7 +50,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _failure_reasons(examination: Examination) -> dict[str, str]:
+def _failure_reasons(examination: RecordingAnalysis) -> dict[str, str]:
     """Reasons for which the command ends with code 1: errors in the recording, or the failure of the run whose results
     were to be saved."""
     if examination.has_error_findings:
@@ -59,7 +59,7 @@ def _failure_reasons(examination: Examination) -> dict[str, str]:
     return {name: text for name, text in examination.failed.items() if name == examination.scene.stabilise.method}
 
 
-def _force_sizes(examination: Examination) -> dict[str, Any]:
+def _force_sizes(examination: RecordingAnalysis) -> dict[str, Any]:
     """Unit, largest magnitude and rms of each section force, for the summary."""
     sizes = dict[str, Any]()
     for answer, counted in examination.counted.items():
@@ -73,7 +73,7 @@ def _force_sizes(examination: Examination) -> dict[str, Any]:
     return sizes
 
 
-def _lines_of_findings(examination: Examination) -> list[str]:
+def _lines_of_findings(examination: RecordingAnalysis) -> list[str]:
     """Lines for the screen: findings above a note, how each run ended, and the verdicts on the runs."""
     lines = [
         f"  {finding.weight}: {finding.text}"

@@ -26,7 +26,7 @@ from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import Evidence
 from models.measured.signal import UNIT_OF_QUANTITY, Signal
 from models.systems.measured.holds import FREE_RUN
-from models.systems.measured.run import Examination
+from models.systems.measured.run import RecordingAnalysis
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.verdict import ChannelComparison, paired_channels
@@ -236,7 +236,7 @@ def _panels_over_time(row_count: int, height: float, **options_of_panels: Any) -
     return drawn, panels
 
 
-def inputs_figure(examination: Examination, path: Path) -> Path:
+def inputs_figure(examination: RecordingAnalysis, path: Path) -> Path:
     """Save a figure of the measured forces at all hubs along each axis over time."""
     recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
     drawn, panels = _panels_over_time(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
@@ -255,7 +255,7 @@ def inputs_figure(examination: Examination, path: Path) -> Path:
     return save(drawn, path)
 
 
-def drift_figure(examination: Examination, path: Path) -> Path:
+def drift_figure(examination: RecordingAnalysis, path: Path) -> Path:
     """Save a figure of roll and pitch of every run, with the measured angles and, for a virtual measurement, the true
     angles."""
     angles = examination.rig.angles
@@ -278,7 +278,7 @@ def drift_figure(examination: Examination, path: Path) -> Path:
     return save(drawn, path)
 
 
-def _angles_of_runs(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _angles_of_runs(examination: RecordingAnalysis, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times (s) and values (rad) of an angle by name: measured, of every run, and true for a virtual measurement."""
     recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
@@ -328,7 +328,7 @@ def counting_figure(counted_loads: dict[SectionChannel, CountedLoad], path: Path
 
 
 def overlay_figure(
-    examination: Examination, run: SectionOutcome, channel_comparisons: Sequence[ChannelComparison], path: Path
+    examination: RecordingAnalysis, run: SectionOutcome, channel_comparisons: Sequence[ChannelComparison], path: Path
 ) -> Path:
     """Save a figure of measured channels that were not inputs of the run, and of the computed ones: over the complete
     time, and for two seconds about the largest error."""

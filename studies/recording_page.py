@@ -17,7 +17,7 @@ from models.drawing.pages import environment_of
 from models.fatigue.damage import WOEHLER_SLOPE
 from models.systems.measured.consequences import DAMAGE_LIMITS, FORCE_LIMITS
 from models.systems.measured.holds import FREE_RUN
-from models.systems.measured.run import Examination
+from models.systems.measured.run import RecordingAnalysis
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import LARGEST_DISAGREEMENT, errors_of_run
 from studies import recording_figures as draw
@@ -34,7 +34,7 @@ DRAWN_FORCES = 6
 """Largest number of section forces that are drawn; all are in the table and in the files."""
 
 
-def write(examination: Examination, path: Path, result: Result) -> Path:
+def write(examination: RecordingAnalysis, path: Path, result: Result) -> Path:
     """Write the page of a recording as a complete file; returns its path."""
     with TemporaryDirectory() as folder:
         text = page_text(examination, Path(folder), result)
@@ -42,7 +42,7 @@ def write(examination: Examination, path: Path, result: Result) -> Path:
     return path
 
 
-def page_text(examination: Examination, folder: Path, result: Result) -> str:
+def page_text(examination: RecordingAnalysis, folder: Path, result: Result) -> str:
     """HTML text of a recording's page, with the stated errors and assumptions of the result; figures are drawn into
     ``folder`` and embedded."""
     environment = environment_of(Path(__file__).parent)
@@ -83,12 +83,12 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
     )
 
 
-def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
+def _page_figures(examination: RecordingAnalysis, folder: Path) -> dict[str, Any]:
     """Figures of the recording's page by name: input forces, findings above a note, drift of the runs, and measured
     channels that were not inputs of the run."""
     figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
     figures["findings"] = [
-        (finding, draw.figure_of_finding(finding, examination.evidence, folder / f"finding_{i}.png"))
+        (finding, draw.figure_of_finding(finding, examination.evidence_for_checks, folder / f"finding_{i}.png"))
         for i, finding in enumerate(examination.findings)
         if finding.weight != "note"
     ]
@@ -104,7 +104,7 @@ def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
     return figures
 
 
-def _section_force_content(examination: Examination, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
+def _section_force_content(examination: RecordingAnalysis, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
     """Content of the page's part on section forces: load counts of the varying forces, number of the constant ones, and
     figures of the first few."""
     moving = {

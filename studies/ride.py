@@ -26,8 +26,8 @@ from models.systems.ride.of_scene import (
     vehicle_of,
 )
 from models.systems.ride.plan import frequency_doubts, noise_sharing_text
-from models.systems.ride.readings import isotropic_change, largest_gap, static_loads
-from models.systems.ride.run import AS_WRITTEN, SweepPoints
+from models.systems.ride.readings import isotropic_change, largest_deviation_difference, static_loads
+from models.systems.ride.run import CORRELATIONS_AS_WRITTEN, SweepPoints
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle
@@ -122,7 +122,7 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
     """Cases of road correlation by name: as in the scene (None), then simpler ones. Independent tracks are left out for
     a vehicle with wheels both in the middle and at the sides."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
-    return {AS_WRITTEN: None} | {
+    return {CORRELATIONS_AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)
         for name, (left_right, front_rear) in SIMPLER_ROADS.items()
         if len(sided) == 1 or left_right != "uncorrelated"
@@ -174,7 +174,9 @@ def _summary_of_deviations(sweep: Sweep) -> dict[str, Any]:
     return {
         "speed": sweep.speeds[:-1].tolist(),
         "deviation": {
-            name: [float(value) if np.isfinite(value) else None for value in sweep.of(AS_WRITTEN, name)[:-1]]
+            name: [
+                float(value) if np.isfinite(value) else None for value in sweep.of(CORRELATIONS_AS_WRITTEN, name)[:-1]
+            ]
             for name in sweep.outputs
         },
     }
@@ -205,8 +207,9 @@ def _table_lines(
     lines += _travel_lines(vehicle, deviations, options.free_travel) + _load_factor_lines(vehicle, deviations)
     for engine, other_value in other_sweeps:
         status_note = "" if (other_value.status == first.status).all() else "; but what is finite differs"
+        difference = largest_deviation_difference(other_value, first)
         lines.append(
-            f"  {engine}'s own linear vehicle: standard deviations within {largest_gap(other_value, first):.1e} "
+            f"  {engine}'s own linear vehicle: standard deviations within {difference:.1e} "
             f"(of the largest) of {name}'s{status_note}"
         )
     return lines

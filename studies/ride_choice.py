@@ -19,7 +19,7 @@ from models.core.told import derived_result
 from models.core.whole_files import write_whole
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import needs_run_in_time, scene_errors
-from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
+from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, refusal_reason
 from models.systems.ride.scene import RideScene
 from studies.choice import save_choices
 
@@ -42,7 +42,7 @@ class SingleEffect:
     """A single effect of a ride scene: predicted and confirmed relative changes (quantities,) if only it is left out,
     and the reason why it may not be left out, else ""."""
 
-    effect: Effect
+    effect: OmissibleEffect
     predicted_change: np.ndarray
     confirmed_change: np.ndarray
     refusal_reason: str
@@ -98,18 +98,20 @@ def _deviation_results(scene: RideScene, reduced_scene: ReducedScene) -> dict[st
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
     vehicle = replace(reduced_scene.vehicle, limits=reduced_scene.limits)
     if reduced_scene != ReducedScene.complete(scene):
-        results["what is left"] = run_scene(reduced_scene.ride, "reference", vehicle=vehicle, error=scene.error)
+        results["what is left"] = run_scene(reduced_scene.ride_scene, "reference", vehicle=vehicle, error=scene.error)
     return results
 
 
-def _single_effect(chooser: Chooser, effect: Effect) -> SingleEffect:
+def _single_effect(chooser: Chooser, effect: OmissibleEffect) -> SingleEffect:
     single = frozenset([effect])
     return SingleEffect(
         effect, chooser.predicted_changes(single), chooser.changes_by_modes(single), refusal_reason(single)
     )
 
 
-def _summary_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: dict[Effect, float]) -> dict[str, Any]:
+def _summary_of_choice(
+    scene: RideScene, choice: RideChoice, change_by_effect: dict[OmissibleEffect, float]
+) -> dict[str, Any]:
     """Summary of a ride's choice as plain values: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted_change,
@@ -243,7 +245,10 @@ def percent_text(relative_change: float) -> str:
 
 
 def _table_lines(
-    scene: RideScene, choice: RideChoice, single_effects: list[SingleEffect], change_by_effect: dict[Effect, float]
+    scene: RideScene,
+    choice: RideChoice,
+    single_effects: list[SingleEffect],
+    change_by_effect: dict[OmissibleEffect, float],
 ) -> list[str]:
     """Lines for the screen on the choice of effects, their changes and the saving."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"

@@ -18,7 +18,7 @@ from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
-from models.systems.ride.readings import largest_errors
+from models.systems.ride.readings import largest_deviation_errors
 from models.systems.ride.run import SweepPoints
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle
@@ -79,7 +79,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     names = [output.name for output in full.outputs]
     truth = list(sweeps.values())[-1].deviation[-1]
     errors = {
-        (model, road): largest_errors(sweep, i, truth, names)
+        (model, road): largest_deviation_errors(sweep, i, truth, names)
         for model, sweep in sweeps.items()
         for i, road in enumerate(sweep.cases)
     }

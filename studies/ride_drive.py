@@ -12,7 +12,7 @@ from models.core.strict import Strict, read
 from models.ride.varying_speed import VaryingSpeed
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import check_linear, vehicle_of
-from models.systems.ride.readings import quasi_stationary_gaps
+from models.systems.ride.readings import quasi_stationary_errors
 from models.systems.ride.scene import RideScene
 
 SYSTEM = "ride"
@@ -71,7 +71,7 @@ def _options(scene: RideScene) -> Options:
 
 
 def _summary_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
-    gaps = quasi_stationary_gaps(drive, quasi_stationary)
+    gaps = quasi_stationary_errors(drive, quasi_stationary)
     finite = np.isfinite(drive.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
     return {
@@ -86,7 +86,7 @@ def _table_lines(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[
     heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]
     width = max(map(len, heads))
     lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   each speed by itself is most wrong, % of the largest"]
-    gaps = quasi_stationary_gaps(drive, quasi_stationary)
+    gaps = quasi_stationary_errors(drive, quasi_stationary)
     for i, name in enumerate(heads):
         deviation = drive.deviation[:, i]
         if not np.isfinite(deviation).all():

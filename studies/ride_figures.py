@@ -35,7 +35,7 @@ from models.road.excitation import Excitation
 from models.road.fitted import FittedRoad
 from models.road.isotropic import isotropic_road_like
 from models.road.two_track import TwoTrackRoad
-from models.systems.ride.nonlinear import Nonlinear, Ride
+from models.systems.ride.nonlinear import EngineRide, NonlinearRide
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
@@ -307,7 +307,7 @@ MOST_OUTPUTS = 12
 """Largest number of outputs in a figure."""
 
 
-def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None:
+def nonlinear_figure(nonlinear: NonlinearRide, heading: Heading, path: Path) -> None:
     """Save a figure of each output's standard deviation over speed by small motion, statistical linearisation and Monte
     Carlo copies; open marks show where statistical linearisation states a large error."""
     outputs = nonlinear.shown.vehicle.outputs
@@ -356,7 +356,7 @@ def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None
 
 
 def engine_spectra_figure(
-    runs: Mapping[str, Ride],
+    runs: Mapping[str, EngineRide],
     linear_vehicle: LinearVehicle,
     road: Excitation,
     speed: float,

@@ -16,7 +16,7 @@ from models.ride.frequency import standard_errors
 from models.ride.road_path import check_rates
 from models.road.excitation import Excitation
 from models.systems import run as run_scene
-from models.systems.ride.nonlinear import Nonlinear, Ride, Sampling
+from models.systems.ride.nonlinear import EngineRide, NonlinearRide, RunSampling
 from models.systems.ride.of_scene import excitation_of, has_no_linear_equivalent, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
@@ -26,7 +26,7 @@ SYSTEM = "ride"
 Progress = Callable[[str, float], None]
 
 
-class Options(Sampling):
+class Options(RunSampling):
     """Keys of the table [options] of this study."""
 
 
@@ -61,7 +61,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     speed, road = options.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
     results = {"reference": run_scene(scene, "reference", sampling=options, progress=progress, error=scene.error)}
     results["reference"].save(folder / "nonlinear.nc")
-    answer, runs, failed = results["reference"].detail, dict[str, Ride](), dict[str, str]()
+    answer, runs, failed = results["reference"].detail, dict[str, EngineRide](), dict[str, str]()
     for engine in (engine for engine in engines if engine in INTEGRATORS):
         progress(f"{engine} in time", 0.8)
         try:
@@ -90,7 +90,7 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _summary_of_deviations(nonlinear: Nonlinear) -> dict[str, Any]:
+def _summary_of_deviations(nonlinear: NonlinearRide) -> dict[str, Any]:
     """Summary: standard deviation and mean (SI) of each output at all speeds, None for values that are not finite; for
     tyres that may lift off, those of the Monte Carlo copies at the copies' speeds."""
     copies = list(nonlinear.copies.values())
@@ -108,7 +108,7 @@ def _summary_of_deviations(nonlinear: Nonlinear) -> dict[str, Any]:
     return table
 
 
-def _table_lines(nonlinear: Nonlinear, speed: float) -> list[str]:
+def _table_lines(nonlinear: NonlinearRide, speed: float) -> list[str]:
     """Lines for the screen: the springs' equivalent gains at a speed (m/s), and the Monte Carlo copies with the errors
     of both linear vehicles relative to them."""
     lines, shown = [f"  at {speed:g} m/s"], nonlinear.shown
@@ -134,7 +134,7 @@ def _table_lines(nonlinear: Nonlinear, speed: float) -> list[str]:
     return lines
 
 
-def _errors_at_speed(nonlinear: Nonlinear, speed: float, output_number: int) -> str:
+def _errors_at_speed(nonlinear: NonlinearRide, speed: float, output_number: int) -> str:
     """Text on the errors of small motion and of statistical linearisation of an output at a speed (m/s); ""
     if the sweep does not have the speed."""
     matching = np.flatnonzero(np.isclose(nonlinear.speeds, speed))
@@ -148,7 +148,7 @@ def _errors_at_speed(nonlinear: Nonlinear, speed: float, output_number: int) -> 
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 
 
-def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[str, Ride]) -> list[str]:
+def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: NonlinearRide, runs: dict[str, EngineRide]) -> list[str]:
     """Lines for the screen on two shares of time for each tyre: for which a tyre that cannot lift off would pull, by a
     Gaussian law, and for which it is in the air in the engines' runs. Empty if no tyre may lift off."""
     from scipy.special import ndtr
@@ -178,7 +178,7 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[s
     return lines
 
 
-def _time_table(runs: dict[str, Ride], nonlinear: Nonlinear, road: Excitation, speed: float) -> list[str]:
+def _time_table(runs: dict[str, EngineRide], nonlinear: NonlinearRide, road: Excitation, speed: float) -> list[str]:
     """Lines for the screen: the engines' standard deviations beside statistical linearisation, and the difference
     between the engines."""
     if not runs:

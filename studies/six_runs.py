@@ -17,7 +17,7 @@ from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import (
     DRIFT_OFF_PITCH,
-    Options,
+    SixRunOptions,
     channel_error,
     figures_of_run,
     measurement_and_runs,
@@ -80,7 +80,7 @@ the moment."""
 
 
 def summary_lines(
-    rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options, deviation: float
+    rows: list[dict[str, Any]], engines: tuple[str, ...], options: SixRunOptions, deviation: float
 ) -> list[str]:
     """Lines for the screen: a table with a line per run and a column per engine."""
     runs: dict[str, list[dict[str, Any]]] = {}

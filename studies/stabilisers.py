@@ -16,7 +16,13 @@ from models.core.whole_files import whole_file, write_whole
 from models.drift.score import SECTION_FORCE_CHANNELS
 from models.fatigue.damage import COUNTING_CONVENTION
 from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.stabilised import Bench, Options, Row, compare, options_of
+from models.systems.pitch_plane.stabilised import (
+    FiguresRow,
+    StabiliserBench,
+    StabiliserOptions,
+    compare_stabilisers,
+    options_of,
+)
 
 Progress = Callable[[str, float], None]
 check = options_of
@@ -28,7 +34,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     from models.drawing.drift import decision_figure, stiffness_figure
     from models.drawing.figures import save
 
-    benches_of_roads, rows, failed = compare(scene, engines, folder, progress)
+    benches_of_roads, rows, failed = compare_stabilisers(scene, engines, folder, progress)
     options = benches_of_roads[0].options
     progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
     sweep = {bench.road: bench.sweep() for bench in benches_of_roads}
@@ -65,7 +71,9 @@ def _step_error_text(results: Results) -> str:
     )
 
 
-def summary_lines(rows: list[Row], benches_of_roads: list[Bench], options: Options) -> list[str]:
+def summary_lines(
+    rows: list[FiguresRow], benches_of_roads: list[StabiliserBench], options: StabiliserOptions
+) -> list[str]:
     """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [
         f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
@@ -100,7 +108,7 @@ UNITS_LINE = (
 )
 
 
-def _score_line(row: Row, free_seconds: float) -> str:
+def _score_line(row: FiguresRow, free_seconds: float) -> str:
     ratios = "".join(f"{_ratio_text(row[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
     return (
         f"  {row['method']:<25}{ratios}{_ratio_text(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"

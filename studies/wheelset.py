@@ -38,7 +38,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
-            eigenvalues[engine] = linearised_result(scene, engine, error=scene.error)
+            eigenvalues[engine] = linearised_result(scene, engine, estimate_error=scene.error)
             progress(f"paths of {engine}", (i + 0.5) / len(engines))
             paths[engine] = {speed: run_path(scene, engine, speed, error=scene.error) for speed in path_speeds(scene)}
         except RunFailed as error:
@@ -88,8 +88,8 @@ def _save_table(linear_results: dict[str, LinearisedMotion], folder: Path) -> No
     columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
     for engine, linear_run in linear_results.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
-        columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting.real)
-        columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting.imag / (2.0 * np.pi))
+        columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting_eigenvalue.real)
+        columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting_eigenvalue.imag / (2.0 * np.pi))
     write_table(folder / "over_speed.csv", columns)
 
 

@@ -58,9 +58,17 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
         left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), ENGINE_MARKS[engine], **style)
         middle.plot(
-            linear_run.speeds, 2.0 * np.pi * linear_run.speeds / linear_run.hunting.imag, ENGINE_MARKS[engine], **style
+            linear_run.speeds,
+            2.0 * np.pi * linear_run.speeds / linear_run.hunting_eigenvalue.imag,
+            ENGINE_MARKS[engine],
+            **style,
         )
-        right.plot(linear_run.hunting.real, linear_run.hunting.imag / (2.0 * np.pi), ENGINE_MARKS[engine], **style)
+        right.plot(
+            linear_run.hunting_eigenvalue.real,
+            linear_run.hunting_eigenvalue.imag / (2.0 * np.pi),
+            ENGINE_MARKS[engine],
+            **style,
+        )
     first = next(iter(linear.values()))
     for line in (left.axhline, right.axvline):
         line(0.0, color="0.6", linewidth=0.8)
@@ -76,7 +84,7 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         fontsize=SMALL_TEXT,
     )
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
-        eigenvalue = first.hunting[i]
+        eigenvalue = first.hunting_eigenvalue[i]
         if np.isfinite(eigenvalue):
             mark_position = eigenvalue.real, eigenvalue.imag / (2.0 * np.pi)
             clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}

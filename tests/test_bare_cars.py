@@ -8,7 +8,7 @@ import pytest
 from models.engines import free_vehicle_mujoco
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.multibody.numbers import Handling
-from models.systems.handling.run import driven_by
+from models.systems.handling.run import driven_model
 from validation.absence import bare_cars, hand_built_handling, machinery
 
 
@@ -35,11 +35,11 @@ def test_bodies_that_are_one_in_mujoco_move_as_they_do_apart(monkeypatch: pytest
     own, q, v = bare_cars.start_state()
     rng = np.random.default_rng(1)
     q, v = q + rng.normal(0.0, 0.05, len(q)), v + rng.normal(0.0, 0.2, len(v))
-    one = FreeMujoco(driven_by(own))
+    one = FreeMujoco(driven_model(own))
     merged = free_vehicle_mujoco.mergeable_carriers(own.vehicle)
     assert {"carrier", "sway"} < set(merged) and len(merged) == 6  # and the four wheels, whose rotors ride on them
     monkeypatch.setattr(free_vehicle_mujoco, "mergeable_carriers", lambda vehicle: {})
-    apart = FreeMujoco(driven_by(own))
+    apart = FreeMujoco(driven_model(own))
     assert apart.model.nbody - one.model.nbody == 6
     np.testing.assert_allclose(one.acceleration(0.0, q, v), apart.acceleration(0.0, q, v), rtol=1e-10, atol=1e-10)
 

@@ -5,7 +5,7 @@ import pytest
 
 from models.brake import figures_of_merit as merit
 from models.core.errors import InputError
-from models.systems.braking.stops import Scatter, scatter_of, welch_test
+from models.systems.braking.stops import SampleScatter, scatter_of, welch_test
 
 PAPER = merit.Axles(front=33_600.0, rear=21_800.0, wheelbase=3.61, height=1.2)
 
@@ -75,7 +75,7 @@ def test_locks_are_told_by_wheel_above_a_speed_alone():
 
 def test_welch_is_that_of_a_worked_example():
     # means 5 and 7, variances 4 and 9, 10 and 12 values: t = 2 / sqrt(0.4 + 0.75), freedoms 1.3225 / 0.0689
-    found = welch_test(Scatter(10, 5.0, 2.0), Scatter(12, 7.0, 3.0))
+    found = welch_test(SampleScatter(10, 5.0, 2.0), SampleScatter(12, 7.0, 3.0))
     assert found.t == pytest.approx(2.0 / np.sqrt(1.15)) and found.freedoms == pytest.approx(19.19, abs=0.01)
     from scipy.stats import ttest_ind_from_stats
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from models.brake.trailer import CHOSEN_TRAILER
-from models.systems.braking.adhesion import utilisation
+from models.systems.braking.adhesion import measured_utilisation
 from models.systems.braking.of_scene import plane_of
 from models.systems.braking.scene import build
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 from studies.braking_figures import positions_on_road, unit_outlines
 
 TABLE = {
@@ -25,7 +25,7 @@ TABLE = {
 def test_hitch_angles_are_of_the_drawbar_against_the_truck():
     states = np.zeros((3, 2, 5))
     states[:, 0, 2:4] = [[0.0, 0.0], [0.1, -0.2], [0.3, 0.2]]
-    stop = Stop(SimpleNamespace(states=states, times=np.array([0.0, 1.0, 2.0]), coordinates=()))
+    stop = StopHistory(SimpleNamespace(states=states, times=np.array([0.0, 1.0, 2.0]), coordinates=()))
     assert stop.hitch_results() == pytest.approx(
         {
             "largest hitch angle [deg]": np.degrees(-0.3),
@@ -52,7 +52,7 @@ def test_the_train_is_drawn_where_its_hinges_are():
 
 @pytest.mark.full
 def test_adhesion_of_every_axle_of_a_train_is_that_of_its_tyres():
-    found = utilisation(build(TABLE), "ice")
+    found = measured_utilisation(build(TABLE), "ice")
     k = np.array([found.adhesion.front, found.adhesion.rear, *found.adhesion.trailer])
     # friction peaks at 0.172; Annex 13 takes 0.010 or 0.015 of the truck's other axle off, which does not roll so here
     assert k.size == 4 and ((k > 0.14) & (k < 0.172)).all() and k[2:].min() > 0.155

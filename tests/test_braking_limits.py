@@ -10,7 +10,7 @@ from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, chec
 from models.brake.quarter import Quarter
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_train
 from models.core.errors import InputError, RunFailed
-from models.systems.braking.procedures import vehicle_and_start
+from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking.random_stops import random_stop
@@ -99,7 +99,7 @@ def test_what_cannot_be_is_refused_with_its_value():
     with pytest.raises(ControllerFailed, match="wrong frame: complex"):
         checked_answer(Command(pressures=np.full(4, 1j)), GIVEN)
     with pytest.raises(InputError, match=r"mass = 0.1: must be above 322.8 kg"):
-        vehicle_and_start(scene(vehicle={"override": {"mass": 0.1}}), "stop")
+        vehicle_and_start_state(scene(vehicle={"override": {"mass": 0.1}}), "stop")
     with pytest.raises(InputError, match=r"mass = 200.0: must be above"):
         plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"mass": 100.0, "drawbar_mass": 100.0}))
     with pytest.raises(ValueError, match="J / r"):

@@ -12,7 +12,7 @@ from models.systems.braking.of_scene import measured_pressures_of
 from models.systems.braking.plan import check, describe
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 from studies.braking import measurement_end_line, run
 
 HEAD = "time [s], pressure_fl [bar], pressure_fr [kPa], pressure_rl [bar], pressure_rr [bar]"
@@ -49,7 +49,7 @@ def test_pressures_of_a_file_are_held_after_its_end_and_it_is_said(tmp_path):
     own = scene(tmp_path, **MEASURED, run={"duration": 0.3})
     path = drive(own).detail
     assert path.pressures[1:] == pytest.approx(1.0, rel=1e-12)
-    told = measurement_end_line(measured_pressures_of(own, "stop", 4), Stop(path))
+    told = measurement_end_line(measured_pressures_of(own, "stop", 4), StopHistory(path))
     assert told == ["    measured pressures end at 0.100 s: from then on the last ones stay"]
     assert "measured pressures {procedure}" in describe(own)
 

@@ -6,7 +6,7 @@ import pytest
 
 from models.brake.controller import Pressures
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.systems.braking.procedures import steer_angles, vehicle_and_start
+from models.systems.braking.procedures import steer_angles, vehicle_and_start_state
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from models.tyre.tyre_source import table_of_named_tyre
@@ -84,7 +84,7 @@ def test_chambers_fill_with_their_time_constant():
 
 
 def test_wheels_have_the_pressures_that_they_are_told():
-    vehicle, start = vehicle_and_start(scene(10.5, 1.0, brakes=LOCKING), "stop")
+    vehicle, start = vehicle_and_start_state(scene(10.5, 1.0, brakes=LOCKING), "stop")
     asked = np.array([1.3, 1.7, 0.4, 2.1])
     path = vehicle.run(Pressures(asked), start, 0.05)
     assert path.pressures[-1] == pytest.approx(asked, rel=1e-12)
@@ -93,10 +93,10 @@ def test_wheels_have_the_pressures_that_they_are_told():
 
 def test_only_front_wheels_are_steered_by_the_knots_of_the_procedure():
     knots = [[0.5, 0.01], [1.5, 0.05]]
-    vehicle, start = vehicle_and_start(scene(10.5, 1.0, procedure={"kind": "j_turn", "steering": knots}), "stop")
+    vehicle, start = vehicle_and_start_state(scene(10.5, 1.0, procedure={"kind": "j_turn", "steering": knots}), "stop")
     for time, angle in ((0.0, 0.01), (1.0, 0.03), (4.0, 0.05)):
         assert vehicle.steering(time) == pytest.approx([angle, angle, 0.0, 0.0], rel=1e-12)
-    fixed, _ = vehicle_and_start(scene(10.5, 1.0, procedure={"kind": "j_turn", "steer": -0.02}), "stop")
+    fixed, _ = vehicle_and_start_state(scene(10.5, 1.0, procedure={"kind": "j_turn", "steer": -0.02}), "stop")
     assert fixed.steer == pytest.approx([-0.02, -0.02, 0.0, 0.0], rel=1e-12)
     assert steer_angles(vehicle, 0.3) == pytest.approx([0.3, 0.3, 0.0, 0.0], rel=1e-12)
     assert start.state[1, 0] == 10.5 and start.turning == pytest.approx(10.5 / PLANE.radius, rel=1e-12)

@@ -12,13 +12,13 @@ from models.brake.controller import Command
 from models.brake.port.ask import ControllerFailed
 from models.core.errors import InputError
 from models.core.systems import load
-from models.systems.braking.adhesion import Adhesion, NoAdhesion, utilisation
+from models.systems.braking.adhesion import Adhesion, NoAdhesion, measured_utilisation
 from models.systems.braking.of_scene import braked_vehicle
 from models.systems.braking.plan import check, check_reference, describe
-from models.systems.braking.procedures import vehicle_and_start
+from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 from studies.braking import figures_lines
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
@@ -88,7 +88,7 @@ def test_without_load_transfer_and_dynamics_nothing_of_them_is_computed():
 @pytest.mark.parametrize("radius", [137.0, -137.0])
 def test_a_turn_begins_on_its_steady_circle(radius):
     own = scene(procedures={"a": {"kind": "turn", "speed": 8.0, "radius": radius}}, load_transfer={})
-    vehicle, start = vehicle_and_start(own, "a")
+    vehicle, start = vehicle_and_start_state(own, "a")
     path = replace(vehicle, switch_time=1.0).run(Applied(), start, 0.5)
     centre = radius * np.array([-start.state[1, 1], start.state[1, 0]]) / 8.0
     off = np.hypot(*(path.states[:, 0, :2] - centre).T) - abs(radius)
@@ -114,7 +114,7 @@ class Applied:
 
 
 def test_a_controller_that_dies_leaves_the_path_until_then():
-    vehicle, start = vehicle_and_start(scene(), "stop")
+    vehicle, start = vehicle_and_start_state(scene(), "stop")
     with pytest.raises(ControllerFailed, match="dead") as error:
         vehicle.run(Applied(5), start)
     assert len(error.value.partial.times) == 6 and error.value.partial.reports.load.shape[0] == 5
@@ -137,7 +137,7 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
     tables = {**PLAIN, "run": {"duration": 60.0}, "controller": {"kind": "slip_bang_bang"}}
     port = {"callable": "mine.py:Released", "timeout": 60.0, "start": 60.0}
     own, others = (
-        utilisation(build({**tables, **more}, "s.toml", tmp_path), "ice", Adhesion(0.17, 0.17)).z
+        measured_utilisation(build({**tables, **more}, "s.toml", tmp_path), "ice", Adhesion(0.17, 0.17)).z
         for more in ({}, {"port": port})
     )
     expected = 0.5 * 2 * (1500.0 + 1200.0) / 0.5 / (5640.0 * 9.81 + 2 * (13.35 + 27.0) / 0.25 * 9.81)
@@ -147,17 +147,17 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
 def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
     lags = {"relaxation": {"front": 0.005, "rear": 0.5}, "road": {"stretches": [{"left": "dry"}]}}
     with pytest.raises(InputError, match=r"run\.substeps = 1: must be at least 2: .* rocks up"):
-        vehicle_and_start(scene(run={"sample": 0.01, "substeps": 1}, **lags), "stop")
-    vehicle_and_start(scene(run={"sample": 0.01, "substeps": 2}, **lags), "stop")
+        vehicle_and_start_state(scene(run={"sample": 0.01, "substeps": 1}, **lags), "stop")
+    vehicle_and_start_state(scene(run={"sample": 0.01, "substeps": 2}, **lags), "stop")
     lags["relaxation"]["front"] = 1e-12
     with pytest.raises(InputError, match=r"relaxation = 1e-12: must be at least .* m: .* more than 1000") as refusal:
-        vehicle_and_start(scene(run={"sample": 0.01}, **lags), "stop")
+        vehicle_and_start_state(scene(run={"sample": 0.01}, **lags), "stop")
     lags["relaxation"]["front"] = float(re.search(r"at least (\S+) m", str(refusal.value))[1])
-    vehicle_and_start(scene(run={"sample": 0.01, "substeps": 1000}, **lags), "stop")
+    vehicle_and_start_state(scene(run={"sample": 0.01, "substeps": 1000}, **lags), "stop")
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():
-    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).wheel_results()
+    slips = StopHistory(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).wheel_results()
     assert 0.0 < slips["mean slip"].min() <= slips["largest slip"].max() <= 1.0
 
 
@@ -259,9 +259,9 @@ def test_a_run_of_less_than_two_samples_is_refused():
 def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():
     weak = scene(controller={"kind": "slip_bang_bang"}, brakes={"supply": 2.0}, road={"stretches": [{"left": "dry"}]})
     with pytest.raises(NoAdhesion, match=r"front axle does not lock at the supply's 2 bar"):
-        utilisation(weak, "dry")
+        measured_utilisation(weak, "dry")
 
 
 def test_a_run_that_ends_before_the_vehicle_stands_says_so():
-    stop = Stop(drive(scene()).detail)
+    stop = StopHistory(drive(scene()).detail)
     assert "not stopped by 0.3025 s, still 9.7" in figures_lines("stop", stop, {}, {})[0]

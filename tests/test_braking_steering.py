@@ -7,7 +7,7 @@ from scipy.signal import lti, step
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK
 from models.brake.steering import Steering, yaw_response
 from models.core.errors import InputError
-from models.systems.braking.procedures import step_steer, vehicle_and_start
+from models.systems.braking.procedures import step_steer_response, vehicle_and_start_state
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import table_of_surface
@@ -52,7 +52,7 @@ def test_half_of_the_steering():
 
 def test_the_response_of_a_vehicle_is_that_of_the_linear_one():
     speed, angle, ramp = 10.0, 2e-4, 0.1
-    found = step_steer(scene(steering=[[0.0, 0.0], [ramp, angle]], speed=speed), "j")
+    found = step_steer_response(scene(steering=[[0.0, 0.0], [ramp, angle]], speed=speed), "j")
     a, b, mass = PAPER_TRUCK.front.x, -PAPER_TRUCK.rear.x, PAPER_TRUCK.mass
     rolling = sum(
         2.0 * axle.spin_inertia * (axle.track / 2.0 / axle.radius) ** 2
@@ -82,7 +82,7 @@ def test_a_ramp_turns_less_than_a_step_and_a_step_of_one_knot_the_same():
 
 
 def test_a_ramp_begins_with_straight_wheels():
-    assert not vehicle_and_start(scene(steering=[[0.0, 0.0], [0.2, 0.03]]), "j")[0].steer.any()
+    assert not vehicle_and_start_state(scene(steering=[[0.0, 0.0], [0.2, 0.03]]), "j")[0].steer.any()
 
 
 @pytest.mark.parametrize(

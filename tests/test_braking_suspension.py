@@ -11,10 +11,10 @@ from models.brake.trailer import CHOSEN_TRAILER
 from models.core.errors import InputError, Refused, RunFailed
 from models.multibody.numbers import Handling
 from models.systems.braking.plan import check, describe
-from models.systems.braking.procedures import engines_of, vehicle_and_start
+from models.systems.braking.procedures import engines_of, vehicle_and_start_state
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 from models.tyre.magic_formula import table_of_surface
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.sprung_box import (
@@ -107,11 +107,11 @@ def test_a_step_that_stiff_springs_cannot_take_is_refused_before_the_run():
 
 def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_body():
     own = scene()
-    vehicle, start = vehicle_and_start(own, "turn")
+    vehicle, start = vehicle_and_start_state(own, "turn")
     path = vehicle.run(steady_torques(0.0, 0.0, 0.0, 0.0), start, 0.1)
     assert np.abs(path.states[-1, 0, 3:] - start.state[0, 3:]).max() < 1e-5  # springs are settled; drag slows it down
     assert start.state[0, ROLL] > 5e-3
-    stop = Stop(drive(own, procedure="straight").detail)
+    stop = StopHistory(drive(own, procedure="straight").detail)
     assert stop.path.ended_at_rest and stop.vehicle_results()["largest pitch [deg]"] > 0.5
     assert "suspension, roll and pitch" in describe(own)
     check(own, ("reference", "exudyn", "mujoco"))

@@ -16,10 +16,10 @@ from models.multibody.forces import PARTS
 from models.systems.braking.march import StartState
 from models.systems.braking.of_scene import plane_of
 from models.systems.braking.plan import check, describe
-from models.systems.braking.procedures import vehicle_and_start
+from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
-from models.systems.braking.stop_report import Stop, wheel_names
+from models.systems.braking.stop_report import StopHistory, wheel_names
 from models.tyre.magic_formula import table_of_surface
 from models.vehicles.spatial import hitch_of
 from models.vehicles.vehicle_file import SHIPPED_FOLDER
@@ -136,12 +136,12 @@ def test_a_scene_brakes_and_controls_the_wheels_of_its_trailer():
     check(towing, ("reference", "exudyn", "mujoco"))
     assert (
         result.detail.coordinates[19] == "caravan hitch rz"
-        and "largest hitch angle [deg]" in Stop(result.detail).hitch_results()
+        and "largest hitch angle [deg]" in StopHistory(result.detail).hitch_results()
     )
 
 
 def test_a_steady_circle_tows_the_caravan_inwards():
-    vehicle, start = vehicle_and_start(scene(), "turn")
+    vehicle, start = vehicle_and_start_state(scene(), "turn")
     path = vehicle.run(steady_torques(*6 * (0.0,)), start, 0.1)
     yaw = vehicle.sprung.turns[0]
     assert start.state[0, yaw] < -0.05 and abs(path.states[-1, 0, yaw] - start.state[0, yaw]) < 1e-5

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.systems.contact.run import hertz_of, solved_contact
+from models.systems.contact.run import hertzian_contact, solved_contact
 from models.systems.contact.scene import build
 
 ELLIPSE = """
@@ -131,11 +131,11 @@ def test_unlike_materials_may_be_pressed_without_friction(twinrig, capsys):
 def test_radii_curvatures_ellipse_and_approach_name_the_same_contact():
     """To rounding of some roots: 1e-12."""
     own = {key: value for key, value in TABLE.items() if key != "ellipse"}
-    one = hertz_of(build({**own, "radii": {"wheel_x": 0.46, "rail_y": 0.3}}))
+    one = hertzian_contact(build({**own, "radii": {"wheel_x": 0.46, "rail_y": 0.3}}))
     same = [
-        hertz_of(build({**own, "curvatures": {"A": 1 / 0.92, "B": 1 / 0.6}})),
-        hertz_of(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)}})),
-        hertz_of(
+        hertzian_contact(build({**own, "curvatures": {"A": 1 / 0.92, "B": 1 / 0.6}})),
+        hertzian_contact(build({**own, "ellipse": {"a": float(one.a), "b": float(one.b)}})),
+        hertzian_contact(
             build(
                 {
                     **own,

@@ -20,7 +20,7 @@ from models.ensemble.store import Store
 from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, OUTPUT_HEADINGS, solve_table
 from models.systems.contact.run import Built, solved_contact
-from models.systems.contact.scene import Method, build
+from models.systems.contact.scene import ContactMethod, build
 from models.systems.contact.work_precision import TheoryPoint, fastest_point, with_exact_forces
 from studies.contact_table import summary_lines
 from validation.cases import contact_price
@@ -41,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
 def answered(text, name="cases.csv", **method):
     """Counts and rows that a table is answered with."""
     Path(name).write_text(text, encoding="utf-8", errors="surrogateescape")
-    counts = solve_table(Path(name), Path("out.csv"), partial(Built, MaterialPair()), Method(**method))
+    counts = solve_table(Path(name), Path("out.csv"), partial(Built, MaterialPair()), ContactMethod(**method))
     with open("out.csv", newline="") as file:
         return counts, list(csv.DictReader(file))
 
@@ -259,7 +259,7 @@ def test_a_table_that_was_cut_off_says_so():
 def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
     Path("cases.csv").write_text(header + ROW if header else "")
     with pytest.raises(InputError) as found:
-        solve_table(Path("cases.csv"), Path("out.csv"), partial(Built, MaterialPair()), Method())
+        solve_table(Path("cases.csv"), Path("out.csv"), partial(Built, MaterialPair()), ContactMethod())
     assert words in str(found.value) and not Path("out.csv").exists()
 
 
@@ -321,7 +321,7 @@ def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
     case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
     for one in (case, unseen[4]):
         assert np.linalg.norm(with_exact_forces(one, (20,)).force - one.force) < 0.01
-    assert case.limit == FRICTION * LOAD
+    assert case.friction_limit == FRICTION * LOAD
 
 
 def test_the_quick_rows_of_the_price_pass(tmp_path):
@@ -349,8 +349,8 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
     path, built = tmp_path / "cases.csv", partial(Built, MaterialPair())
     path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
     alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))
-    assert solve_table(path, alone, built, Method()) == {"rows": 9, "wrong": 1}
-    solve_table(path, shared, built, Method(), executor=Counting())
+    assert solve_table(path, alone, built, ContactMethod()) == {"rows": 9, "wrong": 1}
+    solve_table(path, shared, built, ContactMethod(), executor=Counting())
     assert shared.read_bytes() == alone.read_bytes()
 
     def stop(rows):
@@ -359,7 +359,7 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
 
     store, again = Store(tmp_path), Counting()
     with pytest.raises(KeyboardInterrupt):
-        solve_table(path, resumed, built, Method(), stop, store=store)
+        solve_table(path, resumed, built, ContactMethod(), stop, block_store=store)
     assert not resumed.exists() and store.has(1)
-    solve_table(path, resumed, built, Method(), executor=again, store=store)
+    solve_table(path, resumed, built, ContactMethod(), executor=again, block_store=store)
     assert resumed.read_bytes() == alone.read_bytes() and again.count == 3

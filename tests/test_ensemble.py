@@ -46,7 +46,7 @@ def scene(folder, seed=3, path=0, effects=None, **changes):
 
 
 def job(folder, **changes):
-    return noise_paths(scene(folder, **changes), TIMES, threshold=2e-4)
+    return noise_paths(scene(folder, **changes), TIMES, drift_off_pitch=2e-4)
 
 
 @pytest.fixture(scope="module")
@@ -338,7 +338,7 @@ def test_engines_repeat_the_paths(folder, interpolation):
     """The same tableau on the same samples: rounding apart, and MuJoCo to the bit for 1 and 2 threads."""
     own = scene(folder, interpolation=interpolation)
     reference = run_paths(noise_paths(own, TIMES), 3)
-    one, two = (run_paths(mujoco_threads(own, TIMES, threads=threads), 3) for threads in (1, 2))
+    one, two = (run_paths(mujoco_threads(own, TIMES, thread_count=threads), 3) for threads in (1, 2))
     assert same(one, two)
     assert largest_difference(reference, one, TIMES) < 1e-12
     assert largest_difference(reference, run_paths(noise_paths(own, TIMES, engine="exudyn"), 2), TIMES) < 1e-12
@@ -356,7 +356,7 @@ def test_what_cannot_be_an_ensemble_is_refused(folder):
         (lambda: noise_paths(silent, TIMES), "force_noise"),
         (lambda: noise_paths(own, np.array([0.6])), "times"),
         (lambda: noise_paths(own, np.array([0.2505])), "times"),
-        (lambda: noise_paths(own, TIMES, truth=np.zeros(3)), "truth"),
+        (lambda: noise_paths(own, TIMES, true_states=np.zeros(3)), "truth"),
         (lambda: noise_paths(own.model_copy(update={"engines": {"reference": _adaptive()}}), TIMES), "DOP853"),
     ):
         with pytest.raises(InputError, match=place):

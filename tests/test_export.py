@@ -22,7 +22,7 @@ from models.engines.spatial_mujoco import SpatialMujoco
 from models.multibody.cut_table import HubInputs
 from models.systems.braking.of_scene import sprung_of
 from models.systems.braking.scene import build as braking
-from models.systems.handling.run import driven_by
+from models.systems.handling.run import driven_model
 from models.systems.hub_forces.export import export_cut_vehicle
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.ride.of_scene import vehicle_of
@@ -181,9 +181,9 @@ def car_on_springs(system):
     """What an engine builds of a steered, or of a braked vehicle, and the scene."""
     if system == "handling":
         scene = load_scene("handling", None)
-        return driven_by(scene.handling(next(iter(scene.manoeuvres)))), scene
+        return driven_model(scene.handling(next(iter(scene.manoeuvres)))), scene
     scene = braking_scene()
-    return driven_by(sprung_of(scene).handling), scene
+    return driven_model(sprung_of(scene).handling), scene
 
 
 @pytest.mark.parametrize("system", ["handling", "braking"])

@@ -17,9 +17,9 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.tangent import (
     TangentPath,
-    covariance,
-    path_of,
+    covariance_over_time,
     slow_swing_frequency,
+    tangent_path_of,
     tilt_error_columns,
 )
 from models.systems.pitch_plane.trust import (
@@ -57,7 +57,7 @@ def test_tangent_is_the_difference_of_two_runs(folder, mode, parameters):
     scene = force_scene(folder, parameters, 1e-3, 2.0, effects={"wheel_forces": forces})
     assembly = replace(assembly_of_scene(scene), mode=mode)
     small = 1e-6 * np.array([1.0, -2.0, 0.5, 1.0, 3.0, -1.0, 0.2, 1.0])
-    _, columns = path_of(assembly).propagate_errors(small[None] / 1e-6)
+    _, columns = tangent_path_of(assembly).propagate_errors(small[None] / 1e-6)
     moved = [states(replace(assembly, initial=assembly.initial + sign * small)) for sign in (1, -1)]
     # central difference of 1e-6: second-order error 1e-12, rounding 1e-10 of it
     assert np.abs((moved[0] - moved[1]) / 2e-6 - columns[:, 0]).max() < 1e-5 * np.abs(columns).max()
@@ -67,11 +67,11 @@ def test_tangent_of_a_wrong_model_and_of_wrong_forces(folder):
     assembly = assembly_of_scene(force_scene(folder, duration=2.0, step=1e-3))
     p = assembly.parameters
     other = p.model_copy(update={"I": p.I * 1.0001, "k3": p.k3 * 0.9999})
-    _, columns = path_of(assembly).propagate_errors(np.zeros((1, 8)), wrong_parameters=other)
+    _, columns = tangent_path_of(assembly).propagate_errors(np.zeros((1, 8)), wrong_parameters=other)
     found = states(replace(assembly, parameters=other)) - states(assembly)
     assert np.abs(found - columns[:, 0]).max() < 1e-3 * np.abs(found).max()  # second order in 1e-4
     pushes = np.full((3 * 2000, 1, 2), [[0.01, -0.02]])
-    _, columns = path_of(assembly).propagate_errors(np.zeros((1, 8)), pushes)
+    _, columns = tangent_path_of(assembly).propagate_errors(np.zeros((1, 8)), pushes)
     wrong = assembly.input.values + np.array([0.01, -0.02])
     found = states(replace(assembly, input=replace(assembly.input, values=wrong)))
     assert np.abs(found - states(assembly) - columns[:, 0]).max() < 1e-3 * np.abs(columns).max()
@@ -81,10 +81,10 @@ def test_linear_geometry_and_body_forces_do_not_grow(folder):
     scene = force_scene(folder, duration=6.0, step=1e-3)
     assembly = assembly_of_scene(scene)
     linear = replace(assembly, vehicle=replace(assembly.vehicle, geometry="linear"))
-    _, columns = path_of(linear).propagate_errors(tilt_error_columns(linear))
+    _, columns = tangent_path_of(linear).propagate_errors(tilt_error_columns(linear))
     assert columns[-1, 0, 3] == pytest.approx(1.0, abs=1e-9) and columns[-1, 1, 3] == pytest.approx(6.0, rel=1e-6)
     body = replace(assembly, mode="force-body")
-    assert slow_swing_frequency(path_of(body)) > 0 and slow_swing_frequency(path_of(assembly)) == 0
+    assert slow_swing_frequency(tangent_path_of(body)) > 0 and slow_swing_frequency(tangent_path_of(assembly)) == 0
     assert (
         pitch_error_growth(linear).rate == pitch_error_growth(body).rate == 0
         and 0.3 < pitch_error_growth(assembly).rate < 0.5
@@ -123,8 +123,8 @@ def test_covariance_is_that_of_the_samples(folder, rule, step):
     """Linearised, every path is a sum over its samples, so the variance is the sum of their squares: no chance."""
     scene = force_scene(folder / "slow", duration=1.0, step=step, interpolation=rule)
     assembly = assembly_of_scene(scene)
-    expected = covariance(assembly, 20.0, step).matrices[-1]
-    path = path_of(assembly, step)
+    expected = covariance_over_time(assembly, 20.0, step).matrices[-1]
+    path = tangent_path_of(assembly, step)
     responses = []
     for sample in range(path.samples + 1):
         for wheel in range(2):
@@ -140,14 +140,14 @@ def test_covariance_is_that_of_the_samples(folder, rule, step):
 
 def test_covariance_refuses_a_spline(folder):
     with pytest.raises(ValueError, match="spline"):
-        covariance(assembly_of_scene(force_scene(folder, duration=1.0, interpolation="smooth")), 1.0)
+        covariance_over_time(assembly_of_scene(force_scene(folder, duration=1.0, interpolation="smooth")), 1.0)
 
 
 def test_held_run_has_no_path(folder):
     assembly = assembly_of_scene(force_scene(folder, duration=1.0))
     held = pitch_spring.extend(assembly, pitch_spring.Parameters(stiffness=100.0))
     with pytest.raises(ValueError, match="held"):
-        path_of(held)
+        tangent_path_of(held)
     assert predict_trust(held) is None and trust_line(held) == []
 
 
@@ -192,7 +192,7 @@ def test_monte_carlo_agrees_with_the_covariance(folder):
         for i in range(60)
     ]
     found = np.sqrt(np.mean([(path[-1] - quiet) ** 2 for path in off], axis=0))
-    expected = np.sqrt(np.diag(covariance(assembly, 30.0).matrices[-1]))
+    expected = np.sqrt(np.diag(covariance_over_time(assembly, 30.0).matrices[-1]))
     assert found[3] / expected[3] == pytest.approx(1.0, abs=0.27)
     assert found[2] / expected[2] == pytest.approx(1.0, abs=0.27)
 

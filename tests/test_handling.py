@@ -11,7 +11,7 @@ from models.core.errors import InputError, RunFailed
 from models.multibody import forces
 from models.multibody.numbers import Controls, Handling, Push, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import Drive, drive_run
+from models.systems.handling.run import SimulatedDrive, drive_run
 from models.systems.handling.scene import build
 from models.tyre.bristles import FADING_SPEED, brush_forces
 from models.vehicles.free_vehicle import SWAY, free_vehicle
@@ -158,14 +158,14 @@ def test_engines_agree_where_all_wheels_slide_and_lift() -> None:
 
 
 @pytest.fixture(scope="module")
-def braked_turn() -> Drive:
+def braked_turn() -> SimulatedDrive:
     """800 N m of braking, 7 parts of 10 in front, while the car begins to turn left, 0.2 s."""
     controls = Controls(steer=((0.0, 0.0), (0.1, 0.03)), brake=((0.0, 0.0), (0.1, 800.0)), front_brake=0.7)
     return drive_run("mujoco", Handling(R19, Tyres(cells=5), controls), 20.0, 0.2)
 
 
 @pytest.mark.grounds("closed form")
-def test_brakes_of_each_axle_have_their_share(braked_turn: Drive) -> None:
+def test_brakes_of_each_axle_have_their_share(braked_turn: SimulatedDrive) -> None:
     """At spins of 60 rad/s the torque is whole: tanh(60) is 1 to rounding."""
     front = np.array([at.name.startswith("f") for at in braked_turn.handling.vehicle.tyres])
     torque = braked_turn.tyres[-1, :, forces.SPIN_TORQUE]
@@ -173,7 +173,7 @@ def test_brakes_of_each_axle_have_their_share(braked_turn: Drive) -> None:
 
 
 @pytest.mark.grounds("closed form")
-def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn: Drive) -> None:
+def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn: SimulatedDrive) -> None:
     """Twice the difference of its path in the axes of the road, turned to the left: 1 ms of a manoeuvre of 0.1 s."""
     x, y, yaw = braked_turn.path.T
     place = next(body for body in R19.bodies if body.name == "body").position

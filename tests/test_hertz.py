@@ -8,7 +8,7 @@ from models.contact.material import STEEL, Material, MaterialPair
 from models.contact.simplified_theory import roll
 from models.core.errors import InputError
 from models.core.strict import read
-from models.systems.contact.run import interpenetrating
+from models.systems.contact.run import interpenetration_contact
 from validation.cases.contact_hertz import exact_contact, measure
 
 PAIR = MaterialPair()
@@ -144,7 +144,9 @@ def test_unlike_pairs_are_refused_only_where_they_rub():
     assert near.quasi_identity_error(0.3) == MaterialPair(near.rail, near.wheel).quasi_identity_error(0.3)
     with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
         unlike.require_likeness()
-    pressed = interpenetrating(by_load(1.0, 1.0, 1e4, unlike), unlike)  # the simplified theory, too, leaves K out
+    pressed = interpenetration_contact(
+        by_load(1.0, 1.0, 1e4, unlike), unlike
+    )  # the simplified theory, too, leaves K out
     with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
         roll(pressed, 0.3, 1e-3, 0.0, 0.0)
 

@@ -11,11 +11,17 @@ from models.core.result import load
 from models.engines.cut_vehicle import build
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.comparison import compare
-from models.systems.hub_forces.measurement import Angles, HubForces, recorded_measurement, true_run, two_tracks
+from models.systems.hub_forces.comparison import compare_stabilisers
+from models.systems.hub_forces.measurement import (
+    HubForces,
+    MeasuredAngles,
+    recorded_measurement,
+    road_under_wheels,
+    true_run,
+)
 from models.systems.hub_forces.run import inputs_with_angles, run
 from models.systems.hub_forces.scene import build as scene_of
-from models.systems.hub_forces.tilt_filter import Deviations, estimate, inputs_with_moments
+from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt, inputs_with_moments
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid_vehicle
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save
@@ -60,7 +66,7 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
 @pytest.fixture(scope="module")
 def measured():
     car, step = r19(), 2e-3
-    hub_inputs = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
+    hub_inputs = road_under_wheels(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
     true = true_run("mujoco", car, hub_inputs, "hub", step, 1.0)
     return car, true, *recorded_measurement(true, "hub", 1)
 
@@ -81,8 +87,8 @@ def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
 
 def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     car, true, forces, angles = measured
-    deviations = Deviations(np.tile([8.0] * 3 + [1.0] * 3, 4), (1.75e-3, 5e-3), 1.0)
-    tilt = estimate(car, forces, angles.with_noise((1.75e-3, 5e-3), 3), deviations)
+    deviations = StatedDeviations(np.tile([8.0] * 3 + [1.0] * 3, 4), (1.75e-3, 5e-3), 1.0)
+    tilt = estimate_tilt(car, forces, angles.with_noise((1.75e-3, 5e-3), 3), deviations)
     assert np.abs(tilt.states[50:, :2] - angles.samples[50:, :2]).max() < 3e-3
     shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
     free, drawn = (
@@ -95,7 +101,7 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     off = [np.abs(run.states[-1, ROLL] - true.states[-1, ROLL]) for run in (free, drawn)]
     assert off[0] > 0.3 and off[1] < 0.02
     with pytest.raises(InputError, match="contradicts the hub forces"):
-        estimate(car, replace(forces, samples=-forces.samples), angles, deviations)
+        estimate_tilt(car, replace(forces, samples=-forces.samples), angles, deviations)
 
 
 @pytest.mark.grounds("closed form")
@@ -117,7 +123,7 @@ def test_noise_is_the_same_in_any_frame_and_differs_from_path_to_path():
     assert one.std() == pytest.approx(3.0, rel=0.006)  # 120,000 samples: 0.2 %
     assert abs(np.mean(one * two)) < 0.1
     # 200,000 samples of each kind: 0.16 %
-    angles = Angles(np.zeros((100_000, 4)), 1e-3).with_noise((1.0, 10.0), 7).samples
+    angles = MeasuredAngles(np.zeros((100_000, 4)), 1e-3).with_noise((1.0, 10.0), 7).samples
     assert [angles[:, :2].std(), angles[:, 2:].std()] == pytest.approx([1.0, 10.0], rel=0.005)
 
 
@@ -170,11 +176,11 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
 
 def test_a_file_of_ones_own(tmp_path, measured):
     scene = scene_of({**ALL, "run": {"duration": 0.5}}, "s.toml")
-    comparison = compare(scene, ("mujoco",))
+    comparison = compare_stabilisers(scene, ("mujoco",))
     save(comparison, tmp_path)
     own = {**ALL, "run": {"duration": 0.5}, "forces": {"file": "hub_forces.csv"}, "angles": {"file": "angles.csv"}}
     del own["road"]
-    again = compare(scene_of(own, "s.toml", tmp_path), ("mujoco",))
+    again = compare_stabilisers(scene_of(own, "s.toml", tmp_path), ("mujoco",))
     assert np.array_equal(again.runs["filter"].detail.states, comparison.runs["filter"].detail.states)
     saved = load(tmp_path / "runs.nc")
     assert list(saved.data["run"].values) == ["true", *comparison.runs] and saved.data.attrs["system"] == "hub-forces"

@@ -101,7 +101,7 @@ def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
     def missing(*given):
         raise AssertionError("was made")
 
-    monkeypatch.setattr("models.systems.hub_forces.tilt_filter.estimate", missing)
+    monkeypatch.setattr("models.systems.hub_forces.tilt_filter.estimate_tilt", missing)
     monkeypatch.setattr("models.systems.hub_forces.run.inputs_with_smoothed_angles", missing)
     measurement = measure(scene(), "mujoco")
     assert measurement.hub_inputs("none", 1e-3, 100).guide is None

@@ -13,14 +13,14 @@ from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane import pitch_filter
 from models.systems.pitch_plane.pitch_filter import (
+    FILTERED_STATES,
     INERTIA_SHARE,
-    KEPT_STATES,
     PITCH,
     PITCH_RATE,
     RELATIVE_STATES,
-    Measurement,
+    PitchMeasurement,
     PitchStep,
-    estimate,
+    estimate_pitch,
 )
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
@@ -76,7 +76,7 @@ def angles(folder):
 def matrices(assembly):
     p, pushes = assembly.parameters, np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, KEPT_STATES], RELATIVE_STATES @ pushes
+    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, FILTERED_STATES], RELATIVE_STATES @ pushes
 
 
 @pytest.mark.parametrize("interpolation", ["held", "linear"])
@@ -117,7 +117,7 @@ def test_without_measurement_the_covariance_is_that_of_all_force_samples(folder,
     """Linear vehicle: each sample's response at the end, from the reference itself, squared and summed."""
     monkeypatch.setattr(pitch_filter, "KNOWN_DEVIATION", 0.0)
     own = assembly_of_scene(scene(folder, duration=0.05, geometry="linear"))
-    found = estimate(own, Measurement(np.full((11, 1), np.nan), PERIOD, (PITCH,), (ANGLE,)), 16.0)
+    found = estimate_pitch(own, PitchMeasurement(np.full((11, 1), np.nan), PERIOD, (PITCH,), (ANGLE,)), 16.0)
     base, total = own.input.values, np.zeros((6, 6))
     settings = Settings("RK4", 1e-3, 0.05)
     at_rest = build("reference", own, settings).run().states[-1]
@@ -136,7 +136,7 @@ def test_without_measurement_the_covariance_is_that_of_all_force_samples(folder,
 def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     """Linear vehicle, held forces: the joint Gaussian of all states, conditioned on all measurements at once."""
     n, own = 12, assembly_of_scene(scene(folder, duration=0.06, geometry="linear", interpolation="held"))
-    measured = Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,))
+    measured = PitchMeasurement(angles(folder), PERIOD, (PITCH,), (ANGLE,))
     step = PitchStep(own, PERIOD, n)
     mean, start = pitch_filter._initial_state_and_covariance(own, 0.05, 0.0)
     means, roots = [mean], [np.linalg.cholesky(start)]
@@ -151,22 +151,24 @@ def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     gain = np.einsum("nij,mj->nim", wide, see) @ np.linalg.inv(see @ see.T + ANGLE**2 * np.eye(n + 1))
     wanted = np.array(means) + gain @ (measured.values[: n + 1, 0] - np.array(means)[:, PITCH])
     left = np.einsum("nij,nkj->nik", wide, wide) - np.einsum("nim,nkm->nik", gain, np.einsum("nij,mj->nim", wide, see))
-    found = estimate(own, measured, 16.0, start_deviation=0.05, smoother=True)
+    found = estimate_pitch(own, measured, 16.0, start_deviation=0.05, with_smoother=True)
     size = np.sqrt(np.einsum("nii->ni", left))[:, :6]
     assert np.abs((found.states - wanted)[:, :6] / size).max() < 1e-3  # of a deviation; the start's 1e-6 costs digits
     spread = np.sqrt(np.einsum("nii->ni", found.covariances))[:, :6]
     np.testing.assert_allclose(spread, size, rtol=1e-3)
-    filtered = estimate(own, measured, 16.0, start_deviation=0.05)
+    filtered = estimate_pitch(own, measured, 16.0, start_deviation=0.05)
     assert np.all(spread[:, PITCH] <= np.sqrt(filtered.covariances[:, PITCH, PITCH]) * (1 + 1e-6))
 
 
 def test_a_wrong_inertia_is_learnt(folder):
     right = assembly_of_scene(scene(folder)).parameters.I
     wrong = assembly_of_scene(scene(folder, I=0.95 * right))
-    found = estimate(wrong, Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0, inertia_deviation=0.05)
+    found = estimate_pitch(
+        wrong, PitchMeasurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0, inertia_deviation=0.05
+    )
     share, sure = found.states[-1, INERTIA_SHARE], np.sqrt(found.error_covariances()[-1, INERTIA_SHARE, INERTIA_SHARE])
     assert sure < 0.01 and abs(share + 0.05) < 4 * sure  # 1/I of the model is 1/0.95 of the true one
-    trusted = estimate(wrong, Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0)
+    trusted = estimate_pitch(wrong, PitchMeasurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0)
     assert abs(trusted.states[-1, INERTIA_SHARE]) < 1e-6
 
 
@@ -219,7 +221,7 @@ def test_angle_and_rate_together_are_surer_than_either(folder):
     for columns in ((PITCH,), (PITCH_RATE,), (PITCH, PITCH_RATE)):
         chosen = [0 if column == PITCH else 1 for column in columns]
         deviations = tuple((ANGLE, 0.05)[i] for i in chosen)
-        found = estimate(own, Measurement(values[:, chosen], PERIOD, columns, deviations), 16.0)
+        found = estimate_pitch(own, PitchMeasurement(values[:, chosen], PERIOD, columns, deviations), 16.0)
         sure[columns] = np.sqrt(found.error_covariances()[-1, PITCH, PITCH])
         assert abs(found.states[-1, PITCH] - states[-1, 3]) < 5 * sure[columns]
     assert sure[PITCH, PITCH_RATE] < min(sure[PITCH,], sure[PITCH_RATE,])
@@ -227,12 +229,14 @@ def test_angle_and_rate_together_are_surer_than_either(folder):
 
 def test_a_measurement_at_its_own_rate_lies_at_its_own_times(folder):
     states = free(folder)
-    slow = Measurement(states[::4, [3]], 4 * PERIOD, (PITCH,), (ANGLE,))
-    found = estimate(assembly_of_scene(scene(folder)), slow, 16.0)
+    slow = PitchMeasurement(states[::4, [3]], 4 * PERIOD, (PITCH,), (ANGLE,))
+    found = estimate_pitch(assembly_of_scene(scene(folder)), slow, 16.0)
     assert found.used_values.sum() == len(slow.values) and (found.used_values[::4] == 1).all()
     np.testing.assert_allclose(found.states[:, PITCH], states[:, 3], atol=1e-9)  # all data are true
     fine = build("reference", assembly_of_scene(scene(folder)), Settings("RK4", 1e-3, DURATION)).run().states
-    fast = estimate(assembly_of_scene(scene(folder)), Measurement(fine[:, [3]], 1e-3, (PITCH,), (ANGLE,)), 16.0)
+    fast = estimate_pitch(
+        assembly_of_scene(scene(folder)), PitchMeasurement(fine[:, [3]], 1e-3, (PITCH,), (ANGLE,)), 16.0
+    )
     np.testing.assert_allclose(fast.states[:, PITCH], fine[:, 3], atol=1e-9)
 
 
@@ -255,9 +259,9 @@ def test_one_estimate_serves_a_check_and_all_engines(folder, monkeypatch):
 
     def counted(*arguments, **named):
         calls.append(1)
-        return estimate(*arguments, **named)
+        return estimate_pitch(*arguments, **named)
 
-    monkeypatch.setattr(pitch_filter, "estimate", counted)
+    monkeypatch.setattr(pitch_filter, "estimate_pitch", counted)
     for _ in range(3):
         assembly_of_scene(scene(folder, drawn(folder)))
     assembly_of_scene(scene(folder, drawn(folder, force_deviation=17.0)))

@@ -19,7 +19,7 @@ from models.ride.nonlinear_copies import CopiesMarch, copies_in_time
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import statistically_linear
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import true_run, two_tracks
+from models.systems.hub_forces.measurement import road_under_wheels, true_run
 from models.systems.hub_forces.scene import build as build_hubs
 from models.systems.pitch_plane.effects import lift_off
 from models.systems.pitch_plane.run import run as simulate
@@ -282,7 +282,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     own = ride_scene("quarter_car_nonlinear")
     vehicle = vehicle_of(own)
     road = road_path(excitation_of(own, wheels(vehicle)), 20.0, 5e-4)
-    runs = [drive_over_road(engine, vehicle, road, 2.0, seed=2) for engine in ENGINES[1:]]
+    runs = [drive_over_road(engine, vehicle, road, 2.0, road_seed=2) for engine in ENGINES[1:]]
     assert np.abs(runs[0].run.positions - runs[1].run.positions).max() < 1e-12
     load = preloads(vehicle).tyres[vehicle.tyres[0].name]
     force = runs[0].output_values("tyre force front left")
@@ -353,7 +353,7 @@ def hubs(road_class="E", **effects):
 
 def test_hub_forces_of_wheels_in_the_air_are_none_in_every_engine():
     car, roads = hubs(lift_off={}), [iso8608_road("E", seed) for seed in (1, 2)]
-    drive = two_tracks(car, *roads, 20.0, 1e-3, 2000)
+    drive = road_under_wheels(car, *roads, 20.0, 1e-3, 2000)
     runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, 2.0) for engine in ENGINES}
     for engine in ENGINES[1:]:
         assert np.abs(runs[engine].states - runs["reference"].states).max() < 1e-12
@@ -373,7 +373,7 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
 
     car = hubs(lift_off={})
     car = replace(car, uncut=replace(car.uncut, tyres=tuple(replace(t, damping=500.0) for t in car.uncut.tyres)))
-    drive = two_tracks(car, *(iso8608_road("E", seed) for seed in (1, 2)), 20.0, 1e-3, 100)
+    drive = road_under_wheels(car, *(iso8608_road("E", seed) for seed in (1, 2)), 20.0, 1e-3, 100)
     own = hub_model("mujoco", car, replace(drive, frame="inertial"), 1e-3, 0.1)
     model, data = own.model.model, own.model.data
     random = np.random.default_rng(2)

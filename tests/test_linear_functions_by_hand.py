@@ -31,9 +31,9 @@ from models.ride.excited import _range_and_kernel
 from models.ride.sweep import modes_of_matrix, variance_sweep
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, _both_filters, half_track
-from models.systems.bicycle.run import assumptions
+from models.systems.bicycle.run import bicycle_assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels
-from models.systems.ride.watched import Spectral, checked_speeds, static_loads
+from models.systems.ride.watched import SpectralMotion, checked_speeds, static_loads
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import CARRIER
@@ -162,7 +162,7 @@ def test_rounding_of_the_slowest_decay_is_that_of_the_fastest_motion():
 
 
 def test_a_bicycle_is_judged_until_it_leans_by_a_radian():
-    (upright,) = assumptions(None)
+    (upright,) = bicycle_assumptions(None)
     assert {abs(value) for value in vars(upright).values() if isinstance(value, float)} == {1.0}
 
 
@@ -183,7 +183,9 @@ def test_a_few_of_many_speeds_are_evenly_among_them():
 def test_deviations_of_parts_are_those_of_outputs_that_ask_for_the_same():
     """Tyre forces and travels as outputs of the vehicle file."""
     road, speeds = excitation_of(ride_scene(iso8608="C"), WHEELS), [15.0, 25.0]
-    spectral = Spectral(CAR, lambda speed: linearise(CAR, speed), road, speeds, {"load fl": np.array([0.5, 0.75])})
+    spectral = SpectralMotion(
+        CAR, lambda speed: linearise(CAR, speed), road, speeds, {"load fl": np.array([0.5, 0.75])}
+    )
     sweep = variance_sweep(lambda speed: linearise(CAR, speed), {"c": road}, speeds)
     for name, output in (("load fl", "tyre force front left"), ("travel rear right", "travel rear right")):
         assert spectral.motion_of_part(name).deviation == pytest.approx(sweep.of("c", output), rel=1e-9)

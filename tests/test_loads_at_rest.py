@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.multibody.numbers import GRAVITY, Handling
-from models.systems.handling.run import build
+from models.systems.handling.run import build_in_engine
 from models.vehicles.spatial_linear import preloads
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -42,4 +42,4 @@ def test_a_car_that_stands_on_its_preloads_stays_at_rest(engine):
     """A spring's preload that is 1 % off moves its wheel by a good part of 1 % of g times the masses' ratio."""
     car = Handling(LOPSIDED)
     q, v = car.straight(0.0)
-    assert np.abs(build(engine, car).acceleration(0.0, q, v)).max() < 1e-8 * GRAVITY
+    assert np.abs(build_in_engine(engine, car).acceleration(0.0, q, v)).max() < 1e-8 * GRAVITY

@@ -28,9 +28,9 @@ from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal, TransducerPlace
-from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
+from models.systems.hub_forces.tilt_filter import StatedDeviations, TiltFilter
 from models.systems.measured.consequences import CORRECTION_OF_CHECK, Consequence, consequence_texts
-from models.systems.measured.inputs import Inputs
+from models.systems.measured.inputs import RecordingInputs
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import filter_doubts
 from models.systems.measured.virtual import VirtualMeasurement, recording_of_samples
@@ -386,8 +386,8 @@ def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp
 def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_path):
     samples = ridden.samples(Faults(noise=bench.NOISE, bias=bias), bench.SEED)
     own = recording_of_samples(ridden, samples, tmp_path / "a.columns")
-    inputs = Inputs(own, ridden.vehicle)
+    inputs = RecordingInputs(own, ridden.vehicle)
     forces = np.tile(np.repeat([bench.NOISE["force"], bench.NOISE["moment"]], 3), 4)
-    followed = TiltFilter(ridden.vehicle, "hub", own.period, Deviations(forces, (1.75e-3, 5e-3), 10.0))
+    followed = TiltFilter(ridden.vehicle, "hub", own.period, StatedDeviations(forces, (1.75e-3, 5e-3), 10.0))
     followed.advance(inputs.wrenches(0, own.count), inputs.tilt(0, own.count))
     assert [named in text for text in followed.objections()] == [True] * bool(bias)

@@ -19,7 +19,7 @@ from models.systems.measured.consequences import (
     consequences,
     verdict_with_consequences,
 )
-from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun, run
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRunSettings, run
 from models.systems.measured.sections import Sections
 from models.systems.measured.virtual import VirtualMeasurement, recording_of_samples
 from validation.measured import planted as bench
@@ -35,7 +35,7 @@ def ridden() -> VirtualMeasurement:
 
 def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> SectionOutcome:
     """The run with the filter."""
-    return run(SectionRun(ridden.vehicle, own, Sections(ridden.vehicle), hold=AttitudeHold()), folder / "run")
+    return run(SectionRunSettings(ridden.vehicle, own, Sections(ridden.vehicle), hold=AttitudeHold()), folder / "run")
 
 
 def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path) -> tuple[Consequence, float, float]:

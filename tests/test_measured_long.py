@@ -16,12 +16,12 @@ from models.fatigue.damage import turning_points
 from models.fatigue.rainflow_cycles import rainflow_cycles
 from models.measured.columns import Columns
 from models.measured.recording import Recording
-from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
-from models.systems.measured.hand_on import hand_on
-from models.systems.measured.inputs import Inputs, StepGrid
-from models.systems.measured.section_run import AttitudeHold, Checkpoint, SectionRun, run
+from models.systems.hub_forces.tilt_filter import StatedDeviations, TiltFilter
+from models.systems.measured.hand_on import write_section_forces
+from models.systems.measured.inputs import RecordingInputs, StepGrid
+from models.systems.measured.section_run import AttitudeHold, Checkpoint, SectionRunSettings, run
 from models.systems.measured.sections import AccelerometerPoint, Sections, accelerometer_points
-from models.systems.measured.verdict import channels_to_compare, compare
+from models.systems.measured.verdict import channels_to_compare, compare_channel
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
 from validation.measured.long_recording import (
@@ -49,7 +49,7 @@ def whole(tmp_path_factory):
     return own, run(own, folder / "run"), computed_channel_bytes(folder)
 
 
-def changed(own: SectionRun, folder, change) -> SectionRun:
+def changed(own: SectionRunSettings, folder, change) -> SectionRunSettings:
     """The run of a recording whose samples (n, signals) are changed."""
     values = own.recording.columns.block(own.recording.columns.names, 0, own.recording.count)
     columns = Columns(folder / "changed.f64", own.recording.columns.names, own.recording.count)
@@ -89,9 +89,9 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
         patch.setattr(Checkpoint, "save", saved)
         patch.setattr(Columns, "write", written)
         with pytest.raises(Killed):
-            run(own, tmp_path / "run", block=0.04)
+            run(own, tmp_path / "run", block_duration=0.04)
     told = list[float]()
-    found = run(own, tmp_path / "run", lambda done, of: told.append(done), block=0.05)
+    found = run(own, tmp_path / "run", lambda done, of: told.append(done), block_duration=0.05)
     assert computed_channel_bytes(tmp_path) == bits and found.done == own.count
     assert told[0] > 0.0 or time == 1  # it did not begin anew
     assert told[-1] == pytest.approx(SECONDS, abs=2e-3)
@@ -131,7 +131,7 @@ def test_a_vehicle_that_topples_ends_with_the_time_and_what_there_was(whole, tmp
         return values
 
     with pytest.raises(RunFailed, match=r"topples|infinite|gave up") as error:
-        run(replace(changed(own, tmp_path, pushed), hold=AttitudeHold("none")), tmp_path / "run", block=0.03)
+        run(replace(changed(own, tmp_path, pushed), hold=AttitudeHold("none")), tmp_path / "run", block_duration=0.03)
     assert error.value.time is not None and 0.097 <= error.value.time <= SECONDS  # the cubic begins a sample earlier
     assert 98 <= error.value.partial.done <= 201
     assert np.isfinite(error.value.partial.samples(error.value.partial.answers[0])).all()
@@ -153,11 +153,13 @@ def test_short_gaps_of_forces_are_bridged_and_told_and_long_ones_refused(whole, 
         run(gap(own, tmp_path, "fl_fz", 20, 170), tmp_path / "run")
     (tmp_path / "changed.json").unlink()
     other = gap(own, tmp_path, "rr_fz", 70, 110)  # across the blocks' border at 0.09 s
-    outcome = run(other, tmp_path / "run", block=0.03)
+    outcome = run(other, tmp_path / "run", block_duration=0.03)
     assert [(one.place, one.weight, one.size) for one in outcome.findings] == [("rr_fz", "doubt", pytest.approx(0.04))]
-    column = Inputs(other.recording, own.vehicle).wrenches(0, 201)[:, 20]
+    column = RecordingInputs(other.recording, own.vehicle).wrenches(0, 201)[:, 20]
     assert np.isfinite(column).all() and np.ptp(column[70:110]) <= 2 * np.ptp(column)
-    parts = np.concatenate([Inputs(other.recording, own.vehicle).wrenches(i, 30)[:, 20] for i in range(0, 201, 30)])
+    parts = np.concatenate(
+        [RecordingInputs(other.recording, own.vehicle).wrenches(i, 30)[:, 20] for i in range(0, 201, 30)]
+    )
     assert np.array_equal(parts, column)
 
 
@@ -173,7 +175,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
     signals, true = repeated_pattern(case.PATTERN_SECONDS)
     names = [signal.name for signal in signals]
     angles = true[:, [names.index("roll"), names.index("pitch")]]
-    made = np.cumsum(Inputs(own.recording, own.vehicle).tilt(0, 201)[:, 2:], axis=0)
+    made = np.cumsum(RecordingInputs(own.recording, own.vehicle).tilt(0, 201)[:, 2:], axis=0)
     assert own.recording.find("angular rate", component="roll")[0].frame == "body"
     assert np.abs(made[-1] * 1e-3 - (angles[200] - angles[0])).max() < 5e-4  # noise of 5e-3 rad/s, 200 samples: 7e-5
 
@@ -181,7 +183,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
 def test_the_filter_is_filterpys_and_leaves_gaps_to_the_prediction():
     car, rng, dt = r19(), np.random.default_rng(2), 1e-3
     wrenches, angles = rng.normal(0, 20, (300, 24)), rng.normal(0, 1e-3, (300, 4))
-    own = TiltFilter(car, "hub", dt, Deviations(np.full(24, 8.0), (1e-3, 1e-3), 1.0))
+    own = TiltFilter(car, "hub", dt, StatedDeviations(np.full(24, 8.0), (1e-3, 1e-3), 1.0))
     kalman = KalmanFilter(dim_x=4, dim_z=4, dim_u=2)
     kalman.F, kalman.H, kalman.Q = np.eye(4) + dt * np.eye(4, k=2), np.eye(4), own.noise.process
     kalman.R = 1e-6 * np.eye(4)
@@ -218,7 +220,7 @@ def test_a_check_channel_with_a_wrong_gain_shows_it(whole):
     values = own.recording.columns.block(names, 0, own.recording.count)
     values[:, names.index(signal.name)] = true / 1.1
     columns.write(0, values)
-    found = compare(Recording(own.recording.signals, columns, own.recording.period), outcome, signal, answer)
+    found = compare_channel(Recording(own.recording.signals, columns, own.recording.period), outcome, signal, answer)
     assert found.damage == pytest.approx({slope: 1.1**slope for slope in (3.0, 5.0, 8.0)})
     assert [band.error / band.measured for band in found.bands] == pytest.approx([0.1] * len(found.bands))
     assert found.explained_variance == pytest.approx(0.99) and found.trusted_time == np.inf
@@ -233,9 +235,9 @@ def test_sections_are_named_and_their_files_are_not_overwritten(whole, tmp_path)
         Sections(own.vehicle, wanted=("frontleft",))
     kept = Sections(own.vehicle, wanted=("front left", "fl guide")).answers
     assert {answer.section for answer in kept} == {"", "front left", "fl guide"}
-    hand_on(outcome, tmp_path, ["csv"], outcome.answers[:2])
+    write_section_forces(outcome, tmp_path, ["csv"], outcome.answers[:2])
     with pytest.raises(InputError, match="exists"):
-        hand_on(outcome, tmp_path, ["csv"], outcome.answers[:2])
+        write_section_forces(outcome, tmp_path, ["csv"], outcome.answers[:2])
 
 
 def test_accelerometers_feel_gravity_and_motion(whole):

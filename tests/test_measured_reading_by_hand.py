@@ -19,12 +19,12 @@ from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
 from models.measured.timing import sample_timing
 from models.measured.units import factor_to_si
-from models.systems.measured.channel_map import find, mapped_signals
+from models.systems.measured.channel_map import find_channel, mapped_signals
 from models.systems.measured.clock import ClockGrid, ClockGroup, _clock_finding, _clock_grid, file_shifts
-from models.systems.measured.holds import noise_of, stabilisers_of_runs
+from models.systems.measured.holds import noise_deviations, stabilisers_of_runs
 from models.systems.measured.plan import opened_files, signals_of_files
 from models.systems.measured.run import read_files
-from models.systems.measured.scene import Deviations, build
+from models.systems.measured.scene import NoiseTable, build
 
 pytestmark = pytest.mark.grounds("closed form")
 PERIOD = 2e-3
@@ -168,7 +168,7 @@ SOURCE = SimpleNamespace(path=Path("a.csv"), channels=(CHANNEL, Channel("fr", "k
 
 
 def test_a_channel_is_found_as_its_file_has_it():
-    assert find(SOURCE, "fl", "s.toml", "files") == CHANNEL
+    assert find_channel(SOURCE, "fl", "s.toml", "files") == CHANNEL
 
 
 def test_signals_of_the_map_have_the_zero_of_the_scene_and_the_factor_of_the_unit(tmp_path):
@@ -196,7 +196,7 @@ def group_of(timing, *signals):
 def test_a_clock_s_times_and_values_in_si_units():
     assert ClockGrid(2.5, 0.25, 4).times.tolist() == [2.5, 2.75, 3.0, 3.25]
     group = group_of(timing_of(), signal_of(sign=-1, factor=1e3, zero=0.25), signal_of("fr", factor=0.5, zero=-1.0))
-    assert group.si(np.array([[0.75, 2.0], [0.25, -1.0]])).tolist() == [[-500.0, 1.5], [0.0, 0.0]]
+    assert group.values_in_si(np.array([[0.75, 2.0], [0.25, -1.0]])).tolist() == [[-500.0, 1.5], [0.0, 0.0]]
 
 
 def test_the_clock_is_that_of_the_forces_from_the_moment_that_the_scene_names(tmp_path):
@@ -262,7 +262,7 @@ def test_deviations_of_a_hold_are_stated_or_estimated_or_at_least_those_of_trans
     rate = signal_of("pitch", "angular rate", "body", "pitch")
     recording = recording_of({signal_of(): 1e6 * impulse, rate: 1e-3 * impulse})
     expected = {"force": pytest.approx(estimated, rel=1e-6), "moment": 2.5, "angle": 1.75e-3, "rate": 5e-3}
-    assert noise_of(Deviations(moment=2.5), recording) == expected
+    assert noise_deviations(NoiseTable(moment=2.5), recording) == expected
     stabilise = {"method": "kalman", "bandwidth": 0.75, "model": 12.5, "smoothing": 6.5}
     stated = {"force": 12.5, "moment": 2.5, "angle": 0.25, "rate": 0.5}
     file = {"file": "a.csv", "channels": [mapped("fl", "fl")]}

@@ -20,10 +20,10 @@ from models.measured.signal import Signal, TransducerPlace
 from models.multibody.cut_table import joints
 from models.systems.hub_forces.measurement import element_travels
 from models.systems.measured.hand_on import labelled_result
-from models.systems.measured.inputs import Inputs, StepGrid
+from models.systems.measured.inputs import RecordingInputs, StepGrid
 from models.systems.measured.run import _record_seconds, run
 from models.systems.measured.scene import build
-from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRunSettings
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import (
     AccelerometerPoint,
@@ -37,7 +37,7 @@ from models.systems.measured.virtual import (
     _chassis_motion,
     body_rates,
     channel_group,
-    check,
+    checked_signals,
     virtual_measurement,
 )
 from validation.spatial.cars import r19
@@ -109,7 +109,9 @@ def standing(count=120, **angles):
 
 def test_a_run_is_held_to_the_angles_that_were_measured(tmp_path):
     """A low-pass leaves constants as they are."""
-    job = SectionRun(CAR, standing(roll=0.02, pitch=-0.01), Sections(CAR), "reference", AttitudeHold("prescribed"))
+    job = SectionRunSettings(
+        CAR, standing(roll=0.02, pitch=-0.01), Sections(CAR), "reference", AttitudeHold("prescribed")
+    )
     outcome = march(job, tmp_path)
     assert (job.grid.step, job.grid.period, outcome.period, outcome.done) == (PERIOD, PERIOD, PERIOD, 120)
     assert outcome.samples("body roll") == pytest.approx(np.full(120, 0.02), rel=1e-9)
@@ -129,7 +131,7 @@ def test_gyros_become_rates_of_angles_and_rates_of_angles_what_gyros_read():
     gyros = turned_rates(0.2, -0.3, rates)
     assert body_rates(np.array([[0.2, -0.3]]), rates[None])[0] == pytest.approx(gyros, rel=1e-8)
     named = dict(zip(("roll_rate", "pitch_rate", "yaw_rate"), gyros.tolist(), strict=True))
-    inputs = Inputs(standing(roll=0.2, pitch=-0.3, **named), CAR)
+    inputs = RecordingInputs(standing(roll=0.2, pitch=-0.3, **named), CAR)
     assert inputs.tilt(5, 2) == pytest.approx(np.tile([0.2, -0.3, *rates[:2]], (2, 1)), rel=1e-8)
     assert {signal.factor for signal in inputs.used_signals} == {1.5} and len(inputs.used_signals) == 9
     expected = np.zeros((2, 6 * len(LOADS)))
@@ -235,7 +237,7 @@ def test_accelerometers_on_a_table_that_turns_and_speeds_up_feel_both_and_gravit
 
 def test_channels_of_a_virtual_measurement_have_the_units_of_a_test_track():
     degree = np.pi / 180.0
-    factors = {signal.name: signal.factor for signal in check(CAR, read(VirtualTable, VIRTUAL, ""))}
+    factors = {signal.name: signal.factor for signal in checked_signals(CAR, read(VirtualTable, VIRTUAL, ""))}
     named = {"fl_fz": 1e3, "rr_mx": 1.0, "roll": degree, "yaw_rate": degree, "dash_az": 1.0}
     assert {name: factors[name] for name in named} == named
     assert (factors["left seat_force"], factors["front left_travel"]) == (1e3, 1e-3)

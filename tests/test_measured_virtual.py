@@ -14,15 +14,15 @@ from models.measured.faults_of_measurement import Faults, check_faults, measured
 from models.measured.gaps import filled_samples
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.systems.measured.inputs import Inputs, StepGrid
-from models.systems.measured.pitch_plane import PlaneJob
+from models.systems.measured.inputs import RecordingInputs, StepGrid
+from models.systems.measured.pitch_plane import PlaneRunSettings
 from models.systems.measured.pitch_plane import run as plane_run
 from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold
 from models.systems.measured.sections import SectionChannel
-from models.systems.measured.trust import MeasurementErrors, position, predicted_drift
-from models.systems.measured.verdict import ChannelComparison, FrequencyBand, disagreement, uncertainty
+from models.systems.measured.trust import MeasurementErrors, position_error, predicted_drift
+from models.systems.measured.verdict import ChannelComparison, FrequencyBand, angle_uncertainty, channel_disagreement
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
-from models.systems.measured.virtual import check as check_virtual
+from models.systems.measured.virtual import checked_signals as check_virtual
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.cut_vehicle import CutVehicle, cut, rigid_vehicle
 from models.vehicles.vehicle_file import load_vehicle
@@ -148,7 +148,7 @@ def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, t
     rows = StepGrid(1e-3, 2e-3).cubic_rows(samples, 30)[:, 0]
     fine = np.arange(30) / 4
     assert np.abs(rows - (2.0 - fine + 0.3 * fine**2 - 0.05 * fine**3)).max() < 1e-13
-    inputs = Inputs(recording_of_samples(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
+    inputs = RecordingInputs(recording_of_samples(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
     start, end = inputs.wrenches_with_neighbours(0, 4), inputs.wrenches_with_neighbours(inputs.recording.count - 4, 4)
     assert (inputs.wrenches_with_neighbours(5, 4) == inputs.wrenches(4, 7)).all()
     assert np.allclose(start[0], 2 * start[1] - start[2]) and len(start) == len(end) == 7
@@ -190,7 +190,7 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     )  # cosh has become exp, products are small
     assert hub.passing_time(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
     assert hub.angle > space.angle and space.trusted_time < hub.trusted_time == 8.0
-    off = position(car, MeasurementErrors(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
+    off = position_error(car, MeasurementErrors(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
     assert np.allclose(off, [0.0, 9.81 * 0.01 * 2.0, 0.0])
 
 
@@ -202,8 +202,10 @@ def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehic
     # x'' + 2 z w x' + w^2 x = pushed, by semi-implicit Euler
     c = 2 * PULL_DAMPING * corner * h
     angle = lfilter([h * h], [1.0, corner**2 * h * h + c - 2.0, 1.0 - c], pushed)
-    assert 2 * angle.std() / uncertainty(car, hold, h) == pytest.approx(1.0, abs=0.05)  # some hundred correlation times
-    assert uncertainty(car, replace(hold, method="none"), h) == 0.0
+    assert 2 * angle.std() / angle_uncertainty(car, hold, h) == pytest.approx(
+        1.0, abs=0.05
+    )  # some hundred correlation times
+    assert angle_uncertainty(car, replace(hold, method="none"), h) == 0.0
 
 
 def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
@@ -217,9 +219,9 @@ def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
         {},
         np.inf,
     )
-    assert disagreement(band) == pytest.approx(0.5)  # 5 of 10
-    assert disagreement(band, 3.0) == pytest.approx(np.sqrt(16 / 91))
-    assert disagreement(band, np.nan) == disagreement(band) and disagreement(band, 5.0) == 0.0
+    assert channel_disagreement(band) == pytest.approx(0.5)  # 5 of 10
+    assert channel_disagreement(band, 3.0) == pytest.approx(np.sqrt(16 / 91))
+    assert channel_disagreement(band, np.nan) == channel_disagreement(band) and channel_disagreement(band, 5.0) == 0.0
 
 
 @pytest.fixture(scope="module")
@@ -240,19 +242,19 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, tmp_path: Path) -> None:
-    found = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold(force=10.0)), tmp_path / "run")
+    found = plane_run(PlaneRunSettings(planar, "itwm_drift", hold=AttitudeHold(force=10.0)), tmp_path / "run")
     pitch = found.outcome.columns.read("chassis pitch")
     assert np.abs(pitch - planar.samples(planar.find("angle")[0])).max() < 1e-4
     assert (
         found.verdict.word == "accepted" and found.outcome.normalised_innovation < 1.0
     )  # nothing but the stated noise is missing
-    free = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold("none", force=2000.0)), tmp_path / "free")
+    free = plane_run(PlaneRunSettings(planar, "itwm_drift", hold=AttitudeHold("none", force=2000.0)), tmp_path / "free")
     assert free.verdict.word == "stabilise" and free.trust is not None and free.trust.until is not None
 
 
 def test_a_free_run_on_turning_forces_is_accepted_only_beside_its_pitch(planar: Recording, tmp_path: Path) -> None:
     turning = replace(planar, signals=tuple(replace(s, frame="body") for s in planar.signals))
-    job = PlaneJob(turning, "itwm_drift", hold=AttitudeHold("none", force=10.0))
+    job = PlaneRunSettings(turning, "itwm_drift", hold=AttitudeHold("none", force=10.0))
     assert plane_run(job, tmp_path / "right").verdict.word == "accepted"
     # nothing grows where forces turn with the vehicle, so that its own prediction never ends
     blind = replace(turning, signals=turning.signals[:4])
@@ -270,7 +272,10 @@ def test_another_vehicle_or_a_missing_wheel_is_refused(planar: Recording, tmp_pa
     light = Columns(tmp_path / "light.bin", names, planar.count)
     light.write(0, 0.8 * planar.columns.block(names, 0, planar.count))
     with pytest.raises(InputError, match="too little"):
-        plane_run(PlaneJob(replace(planar, columns=light), "itwm_drift", hold=AttitudeHold("none")), tmp_path / "light")
+        plane_run(
+            PlaneRunSettings(replace(planar, columns=light), "itwm_drift", hold=AttitudeHold("none")),
+            tmp_path / "light",
+        )
     fewer = replace(planar, signals=planar.signals[1:])
     with pytest.raises(InputError, match="both 'front left' and 'front right'"):
-        plane_run(PlaneJob(fewer, "itwm_drift", hold=AttitudeHold("none")), tmp_path / "fewer")
+        plane_run(PlaneRunSettings(fewer, "itwm_drift", hold=AttitudeHold("none")), tmp_path / "fewer")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.multibody.numbers import GRAVITY, Handling, Tyres
-from models.systems.handling.run import build
+from models.systems.handling.run import build_in_engine
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial_linear import preloads
 from models.vehicles.vehicle_file import load_vehicle
@@ -51,6 +51,6 @@ def test_momentum_changes_by_the_forces_on_the_car(car, engine):
     """To the rounding of sums of 20 bodies, and of a brush that slides everywhere."""
     q, v = car.straight(SLIDING[0])
     v[1] = SLIDING[1]
-    rates, acting = momentum_rates(car, build(engine, car).acceleration(0.0, q, v)), forces_on(car)
+    rates, acting = momentum_rates(car, build_in_engine(engine, car).acceleration(0.0, q, v)), forces_on(car)
     assert np.abs(acting[0, :2]).min() > 1000.0
     assert np.abs(rates - acting).max() < 1e-8 * np.abs(acting).max()

@@ -313,7 +313,7 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
         (tmp_path / f"{name}.csv").write_text(head + "".join(rows))
     scene = build_contact(
         {"title": "t", "system": "contact", "cases": {"file": "wet.csv"}, "effects": {"rain": {"share": 0.5}}},
-        folder=tmp_path,
+        scene_folder=tmp_path,
     )
     run_contact(scene, answers=tmp_path / "a.csv")
     solve_table(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)

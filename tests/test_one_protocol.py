@@ -13,7 +13,7 @@ from models.engines.model import Model
 from models.engines.protocol import build as in_plane
 from models.engines.spatial_protocol import INTEGRATORS
 from models.engines.spatial_protocol import build as in_space
-from models.systems.handling.run import build as on_tyres
+from models.systems.handling.run import build_in_engine as on_tyres
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence import bare_cars

@@ -23,7 +23,7 @@ from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.energy import unaccounted_energy
 from models.systems.handling.export import export_handling
-from models.systems.handling.run import REFERENCE, build, drive_run
+from models.systems.handling.run import REFERENCE_ENGINE, build_in_engine, drive_run
 from models.systems.ride.run import run as run_ride
 from models.tyre.magic_formula import table_of_surface
 from models.vehicles.cut_vehicle import cut
@@ -100,7 +100,7 @@ def test_it_drives_a_lane_change_in_both_engines(drives):
 def test_engines_accelerate_it_as_the_plain_equations_do(saloon, drives):
     """These share no force with them; and they notice a lost damper."""
     handling, run = Handling(saloon, controls=LANE_CHANGE), drives["mujoco"].run
-    models = {engine: build(engine, handling) for engine in ("exudyn", "mujoco", REFERENCE)}
+    models = {engine: build_in_engine(engine, handling) for engine in ("exudyn", "mujoco", REFERENCE_ENGINE)}
     for row in (300, 700, 1100):
         state = run.positions[row] + 0.01, run.rates[row] + 0.05
         exudyn, other, plain = (models[engine].acceleration(run.times[row], *state) for engine in models)
@@ -228,7 +228,7 @@ def test_a_car_that_twinrig_exported_is_the_same_car_again(tmp_path):
     ]
     draw, (q, v) = np.random.default_rng(3), before.straight(20.0)
     q, v = q + draw.uniform(-0.02, 0.02, len(q)), v + draw.uniform(-0.2, 0.2, len(v))
-    first, second = (build("mujoco", car) for car in (before, after))
+    first, second = (build_in_engine("mujoco", car) for car in (before, after))
     accelerations = first.acceleration(0.5, q, v)[order]
     apart = second.acceleration(0.5, q[order], v[order]) - accelerations
     assert np.abs(apart).max() < 1e-10 * np.abs(accelerations).max()

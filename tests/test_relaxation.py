@@ -11,7 +11,7 @@ from models.brake.controller import AllApplied
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.relaxation import DAMPING, Lag, lag_on, lagging_slip, longest_step
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad
-from models.systems.braking.procedures import vehicle_and_start
+from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import vehicle_in_engine
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import table_of_surface
@@ -42,7 +42,7 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference")
             "procedures": {"j": {"kind": "j_turn", "speed": 9.0, "steer": steer}},
         }
     )
-    vehicle, start = vehicle_and_start(scene, "j")
+    vehicle, start = vehicle_and_start_state(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))
     return vehicle_in_engine(vehicle, engine).run(AllApplied(4), start, duration)

@@ -317,7 +317,7 @@ def test_two_closed_forms_of_runs_agree(road):
         step = share * march.longest_stable_step
         assert SampledStatistics(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)
     late = replace(march, reduced=replace(march.reduced, excitation=further(march.reduced.excitation)))
-    if scene.ride.road.front_rear == "delayed":
+    if scene.ride_scene.road.front_rear == "delayed":
         assert SampledStatistics(late).deviations(step) != pytest.approx(march.deviations(step), rel=3e-3)
 
 

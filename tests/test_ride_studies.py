@@ -286,8 +286,8 @@ def test_engines_follow_springs_where_they_are_steep(monkeypatch):
         steps.append(path.step)
         raise Ridden
 
-    monkeypatch.setattr(nonlinear, "ride_over", driven)
+    monkeypatch.setattr(nonlinear, "ride_over_heights", driven)
     for vehicle in (own, steep):
         with pytest.raises(Ridden):
-            nonlinear.engine_result(scene, "mujoco", vehicle, nonlinear.Sampling(speed=20.0))
+            nonlinear.engine_result(scene, "mujoco", vehicle, nonlinear.RunSampling(speed=20.0))
     assert steps[0] == pytest.approx(2e-3) and steps[1] * 834.0 == pytest.approx(0.5, rel=0.01)

@@ -15,9 +15,9 @@ from models.road.iso8608 import iso8608_road, random_phases
 from models.road.profile import SineProfile
 from models.road.study import study_road
 from models.systems import run
-from models.systems.hub_forces.measurement import recorded_measurement, two_tracks
+from models.systems.hub_forces.measurement import recorded_measurement, road_under_wheels
 from models.systems.hub_forces.run import measure
-from models.systems.hub_forces.tilt_filter import Deviations, estimate
+from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, SAMPLE_PERIOD, STEP, STEP_COUNT, write
@@ -187,7 +187,7 @@ def test_at_rest_on_the_road_hubs_bear_the_vehicle_and_mounts_what_they_carry(en
     assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
     assert np.abs(measured.angles.samples[0]).max() < 1e-12
     assert measured.forces.period == pytest.approx(1.0 / scene.forces.sampling_rate, rel=1e-12)
-    tracks = two_tracks(CUT, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, STEP, STEP_COUNT)
+    tracks = road_under_wheels(CUT, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, STEP, STEP_COUNT)
     direct = HubModel(engine, CUT, replace(tracks, frame="inertial"), scene.settings(engine), scene.run.forces).run()
     assert measured.truth.states == pytest.approx(direct.states, abs=1e-13)
     result = run(scene, engine, method="none", measurement=measured)
@@ -207,8 +207,8 @@ def test_the_filter_of_a_scene_is_told_the_deviations_of_its_scene_and_forces_th
     measured = measure(scene, "reference")
     first = measured.forces.samples[0].reshape(len(HUBS), 6)
     assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
-    deviations = Deviations(np.tile([8.5] * 3 + [1.5] * 3, 4), (2.5e-3, 4.5e-3), scene.stabilise.model)
-    told = estimate(CUT, measured.forces, measured.angles, deviations)
+    deviations = StatedDeviations(np.tile([8.5] * 3 + [1.5] * 3, 4), (2.5e-3, 4.5e-3), scene.stabilise.model)
+    told = estimate_tilt(CUT, measured.forces, measured.angles, deviations)
     assert measured.tilt.states == pytest.approx(told.states, rel=1e-12, abs=1e-15)
     assert measured.tilt.deviations == pytest.approx(told.deviations, rel=1e-12)
 
@@ -231,7 +231,7 @@ def test_noise_of_hub_forces_and_angles_has_the_deviations_of_its_scene():
 def test_wheels_pass_their_tracks_at_the_speed_one_after_the_other():
     speed, step, steps = 15.0, 2e-3, 40
     tracks = [iso8608_road("C", seed) for seed in (1, 2)]
-    given = two_tracks(CUT, *tracks, speed, step, steps)
+    given = road_under_wheels(CUT, *tracks, speed, step, steps)
     count, front = len(CUT.uncut.tyres), max(tyre.point[0] for tyre in CUT.uncut.tyres)
     assert given.hubs.shape == (2 * steps + 1, 2 * count) and given.speed == speed
     for row in (0, 37, 2 * steps):

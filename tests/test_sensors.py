@@ -9,7 +9,7 @@ from models.core.time_series import read_time_series
 from models.engines.assembly import Settings
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias_path
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.sampling import write
+from models.systems.pitch_plane.sampling import write_samples
 from models.systems.pitch_plane.scene import assembly_of_scene, build
 
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -87,11 +87,11 @@ def test_angle_variance_at_its_limits():
 def test_readings_are_written_as_other_effects_read_them(tmp_path):
     sensor = {"sampling_rate": 100.0, "deviation": 0.01}
     run = simulate(scene({"pitch_sensor": sensor}), "reference")
-    write(run, {"pitch": "pitch_reading"}, 100.0, tmp_path / "pitch.csv")
+    write_samples(run, {"pitch": "pitch_reading"}, 100.0, tmp_path / "pitch.csv")
     values, period = read_time_series(tmp_path / "pitch.csv", {"pitch": {"rad": 1.0}})
     assert period == 0.01 and np.array_equal(values[:, 0], run["pitch_reading"][::20])
     with pytest.raises(InputError, match="do not fit"):
-        write(run, {"pitch": "pitch_reading"}, 300.0, tmp_path / "other.csv")
+        write_samples(run, {"pitch": "pitch_reading"}, 300.0, tmp_path / "other.csv")
 
 
 def test_a_rate_that_falls_between_the_steps_is_refused():

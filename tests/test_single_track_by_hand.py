@@ -7,8 +7,8 @@ import pytest
 
 from models.systems.single_track.equations import (
     GRAVITY,
-    Axle,
-    Car,
+    AxleTyres,
+    SingleTrackCar,
     axle_force,
     forces,
     march,
@@ -17,7 +17,7 @@ from models.systems.single_track.equations import (
 )
 
 pytestmark = pytest.mark.grounds("closed form")
-CAR = Car(
+CAR = SingleTrackCar(
     mass=1200.0,
     front_arm=1.1,
     rear_arm=1.6,
@@ -34,7 +34,7 @@ ROUNDING = 1e-11
 
 
 def axle(stiffness=12.0, friction=0.9, sharpness=2.0, side=0.0, lift=0.0, rise=0.0):
-    return Axle(stiffness, friction, sharpness, side, lift, rise)
+    return AxleTyres(stiffness, friction, sharpness, side, lift, rise)
 
 
 @pytest.mark.parametrize("angle", [-1.2, -0.3, 0.4, 1.4])

@@ -7,7 +7,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.systems import load
-from models.systems.pitch_plane.stabilised import Bench, Options
+from models.systems.pitch_plane.stabilised import StabiliserBench, StabiliserOptions
 from studies.command.asked import SCENES_FOLDER
 from studies.stabilisers import run
 
@@ -113,5 +113,5 @@ def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words,
 def test_a_linear_vehicle_needs_no_spring(tmp_path):
     """Linearised, nothing grows: no stiffness is needed, and noise alone ends the trust in a free run."""
     scene = load(SCENES_FOLDER / "stabilisers.toml", [*SHORT, "vehicle.geometry=linear"])
-    bench = Bench(scene, "road", Options(), tmp_path)
+    bench = StabiliserBench(scene, "road", StabiliserOptions(), tmp_path)
     assert bench.holding == 0.0 and 0.0 < bench.trusted <= 5.0

@@ -180,12 +180,14 @@ def test_copies_of_a_linear_vehicle_have_its_covariance():
 def test_engines_agree_where_springs_are_bent():
     vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
     road = road_path(excitation_, SPEED, 1e-3)
-    one, other = (drive_over_road(engine, vehicle, road, 0.3, seed=5, stride=20) for engine in ("exudyn", "mujoco"))
+    one, other = (
+        drive_over_road(engine, vehicle, road, 0.3, road_seed=5, steps_per_output=20) for engine in ("exudyn", "mujoco")
+    )
     assert np.abs(one.run.positions - other.run.positions).max() < 1e-13
     assert np.abs(one.run.rates - other.run.rates).max() < 1e-12
     # the strut is all that pulls at the body: its output would be -m a, and is not read by a gain
     assert np.isnan(one.output_values("strut force front left")).all()
-    assert one.interval == pytest.approx(20 * road.step)
+    assert one.output_interval == pytest.approx(20 * road.step)
     travel = one.run.positions[::20, 1] - one.run.positions[::20, 0]
     assert one.output_values("travel front left") == pytest.approx(travel, abs=1e-15)
 
@@ -194,7 +196,7 @@ def test_a_copy_goes_where_an_engine_goes():
     """The quarter car's motion is small at any size: the copies' laws step by step are MuJoCo's, so is the force."""
     vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE, 16.0)
     road = road_path(excitation_, SPEED, 1e-3)
-    run, table = drive_over_road("mujoco", vehicle, road, 0.3, seed=5).run, road.wheel_heights_and_rates(300, 5)
+    run, table = drive_over_road("mujoco", vehicle, road, 0.3, road_seed=5).run, road.wheel_heights_and_rates(300, 5)
     springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, x = force_laws(vehicle, plain, springs, SPEED), np.zeros((4, 1))

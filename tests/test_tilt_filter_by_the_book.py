@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 
 from models.multibody.cut_table import HubInputs
-from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter, _without_slope, estimate, inputs_with_moments
-from models.systems.hub_forces.tilt_march import Noise, march
+from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
+from models.systems.hub_forces.tilt_filter import (
+    StatedDeviations,
+    TiltFilter,
+    _without_slope,
+    estimate_tilt,
+    inputs_with_moments,
+)
+from models.systems.hub_forces.tilt_march import TiltNoise, march
 from models.vehicles.cut_vehicle import rigid_vehicle
 from validation.spatial.cars import r19
 
@@ -38,7 +44,7 @@ def test_states_deviations_and_innovations_are_those_of_the_matrices():
     """Values one after another are all at once, as their errors are independent; some are missing."""
     random = np.random.default_rng(12)
     push = np.vstack([np.eye(2) * DT**2 / 2, np.eye(2) * DT])
-    noise = Noise(DT, push @ np.array([[0.5, 0.1], [0.1, 0.3]]) @ push.T, np.array([1e-4, 2e-4, 3e-3, 4e-3]))
+    noise = TiltNoise(DT, push @ np.array([[0.5, 0.1], [0.1, 0.3]]) @ push.T, np.array([1e-4, 2e-4, 3e-3, 4e-3]))
     turning, measured = random.normal(0.0, 1.0, (SAMPLES, 2)), random.normal(0.0, 0.1, (SAMPLES, 4))
     measured[random.uniform(size=measured.shape) < 0.3] = np.nan
     root = random.normal(0.0, 0.05, (4, 4))
@@ -59,19 +65,19 @@ def measurement():
     rates = np.vstack([np.zeros(2), np.cumsum(turning[1:] + turning[:-1], axis=0) * DT / 2.0])
     tilts = np.vstack([np.zeros(2), np.cumsum(rates[1:] + rates[:-1], axis=0) * DT / 2.0])
     angles = np.hstack([tilts, rates]) + random.normal(0.0, 1e-3, (SAMPLES, 4))
-    return car, forces, turning, Angles(angles, DT)
+    return car, forces, turning, MeasuredAngles(angles, DT)
 
 
 def test_the_filter_of_a_measurement_has_the_moments_and_deviations_of_its_vehicle(measurement):
     car, forces, turning, angles = measurement
-    stated = Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7)
+    stated = StatedDeviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7)
     push = np.vstack([np.eye(2) * DT**2 / 2, np.eye(2) * DT])
     variances = np.repeat([2e-3, 3e-3], 2) ** 2
     shaken = rigid_vehicle(car).turning(stated.forces)[:2, :2] + 0.49 * np.eye(2)
-    noise = Noise(DT, push @ shaken @ push.T, variances)
+    noise = TiltNoise(DT, push @ shaken @ push.T, variances)
     first = angles.samples[0].copy(), np.diag(variances)
     states, deviations, squares = by_the_book(*first, turning, angles.samples, noise)
-    tilt = estimate(car, forces, angles, stated)
+    tilt = estimate_tilt(car, forces, angles, stated)
     assert tilt.states == pytest.approx(states, rel=1e-9, abs=1e-12) and tilt.period == DT
     assert tilt.deviations == pytest.approx(deviations, rel=1e-9)
     assert tilt.normalised_innovation == pytest.approx(squares / (4 * (SAMPLES - 1)), rel=1e-9)
@@ -83,7 +89,7 @@ def test_the_filter_of_a_measurement_has_the_moments_and_deviations_of_its_vehic
 def test_biases_are_means_of_the_innovations_with_fewer_of_them_where_they_hang_together(measurement):
     """Of 4 innovations 3, 1, -1, 3: mean 1.5, variance 5 - 2.25, and products of neighbours 3 - 1 - 3 by 20."""
     car, forces, *_ = measurement
-    whole = TiltFilter(car, forces.frame, DT, Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
+    whole = TiltFilter(car, forces.frame, DT, StatedDeviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
     whole.state.sums[:] = np.array([4.0, 6.0, 20.0, 5.0, 0.0])[:, None]
     mean, error = whole.innovation_biases()
     assert mean == pytest.approx([1.5] * 4, rel=1e-12)
@@ -99,7 +105,7 @@ def test_a_slope_is_taken_off_and_nothing_else():
 def test_what_pulls_to_the_estimate_is_a_spring_and_a_damper_of_its_bandwidth(measurement):
     """I wc^2 and 2 0.7 I wc of roll and pitch; between samples the guide goes along lines."""
     car, forces, _, angles = measurement
-    tilt = estimate(car, forces, angles, Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
+    tilt = estimate_tilt(car, forces, angles, StatedDeviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
     given = inputs_with_moments(HubInputs(np.ones((5, 24))), car, tilt, DT, 0.35)
     roll, pitch, _ = np.diag(rigid_vehicle(car).inertia)
     corner = 2.0 * np.pi * 0.35

@@ -15,7 +15,7 @@ from models.systems.braking.of_scene import merged_tables
 from models.systems.braking.plan import describe
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 
 FULL = pytest.mark.full
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
@@ -120,7 +120,7 @@ def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
     monkeypatch.setattr(errors, "same_commands", lambda path, other: True)
     monkeypatch.setattr(errors, "commands_change_nearby", lambda *given: False)
     told, truth = run(cycling, error=True), run(finer).detail
-    true = abs(float(Stop(told.detail).way[-1] - Stop(truth).way[-1]))
+    true = abs(float(StopHistory(told.detail).distance_travelled[-1] - StopHistory(truth).distance_travelled[-1]))
     assert true > 10.0 * errors_of(told)["stopping distance"].error
 
 

@@ -135,7 +135,7 @@ def test_the_error_of_a_held_wheelset_is_that_against_four_times_the_cells():
     some = held(STEEL | {"positions": {"start": 0.002, "stop": 0.008, "count": 3}, "method": {"cells": 15}})
     told = errors_of(run_ := wheel_rail.run(some, error=True))
     finer = replace(some.contact(some.cases["A"]), cell_factor=0.25 * 31 / 15)
-    placed = run_.detail.placed
+    placed = run_.detail.placements
     gaps = [wheel_rail.wheel_sums(one) - wheel_rail.wheel_sums(finer.at(one.shift, one.yaw)) for one in placed]
     for k, name in enumerate(wheel_rail.WHEEL_QUANTITIES):
         assert finite_rms(np.array(gaps)[:, :, k]) < 3.0 * told[name].error

@@ -13,7 +13,7 @@ from models.core.time_series import write_time_series
 from models.systems.braking.of_scene import tyre_table_of
 from models.systems.braking.scene import build as build_braking
 from models.systems.hub_forces import run as module
-from models.systems.hub_forces.comparison import compare
+from models.systems.hub_forces.comparison import compare_stabilisers
 from models.systems.hub_forces.plan import describe
 from models.systems.hub_forces.run import principal_series, run
 from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene, build
@@ -129,9 +129,9 @@ def test_no_error_costs_no_run_and_a_comparison_tells_of_all(monkeypatch):
     monkeypatch.setattr(module, "build", lambda *model: calls.append(model) or build_model(*model))
     monkeypatch.setattr(module, "HubModel", lambda *model: models.append(model) or model_of(*model))
     own = scene()
-    plain = compare(own.model_copy(update={"error": False}), ("mujoco",))
+    plain = compare_stabilisers(own.model_copy(update={"error": False}), ("mujoco",))
     assert len(models) == 4 and not calls and told.message_lines(plain.results) == []  # the measurement, and three runs
-    whole = compare(own, ("mujoco",))
+    whole = compare_stabilisers(own, ("mujoco",))
     assert set(whole.results) == {"true", "free, mujoco", "filter", "prescribed"}
     assert all(errors_of(each) for each in whole.results.values()) and len(told.message_lines(whole.results)) == 4
     steps = [round(model[4] / model[3]) for model in calls]
@@ -181,7 +181,7 @@ def test_a_table_of_a_tyre_has_no_steps_and_says_where_it_ends(tmp_path):
 
 @pytest.mark.full
 def test_the_shipped_scenes_break_nothing():
-    comparison = compare(load(SCENES / "hub_forces.toml"), ("mujoco",))
+    comparison = compare_stabilisers(load(SCENES / "hub_forces.toml"), ("mujoco",))
     assert all(broken_of(each) == [] for each in comparison.results.values())
     assert broken_of(run(load(SCENES / "choice_hub_forces.toml"), "mujoco")) == []
     assert broken_of(run_recording(load(SCENES / "recording.toml"))) == []

@@ -10,7 +10,7 @@ from models.core.assumptions import broken_of
 from models.core.discretisation import errors_of
 from models.core.errors import RunFailed
 from models.systems.ride import errors, nonlinear
-from models.systems.ride.nonlinear import Sampling
+from models.systems.ride.nonlinear import RunSampling
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.plan import describe
 from models.systems.ride.run import run
@@ -20,7 +20,7 @@ from models.vehicles.spatial_linear import wheels
 from validation.stated_errors.systems.ride import exact_deviations, samples
 
 ENGINES = ("reference", "exudyn", "mujoco")
-SHORT = Sampling(copies=20, lasting=2.0, driven=3.0, skipped=0.5)
+SHORT = RunSampling(copies=20, lasting=2.0, driven=3.0, skipped=0.5)
 
 
 def scene(file="half_car", level=1.6e-5, speed=20.0, point="unloaded", **tables):

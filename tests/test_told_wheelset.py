@@ -150,7 +150,7 @@ def test_joined_paths_keep_what_each_says():
 
 def test_a_limit_cycle_tells_its_error_and_what_it_takes_for_granted():
     hunts = scene(wheelset={"override": {"conicity": 0.15, "stiffness_x": 8e5}}, contact={"cells": 5})
-    found, failed = cycles_of_engines(hunts, ("reference",), 67.0, error=True)
+    found, failed = cycles_of_engines(hunts, ("reference",), 67.0, estimate_error=True)
     said = errors_of(found["reference"])
     assert (
         not failed

@@ -15,8 +15,8 @@ from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.plan import describe
-from models.systems.handling.run import build as build_model
-from models.systems.handling.run import drive_run, driven_by, run
+from models.systems.handling.run import build_in_engine as build_model
+from models.systems.handling.run import drive_run, driven_model, run
 from models.systems.handling.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
@@ -98,7 +98,7 @@ def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
 def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
     car = rolling_cars()["train"]
     division = towed_division(car, engine)
-    driven_by_both = replace(driven_by(car), numbers=shared_numbers(car, division), parts=division.native)
+    driven_by_both = replace(driven_model(car), numbers=shared_numbers(car, division), parts=division.native)
     names, _ = native_elements_and_joints(engine, driven_by_both)
     wanted = {spring.name for spring in car.given.springs if spring.frame in car.given.towed} | {"trailer's bar"}
     assert set(names) == wanted

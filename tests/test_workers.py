@@ -15,8 +15,8 @@ from models.ensemble.workers import Crew, process_pool
 from models.identification.fit import fit
 from models.identification.problem import FitClock, Parameter, Problem, measured_channel
 from models.identification.uncertainty import likelihood_profile, uncertainty
-from models.systems.braking.stops import Stops
-from models.systems.ride.nonlinear import CopiesBySpeed, Sampling
+from models.systems.braking.stops import StopEnsemble
+from models.systems.ride.nonlinear import CopiesJob, RunSampling
 from studies.command.asked import load_scene
 from studies.command.crew import crew_changes_by_options
 from validation.ride.in_engines import vehicle_and_road
@@ -24,12 +24,12 @@ from validation.ride.in_engines import vehicle_and_road
 
 def stops():
     scene = load_scene("braking_ensemble", ["procedures.straight.speed=2.0"])
-    return Stops(scene.table(), scene.file, scene.folder, "straight", 0.01, 1)
+    return StopEnsemble(scene.table(), scene.file, scene.folder, "straight", 0.01, 1)
 
 
 def copies():
     vehicle, road = vehicle_and_road("quarter_car")
-    return CopiesBySpeed(vehicle, road, (15.0, 20.0, 25.0), Sampling(copies=8, lasting=0.5, seed=4))
+    return CopiesJob(vehicle, road, (15.0, 20.0, 25.0), RunSampling(copies=8, lasting=0.5, seed=4))
 
 
 @pytest.fixture(scope="module")

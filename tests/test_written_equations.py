@@ -15,7 +15,7 @@ from models.multibody import forces as at
 from models.multibody.plain.road import control_value, surface
 from models.multibody.plain.rolling import Ledger, TyreReport
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import build, run
+from models.systems.handling.run import build_in_engine, run
 from studies.command.asked import SCENES_FOLDER, engines_of
 from validation.faults.campaign import seeing_checks
 from validation.faults.written import CAMPAIGN
@@ -122,7 +122,7 @@ def test_curves_of_the_description_press():
     without = car.changed(given=replace(nonlinear_spring_car(), springs=rolling_cars()["r19_free"].given.springs))
     q, v = car.straight(10.0)
     v[5:] += 0.3
-    ours, others = (build("reference", each).acceleration(0.0, q, v) for each in (car, without))
+    ours, others = (build_in_engine("reference", each).acceleration(0.0, q, v) for each in (car, without))
     assert np.abs(ours - others).max() > 0.1
 
 

@@ -10,10 +10,11 @@ from models.core.result import Result
 from models.core.systems import SYSTEMS
 
 
-def run(scene: Any, engine: str = "", **how: Any) -> Result:
-    """Run a scene in one engine; ``how`` is passed on to the system's own ``run``, for example the name of a manoeuvre.
+def run(scene: Any, engine: str = "", **run_options: Any) -> Result:
+    """Run a scene in one engine; ``run_options`` is passed on to the system's own ``run``, for example the name of a
+    manoeuvre.
 
     Raises InputError, Refused or RunFailed, never returns a partial run.
     """
-    result: Result = import_module(f"{SYSTEMS[scene.system].package}.run").run(scene, engine, **how)
+    result: Result = import_module(f"{SYSTEMS[scene.system].package}.run").run(scene, engine, **run_options)
     return result

@@ -10,7 +10,7 @@ from models.engines.assembly import Settings
 from models.engines.protocol import guard
 from models.machine.timing import interleave, paired_ratio
 from models.multibody.numbers import Handling
-from models.systems.handling.run import build
+from models.systems.handling.run import build_in_engine
 from validation.absence import hand_built_handling, handling
 from validation.absence.of_systems import bare_scene
 
@@ -33,7 +33,7 @@ def car_runs(step_count: int) -> tuple[Job, Job]:
     the path in the same way, and return coordinates and rates (step_count + 1, 23)."""
     car, q, v = start_state()
     model, by_hand, state_times = (
-        build("mujoco", car, Settings("RK4", STEP, step_count * STEP)),
+        build_in_engine("mujoco", car, Settings("RK4", STEP, step_count * STEP)),
         hand_built_handling.run(car, q, v, STEP, step_count),
         STEP * np.arange(step_count + 1),
     )

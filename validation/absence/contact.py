@@ -29,7 +29,7 @@ def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], b
     from models.systems.contact import run
 
     coarse = scene.model_copy(update={"method": scene.method.model_copy(update={"cells": 7})})
-    with mock.patch.object(run, "touching_places", wraps=run.touching_places) as searched:
+    with mock.patch.object(run, "touching_points", wraps=run.touching_points) as searched:
         forces = run.run(coarse, error=False)
     body = forces.detail.contact
     counts = {

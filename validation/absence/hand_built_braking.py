@@ -18,7 +18,7 @@ from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
 from models.systems.braking.march import BrakingPath
-from models.systems.braking.procedures import controller_of, vehicle_and_start
+from models.systems.braking.procedures import controller_of, vehicle_and_start_state
 from models.tyre.tyre_table import TableCell, Tables, cell_and_share, lateral_adhesion
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare_scene
@@ -379,7 +379,7 @@ def bare_stops(speed: float) -> tuple[Job, Job]:
         brakes={"supply": SUPPLY_PRESSURE},
         procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER_ANGLE}},
     )
-    vehicle, start = vehicle_and_start(scene, STOP)
+    vehicle, start = vehicle_and_start_state(scene, STOP)
 
     def run_twinrig() -> BrakingPath:
         return vehicle.run(controller_of(scene, vehicle.plane.wheels, STOP), start, scene.run.duration)

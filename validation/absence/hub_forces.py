@@ -12,7 +12,7 @@ from models.engines.cut_vehicle import build
 from models.multibody import cut_kernel as kernel
 from models.multibody.cut_kernel import WRENCH
 from models.systems.hub_forces.measurement import recorded_measurement
-from models.systems.hub_forces.run import Measurement, measure
+from models.systems.hub_forces.run import HubMeasurement, measure
 from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -86,7 +86,7 @@ def scene_run(scene: HubScene, engine: str, step_count: int) -> Callable[[], Any
     ).run
 
 
-def _noisy_columns(measurement: Measurement) -> list[int]:
+def _noisy_columns(measurement: HubMeasurement) -> list[int]:
     """Number of force columns with noise and number of angle columns with noise; 0 and 0 for measurements from
     files."""
     forces, angles, scene = measurement.forces, measurement.angles, measurement.scene

@@ -12,7 +12,7 @@ from models.measured.faults_of_measurement import Faults
 from models.multibody import cut_kernel as kernel
 from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES
 from models.systems.measured import section_run
-from models.systems.measured.run import Examination, run
+from models.systems.measured.run import RecordingAnalysis, run
 from models.systems.measured.scene import MeasuredScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -76,7 +76,7 @@ def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], 
         return model
 
     with mock.patch.object(section_run, "build", watched):
-        exam: Examination = run(scene, engine).detail
+        exam: RecordingAnalysis = run(scene, engine).detail
     assert exam.outcome is not None
     path = b"".join(exam.outcome.samples(answer).tobytes() for answer in exam.outcome.answers)
     guides, faulty = {int(table[kernel.STABILISER]) for table in tables}, np.zeros((2, 1), bool)

@@ -105,9 +105,9 @@ def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], byte
 
 def _with_fewest_copies() -> Any:
     """Settings with the smallest allowed number of Monte Carlo copies."""
-    from models.systems.ride.nonlinear import Sampling
+    from models.systems.ride.nonlinear import RunSampling
 
-    return Sampling(copies=2, lasting=0.1)
+    return RunSampling(copies=2, lasting=0.1)
 
 
 PROBE_SCRIPT = """

@@ -15,7 +15,7 @@ from models.brake.port.ask import checked_answer
 from models.brake.surfaces import Stretch, road
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_train
 from models.systems.braking.march import StartState
-from models.systems.braking.procedures import vehicle_and_start
+from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import run, vehicle_in_engine
 from models.systems.braking.scene import BrakingScene, build
 from validation.braking.braked_wheels import DRY, ICE, SPEED, AdvancedVehicle, Error, piecewise_linear_friction
@@ -121,7 +121,7 @@ def motion_after_rest_on_lagging_tyres(implementation: str, folder: Path) -> flo
     """Case: the truck slides to rest on tyres with relaxation lengths, then keeps its brakes on for 1 s. Error:
     displacement (m) and speed (m/s) after the stop."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
-    vehicle, start_state = vehicle_and_start(scene, "stop")
+    vehicle, start_state = vehicle_and_start_state(scene, "stop")
     vehicle = vehicle_in_engine(vehicle, implementation)
     start_state.state[1, 1] = 0.2
     path = vehicle.run(AllApplied(4), start_state, 10.0)

@@ -10,7 +10,7 @@ to first order, whatever springs do: contacts go with their wheels, spins slow d
 import numpy as np
 
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
-from models.systems.handling.run import Drive
+from models.systems.handling.run import SimulatedDrive
 from models.vehicles.free_vehicle import SWAY
 from models.vehicles.spatial import SpatialVehicle
 
@@ -25,7 +25,7 @@ def turning_car(vehicle: SpatialVehicle, steer: float) -> Handling:
     return Handling(vehicle, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
 
 
-def load_transfer(drive: Drive) -> np.ndarray:
+def load_transfer(drive: SimulatedDrive) -> np.ndarray:
     """Moments (2,) in N m of the change of the wheel loads from start to end of a drive. The lever arms are the wheels'
     design positions: forward, then to the left."""
     design = np.array([tyre.point[:2] for tyre in drive.handling.vehicle.tyres])
@@ -33,7 +33,7 @@ def load_transfer(drive: Drive) -> np.ndarray:
     return moments
 
 
-def expected_moments(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
+def expected_moments(drive: SimulatedDrive, accelerations: np.ndarray) -> np.ndarray:
     """Moments (2,) in N m that ``load_transfer`` should return, by the balance of all bodies at accelerations (2,) in
     m/s^2: forward, then to the left."""
     handling, vehicle = drive.handling, drive.handling.vehicle
@@ -49,12 +49,12 @@ def expected_moments(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
     return leaning * np.array([pitch, -roll]) - accelerations * (masses @ heights + spins)
 
 
-def braked_error(drive: Drive, mu: float) -> float:
+def braked_error(drive: SimulatedDrive, mu: float) -> float:
     """Relative error of the load transfer between front and rear axle while all wheels slide."""
     return float(load_transfer(drive)[0] / expected_moments(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
 
 
-def turning_error(drive: Drive) -> float:
+def turning_error(drive: SimulatedDrive) -> float:
     """Relative error of the load transfer between the left and right wheels in a steady turn."""
     forward_speed, _, rate = drive.velocity()[-1]
     return float(load_transfer(drive)[1] / expected_moments(drive, np.array([0.0, forward_speed * rate]))[1] - 1.0)

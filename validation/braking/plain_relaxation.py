@@ -7,7 +7,7 @@ from models.brake.brake import Brake, of_wheels
 from models.brake.plain import relaxation as plain
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.pressure import Chambers
-from models.systems.braking.march import on_tyres
+from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.magic_formula import table_of_surface
 from validation.braking.sprung_box import TORQUE_PER_BAR, steady_torques
 from validation.braking.truck_equations import braked_turn
@@ -49,7 +49,7 @@ def braked_turn_difference(relaxation_length: float, substeps: int = 4) -> float
     equations. The truck's tyres have a relaxation length (m)."""
     tyre, torques = table_of_surface("ice"), (300.0, 200.0)
     end = braked_turn(PAPER_TRUCK, tyre, STEER_ANGLE, torques, FIRST_SPEED, LAST_SPEED, relaxation_length)
-    path = on_tyres(
+    path = braked_vehicle_on_tyres(
         plane_of_truck(PAPER_TRUCK),
         [tyre],
         of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=TORQUE_PER_BAR, falling=TORQUE_PER_BAR),)),

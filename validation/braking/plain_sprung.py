@@ -14,7 +14,7 @@ from models.brake.sprung import Sprung, suspended_vehicle
 from models.brake.surfaces import UNIFORM_ROAD, Stretch, road
 from models.engines.braking_sprung import EngineSprungVehicle
 from models.engines.braking_sprung_plain import PlainSprungVehicle
-from models.systems.braking.march import BrakedVehicle, BrakingPath, on_tyres
+from models.systems.braking.march import BrakedVehicle, BrakingPath, braked_vehicle_on_tyres
 from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import table_of_surface
 from models.vehicles.spatial import Curve, SpatialVehicle
@@ -150,7 +150,7 @@ def braked_vehicle_on_springs(vehicle: Sprung, engine: str, valves: bool, lags: 
     )
     plane = vehicle.in_plane()
     unit_values, on_front_unit = np.ones(plane.wheels), np.arange(plane.wheels) < 2
-    return on_tyres(
+    return braked_vehicle_on_tyres(
         plane,
         [table_of_surface(name) for name in ("wet", "dry", "ice")],
         of_wheels(front, front, *[rear] * (plane.wheels - 2)),

@@ -16,7 +16,7 @@ from models.brake.controller import SAMPLE, Controller, Sample
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import APPLY, RELEASE, Chambers
 from models.brake.quarter import Quarter
-from models.systems.braking.march import on_tyres
+from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.magic_formula import NAMED_SURFACES, table_of_surface
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
@@ -31,7 +31,7 @@ def twinrig_distance(
 ) -> float:
     """Stopping distance (m) of the quarter vehicle by twinrig, from a speed (m/s)."""
     chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
-    vehicle = on_tyres(
+    vehicle = braked_vehicle_on_tyres(
         quarter_car.plane, [table_of_surface(surface_name)], of_wheels(brake), chambers, substeps=substeps
     )
     return float(vehicle.run(controller, speed).states[-1, 0, 0])

@@ -12,7 +12,7 @@ from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, suspended_vehicle
 from models.engines.braking_sprung import EngineSprungVehicle
-from models.systems.braking.march import BrakedVehicle, BrakingPath, on_tyres
+from models.systems.braking.march import BrakedVehicle, BrakingPath, braked_vehicle_on_tyres
 from models.tyre.tyre_table import TyreTable
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
@@ -119,7 +119,7 @@ def braked_vehicle(
     """
     brake, plane = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), sprung.in_plane()
     zeros = np.zeros(plane.wheels)
-    return on_tyres(
+    return braked_vehicle_on_tyres(
         plane,
         [tyre],
         of_wheels(*[brake] * plane.wheels),

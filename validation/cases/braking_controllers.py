@@ -15,8 +15,8 @@ from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle, sampled_cycle
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, resting_chambers
-from models.systems.braking.march import BrakingPath, on_tyres
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.march import BrakingPath, braked_vehicle_on_tyres
+from models.systems.braking.stop_report import StopHistory
 from models.tyre.magic_formula import table_of_surface
 from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.quarter_stops import FRONT_WHEEL
@@ -214,16 +214,16 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
 def truck_stop(surface_name: str, controller_name: str, start_speed: float) -> BrakingPath:
     """The paper's truck braked to a stop on a surface by a controller with its default parameters."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
-    return on_tyres(plane_of_truck(PAPER_TRUCK), [table_of_surface(surface_name)], PAPER_BRAKES, chambers).run(
-        CONTROLLERS[controller_name](4), start_speed
-    )
+    return braked_vehicle_on_tyres(
+        plane_of_truck(PAPER_TRUCK), [table_of_surface(surface_name)], PAPER_BRAKES, chambers
+    ).run(CONTROLLERS[controller_name](4), start_speed)
 
 
 def stop_results(surface_name: str, controller_name: str, start_speed: float) -> dict[str, float]:
     """Results of one straight stop of the truck: distance (m), time (s); above 15 km/h also the friction utilisation
     and the longest wheel lock (ms)."""
     path = truck_stop(surface_name, controller_name, start_speed)
-    speeds = Stop(path).speed
+    speeds = StopHistory(path).speed
     last = int(np.argmax(speeds < LOCK_FREE_SPEED))
     used = (
         (start_speed**2 - speeds[last] ** 2)

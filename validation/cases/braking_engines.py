@@ -15,7 +15,7 @@ from models.brake.plane_vehicle import PAPER_TRUCK
 from models.brake.pressure import Chambers
 from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
 from models.engines.braking import EngineChassis
-from models.systems.braking.march import on_tyres
+from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
     ICE_TABLE,
@@ -100,7 +100,7 @@ def braked_truck_turn(
 def real_time_factor(substep_count: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
-    vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
+    vehicle = braked_vehicle_on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
     vehicle.run(SlipBangBang(wheels=4), START_SPEED, 0.1)
     start = time.process_time()
     path = vehicle.run(SlipBangBang(wheels=4), START_SPEED)

@@ -13,7 +13,7 @@ from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.sprung import PITCH
 from models.systems.braking.march import BrakingPath
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import TyreTable
 from validation.braking.sprung_box import (
@@ -188,7 +188,7 @@ def _ice_stop_rows() -> list[Row]:
     """Rows: stop on ice by the slip controller, with the suspension and with the plane vehicle with load transfer."""
     ice, speed = table_of_surface("ice"), 11.11
     stops = [
-        Stop(braked_vehicle(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
+        StopHistory(braked_vehicle(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
         for engine in ("mujoco", None)
     ]
     distances = [stop.vehicle_results()["stopping distance [m]"] for stop in stops]
@@ -197,7 +197,7 @@ def _ice_stop_rows() -> list[Row]:
             "braking_suspension.ice.locks",
             SYSTEM,
             "longest time for which a wheel locks above 15 km/h on ice, bang-bang slip controller",
-            float(stops[0].locks().longest_lock.max()),
+            float(stops[0].lock_times().longest_lock.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.brake.controllers.slip import SlipBangBang
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 from models.tyre.magic_formula import table_of_surface
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as train
@@ -120,7 +120,8 @@ def _slip_control_rows() -> list[Row]:
     ice, speed = table_of_surface("ice"), 11.11
     vehicle = braked_vehicle(whole.towing_car(), ice, substeps=4, gradient=150.0)
     controlled, locked = (
-        Stop(vehicle.run(controller, speed)) for controller in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
+        StopHistory(vehicle.run(controller, speed))
+        for controller in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
     )
     distances = [stop.vehicle_results()["stopping distance [m]"] for stop in (controlled, locked)]
     return [
@@ -128,7 +129,7 @@ def _slip_control_rows() -> list[Row]:
             "braking_trailer.ice.locks",
             SYSTEM,
             "longest time for which a wheel of car or caravan locks above 15 km/h on ice, bang-bang slip controller",
-            float(controlled.locks().longest_lock.max()),
+            float(controlled.lock_times().longest_lock.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(

@@ -11,7 +11,7 @@ from models.advice.ride_choice.activity import activity_by_element
 from models.advice.ride_choice.choose import EQUAL_COST_LOG, Chooser, RideChoice
 from models.advice.ride_choice.screen import Screen, exact_variances
 from models.core.systems import load
-from models.systems.ride.reduced_scene import Effect, reduced_without
+from models.systems.ride.reduced_scene import OmissibleEffect, reduced_without
 from validation.choice.judged import changes_by_frequency, chooser_over_speeds, measured_step, worst_nearby
 from validation.choice.price_of_choice import car_scene
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -73,7 +73,7 @@ def judge_choice_for_ride(ride: LinearRide, with_frequency_responses: bool) -> J
     choice, full_scene = chooser.choose(), chooser.full_scenes[0]
     rest = full_scene.reduced(reduced_without(ride.scene, choice.left_out))
     two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
-    chosen, none = frozenset(choice.left_out), frozenset[Effect]()
+    chosen, none = frozenset(choice.left_out), frozenset[OmissibleEffect]()
     return JudgedChoice(
         ride,
         choice,

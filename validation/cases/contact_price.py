@@ -16,7 +16,7 @@ from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
-from models.systems.contact.scene import Method
+from models.systems.contact.scene import ContactMethod
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import (
@@ -148,7 +148,7 @@ def _total_error_rows(contact_cases: list[ContactCase]) -> list[Row]:
     for case in contact_cases:
         contact = case.contact(Fastsim, **BEST_CHOICES)
         answers, error = rolled(contact, case.motion, 21)
-        limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
+        limit, moment = case.friction_limit, case.friction_limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
         stated.append((error.total, error.moment + MOMENT_ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
@@ -229,7 +229,7 @@ def _shares_beyond_stated_error(
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
             np.array(off)
-            > np.array(remaining_errors(contact, case.motion, cell_count, fine)) + MOMENT_ROUNDING * case.limit
+            > np.array(remaining_errors(contact, case.motion, cell_count, fine)) + MOMENT_ROUNDING * case.friction_limit
         )
     return [float(value) for value in np.mean(answers, axis=0)]
 
@@ -261,7 +261,7 @@ def _long_table_row(work_folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    answers = solve_table(path, out, partial(Built, MATERIAL_PAIR), Method())
+    answers = solve_table(path, out, partial(Built, MATERIAL_PAIR), ContactMethod())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()

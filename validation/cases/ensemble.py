@@ -284,7 +284,9 @@ def _engine_rows_and_times(
     """Rows on the agreement of the first paths between engines, and the wall time (s) per path and step of each
     engine."""
     exudyn = noise_paths(scene, output_times, true_pitch, engine="exudyn")
-    single, two = (mujoco_threads(scene, output_times, true_pitch, threads=threads) for threads in (1, 2))
+    single, two = (
+        mujoco_threads(scene, output_times, true_pitch, thread_count=thread_count) for thread_count in (1, 2)
+    )
     jobs_by_method: dict[str, Callable[[], Arrays]] = {
         "mujoco, 1 thread": lambda: run_paths(single, noise_path_count),
         "mujoco, 2 threads": lambda: run_paths(two, noise_path_count),

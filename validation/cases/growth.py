@@ -25,7 +25,13 @@ from models.ensemble.runner import run_paths
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
-from models.systems.pitch_plane.tangent import TangentPath, covariance, measured_growth, path_of, slow_swing_frequency
+from models.systems.pitch_plane.tangent import (
+    TangentPath,
+    covariance_over_time,
+    measured_growth,
+    slow_swing_frequency,
+    tangent_path_of,
+)
 from models.systems.pitch_plane.virtual_measurement import perturbed_parameters, write_measurement
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import STATES
@@ -85,7 +91,7 @@ def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> S
     at = np.rint(times * SAMPLING_RATE).astype(int)
     p, quiet = assembly.parameters, assembly_of_scene(force_scene(work_folder, duration=MONTE_CARLO_SECONDS))
     q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
-    carried = covariance(quiet, NOISE_DEVIATION)
+    carried = covariance_over_time(quiet, NOISE_DEVIATION)
     alone = pitch_rate_of_forces(_force_samples(quiet).values, 1 / SAMPLING_RATE, p)
     rates = {"run": true_run["pitch_rate"], "forces": alone}
     spreads = {
@@ -101,7 +107,10 @@ def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> S
     }
     if not quick:
         job = noise_paths(_noisy_scene(work_folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
-        off = run_paths(job, NOISE_PATH_COUNT)["states"] - path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
+        off = (
+            run_paths(job, NOISE_PATH_COUNT)["states"]
+            - tangent_path_of(quiet).propagate_errors(np.zeros((1, 8)))[0][at]
+        )
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
 
@@ -279,7 +288,7 @@ def _asymmetric_twin_row(work_folder: Path) -> Row:
     p, at = assembly.parameters, round(5.0 * SAMPLING_RATE)
     q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
     expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / SAMPLING_RATE, p)[at], q)))
-    deviation = covariance(assembly, NOISE_DEVIATION).deviation("pitch")[at]
+    deviation = covariance_over_time(assembly, NOISE_DEVIATION).deviation("pitch")[at]
     what, why = (
         "asymmetric twin: ratio of the covariance along the path at 5 s to the closed law",
         "as for the published vehicle",

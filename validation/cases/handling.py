@@ -19,8 +19,8 @@ from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
-from models.systems.handling.run import Drive, drive_run, driven_by
-from models.systems.handling.single_track import steady_turn
+from models.systems.handling.run import SimulatedDrive, drive_run, driven_model
+from models.systems.handling.single_track import steady_turn_gains
 from models.tyre.bristles import FIRST_FLEXIBILITY, brush_forces, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding_car, turning_car, turning_error
@@ -72,7 +72,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
+def _drive_difference(first_drive: SimulatedDrive, second_drive: SimulatedDrive) -> float:
     """Largest difference of coordinates and rates between two drives."""
     return float(
         max(
@@ -82,7 +82,7 @@ def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
     )
 
 
-def _engine_agreement_row(drives_by_engine: dict[str, Drive]) -> Row:
+def _engine_agreement_row(drives_by_engine: dict[str, SimulatedDrive]) -> Row:
     """Row: largest difference between Exudyn and MuJoCo in a lane change on a rough road."""
     return Observed(
         "handling.engines",
@@ -123,7 +123,7 @@ def _single_tyre_rows() -> list[Row]:
     ]
 
 
-def _friction_power_row(simulated_drive: Drive) -> Row:
+def _friction_power_row(simulated_drive: SimulatedDrive) -> Row:
     """Row: friction of the tyres never feeds energy into the car."""
     return behaviour_row(
         "handling.power",
@@ -163,7 +163,7 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
     may change the table of the vehicle first."""
     steer = 2e-5
     handling = Handling(R19_CAR_WITHOUT_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
-    gain = steady_turn(handling, speed).yaw_gain
+    gain = steady_turn_gains(handling, speed).yaw_gain
     if plant_fault is not None:
         plant_fault(handling)
     return float(drive_run("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
@@ -171,7 +171,7 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
 
 def _steady_turn_rows() -> list[Row]:
     """Rows: yaw gain of a steady turn compared with the single-track vehicle, and the understeer gradient."""
-    turn = steady_turn(Handling(R19_CAR_WITHOUT_DRAG), 20.0)
+    turn = steady_turn_gains(Handling(R19_CAR_WITHOUT_DRAG), 20.0)
     return [
         Observed(
             "handling.turn",
@@ -192,14 +192,14 @@ def _locked_stop_rows() -> list[Row]:
     handling = Handling(R19_CAR_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEEL_NAMES))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
-    left = drive["fx"] + drive.grip()
+    left = drive["fx"] + drive.largest_tyre_forces()
     stopped = (speed**2 - ahead[-1] ** 2) / (2.0 * mu * GRAVITY)  # sliding friction alone
     return [
         Observed(
             "handling.slide",
             SYSTEM,
             "braking force of four locked wheels: deviation from mu N, relative to mu N",
-            float(np.abs(left / drive.grip()).max()),
+            float(np.abs(left / drive.largest_tyre_forces()).max()),
             "",
         ).at_most(1e-9, "at every step of a stop", "closed form"),
         Observed(
@@ -348,7 +348,7 @@ def _tyre_cost_row() -> Row:
 def _equal_bits_in_threads_row() -> Row:
     """Row: lane changes at three speeds give the same bits in two threads of MuJoCo as in one."""
     handling = car_in_lane_change()
-    built = FreeMujoco(driven_by(handling))
+    built = FreeMujoco(driven_model(handling))
     built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
     with installed(built.law):
@@ -367,7 +367,7 @@ def _equal_bits_in_threads_row() -> Row:
 
 def _timed_march(handling_car: Handling, step_count: int) -> Callable[[], Any]:
     """Function that runs a number of steps in MuJoCo's own loop, without preparation or output channels."""
-    built = FreeMujoco(driven_by(handling_car))
+    built = FreeMujoco(driven_model(handling_car))
     built.model.opt.timestep = 1e-4
     start, marcher = np.concatenate(handling_car.straight(SPEED))[None], Marcher(built.model)
 

@@ -15,12 +15,18 @@ from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.comparison import FILTERED_RUN, Comparison, compare
-from models.systems.hub_forces.measurement import HubForces, hub_model, recorded_measurement, true_run, two_tracks
+from models.systems.hub_forces.comparison import FILTERED_RUN, StabiliserComparison, compare_stabilisers
+from models.systems.hub_forces.measurement import (
+    HubForces,
+    hub_model,
+    recorded_measurement,
+    road_under_wheels,
+    true_run,
+)
 from models.systems.hub_forces.run import inputs_with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
-from models.systems.hub_forces.tilt_filter import Deviations, estimate
+from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid_vehicle
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing_breaches
@@ -54,7 +60,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return rows, {}
     rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduced_motion_rows(car), *_noise_growth_rows(car)]
     scenes = {frame: _hub_force_study_scene(frame) for frame in ("hub", "inertial")}
-    comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
+    comparisons = {frame: compare_stabilisers(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
         rows += [*_stabilised_rows(frame, comparison), _prescribed_angles_row(frame, comparison)]
     return rows + _planted_fault_rows(scenes["hub"]), {frame: each.figures() for frame, each in comparisons.items()}
@@ -192,7 +198,7 @@ def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
 def _hub_inputs_on_road(vehicle: CutVehicle, duration: float) -> HubInputs:
     """Input of the vehicle on a class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
-    return two_tracks(vehicle, left, right, 20.0, TIME_STEP, round(duration / TIME_STEP))
+    return road_under_wheels(vehicle, left, right, 20.0, TIME_STEP, round(duration / TIME_STEP))
 
 
 def _reproduced_motion_rows(vehicle: CutVehicle) -> list[Row]:
@@ -267,7 +273,7 @@ def _hub_force_study_scene(force_frame: str) -> HubScene:
     return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 
 
-def _stabilised_rows(force_frame: str, run_comparison: Comparison) -> list[Row]:
+def _stabilised_rows(force_frame: str, run_comparison: StabiliserComparison) -> list[Row]:
     """Rows: difference between the engines before drift-off, errors of roll and pitch with the tilt filter, and damage
     that each run predicts."""
     off = np.abs(run_comparison.errors(run_comparison.runs[FILTERED_RUN])).max(axis=0)
@@ -293,12 +299,12 @@ def _stabilised_rows(force_frame: str, run_comparison: Comparison) -> list[Row]:
             f"hub_forces.drift_off_{force_frame}",
             SYSTEM,
             f"time at which the free run leaves the true roll or pitch by 0.05 rad (8 s: never), frame {force_frame!r}",
-            min(run_comparison.drift_off(run_comparison.runs["free, mujoco"]), 8.0),
+            min(run_comparison.drift_off_time(run_comparison.runs["free, mujoco"]), 8.0),
             "s",
         ).beside("", "stated"),
     ]
     for name in (name for name in run_comparison.runs if "exudyn" not in name):
-        ratios = run_comparison.damages(run_comparison.runs[name]["section_force"]).values()
+        ratios = run_comparison.relative_damages(run_comparison.runs[name]["section_force"]).values()
         for end, value in (("least", min(ratios)), ("most", max(ratios))):
             what = (
                 f"{end} ratio of the damage of {len(ratios)} springs, mounts and bars to the "
@@ -312,7 +318,7 @@ def _stabilised_rows(force_frame: str, run_comparison: Comparison) -> list[Row]:
     return rows
 
 
-def _prescribed_angles_row(force_frame: str, run_comparison: Comparison) -> Row:
+def _prescribed_angles_row(force_frame: str, run_comparison: StabiliserComparison) -> Row:
     """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
     measurement = run_comparison.measurement
     assert measurement.truth is not None
@@ -324,7 +330,7 @@ def _prescribed_angles_row(force_frame: str, run_comparison: Comparison) -> Row:
         TIME_STEP,
     )
     run = build("mujoco", measurement.vehicle, hub_inputs, TIME_STEP, steps * TIME_STEP).run()
-    ratios = np.array([*run_comparison.damages(run.elements).values()])
+    ratios = np.array([*run_comparison.relative_damages(run.elements).values()])
     return Observed(
         f"hub_forces.prescribed_{force_frame}",
         SYSTEM,
@@ -359,7 +365,9 @@ def _planted_fault_rows(study_scene: HubScene) -> list[Row]:
     for i, (name, samples) in enumerate(planted.items()):
         faulty, outcome = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
-            estimate(vehicle, faulty, angles, Deviations(study_scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
+            estimate_tilt(
+                vehicle, faulty, angles, StatedDeviations(study_scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0)
+            )
         except InputError:
             outcome = "refused"
         expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"

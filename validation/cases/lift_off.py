@@ -14,7 +14,7 @@ from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
 from models.ride.road_path import road_path
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import true_run, two_tracks
+from models.systems.hub_forces.measurement import road_under_wheels, true_run
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
@@ -290,7 +290,8 @@ def _ride_vehicle_rows(quick: bool) -> list[Row]:
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
     first, two = (
-        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINE_NAMES
+        drive_over_road(engine, car, path, 1.0 if quick else 10.0, road_seed=SEED, steps_per_output=20).run
+        for engine in ENGINE_NAMES
     )
     apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [
@@ -320,7 +321,7 @@ def _hub_force_rows() -> list[Row]:
     equations, and least force."""
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
-    drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
+    drive = road_under_wheels(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
     runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in IMPLEMENTATIONS}
     apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINE_NAMES)
     loads = runs["reference"].wrenches[:, :, 2]

@@ -11,7 +11,7 @@ from models.contact.profile_files import read_profile
 from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, rail_in_track
 from models.rail.contact_table import WheelsetPlacement
 from models.systems.wheel_rail.run import run
-from models.systems.wheel_rail.scene import Positions
+from models.systems.wheel_rail.scene import LateralPositions
 from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import Observed, Row, System, Table, not_run
@@ -81,11 +81,11 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _timed_positions(benchmark_case: str, lateral_shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
     """Contacts of the wheelset at every lateral displacement (mm), and the processor time (s) per displacement.
     Wall time would count other cases that run at the same time."""
-    positions = Positions(
+    positions = LateralPositions(
         start=1e-3 * float(lateral_shifts[0]), stop=1e-3 * float(lateral_shifts[-1]), count=len(lateral_shifts)
     )
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=benchmark_case)
-    return placed_run.detail.placed, placed_run.seconds / len(lateral_shifts)
+    return placed_run.detail.placements, placed_run.seconds / len(lateral_shifts)
 
 
 def _published_rows(

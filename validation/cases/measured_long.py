@@ -13,10 +13,10 @@ from models.fatigue.counting import counted_load, level_crossings, range_pairs
 from models.fatigue.rainflow_cycles import rainflow_cycles
 from models.measured.formats import open_source
 from models.measured.signal import HUB_COMPONENTS
-from models.systems.measured.hand_on import hand_on
+from models.systems.measured.hand_on import write_section_forces
 from models.systems.measured.section_run import AttitudeHold, run
 from models.systems.measured.sections import Sections, guided_bodies
-from models.systems.measured.verdict import channels_to_compare, compare
+from models.systems.measured.verdict import channels_to_compare, compare_channel
 from models.vehicles.cut_vehicle import cut
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.measured.long_recording import (
@@ -154,8 +154,8 @@ def _equal_blocks_row(work_folder: Path, engine_name: str, stabiliser: str, reco
     job = section_run_of_recording(run_folder, recording_seconds, PATTERN_SECONDS, engine_name, hold)
     bits = []
     for block in (60.0, 0.073):
-        name = f"{engine_name} {stabiliser} {block}"
-        run(job, run_folder / name, block=block)
+        name = f"{engine_name} {stabiliser} {block_duration}"
+        run(job, run_folder / name, block_duration=block_duration)
         bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
@@ -229,7 +229,7 @@ def _export_rows(work_folder: Path) -> list[Row]:
     wanted = outcome.answers[:6]
     values = np.column_stack([outcome.samples(answer) for answer in wanted])
     worst, format_text = 0.0, set()
-    for path in hand_on(outcome, run_folder, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
+    for path in write_section_forces(outcome, run_folder, ("csv", "mf4", "rsp", "tdms"), wanted, file_comment="Monday"):
         source = open_source(path)
         names = [channel.name for channel in source.channels if channel.name in {answer.name for answer in wanted}]
         read = np.vstack([block.values for block in source.blocks(names)])
@@ -238,7 +238,7 @@ def _export_rows(work_folder: Path) -> list[Row]:
             (channel.name, channel.unit, channel.comment) for channel in source.channels if channel.name in names
         }
     kept_share = format_text == {(answer.name, answer.unit, answer.comment) for answer in wanted}
-    compared = [compare(job.recording, outcome, *pair) for pair in channels_to_compare(job)]
+    compared = [compare_channel(job.recording, outcome, *pair) for pair in channels_to_compare(job)]
     force = next(channel_match for channel_match in compared if channel_match.signal.name == "front left_force")
     return [
         Observed(

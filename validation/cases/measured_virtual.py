@@ -18,11 +18,11 @@ from models.measured.formats import write
 from models.measured.recording import Recording
 from models.systems.hub_forces.measurement import HubForces, hub_model
 from models.systems.measured.run import read_files as read_files
-from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRunSettings
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Sections
 from models.systems.measured.trust import MeasurementErrors, predicted_drift
-from models.systems.measured.verdict import errors_of_run, judge, judge_beside_truth
+from models.systems.measured.verdict import errors_of_run, judge_beside_truth, judge_run
 from models.systems.measured.virtual import (
     VirtualMeasurement,
     VirtualTable,
@@ -150,9 +150,9 @@ def recording_from_files(
 
 def stabilised_run(
     recording: Recording, vehicle: CutVehicle, attitude_hold: AttitudeHold, engine_name: str = "mujoco"
-) -> SectionRun:
+) -> SectionRunSettings:
     """Run of a recording, ready to be started, with the vehicle's attitude stabilised as ``attitude_hold`` says."""
-    return SectionRun(vehicle, recording, Sections(vehicle), engine_name, attitude_hold)
+    return SectionRunSettings(vehicle, recording, Sections(vehicle), engine_name, attitude_hold)
 
 
 def _file_format_rows(
@@ -263,7 +263,7 @@ def _engine_and_free_run_rows(
     beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
     apart = float((np.abs(beside - two).max(axis=0) / np.maximum(np.abs(beside).max(axis=0), 1e-6)).max())
     last_run = runs[ENGINES[-1]]
-    blind = judge(jobs[ENGINES[-1]], last_run)
+    blind = judge_run(jobs[ENGINES[-1]], last_run)
     rows = [
         Observed(
             f"measured_virtual.engines_{chain_test.name}",
@@ -292,7 +292,7 @@ def _engine_and_free_run_rows(
     except RunFailed as error:
         assert isinstance(error.partial, SectionOutcome)
         run = error.partial
-    sentence = judge(free, run, trusted=until)
+    sentence = judge_run(free, run, trusted_time=until)
     rows.append(
         Observed(
             f"measured_virtual.free_{chain_test.name}",

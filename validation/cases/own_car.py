@@ -7,7 +7,7 @@ import numpy as np
 
 from models.multibody.numbers import Controls, Handling
 from models.own_model.car import vehicle_of_file
-from models.systems.handling.run import REFERENCE, build, drive_run
+from models.systems.handling.run import REFERENCE_ENGINE, build_in_engine, drive_run
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.car_energy import largest_energy_difference
 from validation.own_model.cars import SALOON
@@ -58,9 +58,9 @@ def _lane_change_rows(handling_car: Handling, duration: float) -> list[Row]:
     ]
     run = drives["mujoco"].run
     last = run.times[-1], run.positions[-1], run.rates[-1]
-    plain = build(REFERENCE, handling_car).acceleration(*last)
+    plain = build_in_engine(REFERENCE_ENGINE, handling_car).acceleration(*last)
     for engine in drives:
-        apart = np.abs(build(engine, handling_car).acceleration(*last) - plain).max() / np.abs(plain).max()
+        apart = np.abs(build_in_engine(engine, handling_car).acceleration(*last) - plain).max() / np.abs(plain).max()
         rows.append(
             Observed(
                 f"own_car.plain_{engine}",

@@ -12,7 +12,12 @@ from models.core.systems import load
 from models.drift.score import SECTION_FORCE_CHANNELS, errors_of_run
 from models.fatigue.damage import WOEHLER_SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
+from models.systems.pitch_plane.stabilised import (
+    StabiliserBench,
+    StabiliserOptions,
+    compare_stabilisers,
+    scenes_by_road,
+)
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.common.scenes import force_scene, on_paper_road, virtual_drive
@@ -157,9 +162,9 @@ def _verdicts_on_grade_rows(work_folder: Path, engine_names: tuple[str, ...]) ->
     """Rows: on a grade of 0.1 rad a holding spring gives wrong results, and a prescribed pitch right ones, in each
     implementation."""
     scene = load(STUDY_SCENE, QUICK_SCENE_CHANGES)
-    options = read(Options, scene.options, "", "options")
+    options = read(StabiliserOptions, scene.options, "", "options")
     (work_folder / "short").mkdir()
-    bench = Bench(roads(scene, options)["grade"], "grade", options, work_folder / "short")
+    bench = StabiliserBench(scenes_by_road(scene, options)["grade"], "grade", options, work_folder / "short")
     rows = []
     for engine in engine_names:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
@@ -183,7 +188,7 @@ def _verdicts_on_grade_rows(work_folder: Path, engine_names: tuple[str, ...]) ->
 def _results_of_study(work_folder: Path) -> list[Saved]:
     """Results of all stabilisers of the study with its default options, in all engines."""
     (work_folder / "study").mkdir()
-    _, rows, failed = compare(
+    _, rows, failed = compare_stabilisers(
         load(STUDY_SCENE), IMPLEMENTATIONS, work_folder / "study", lambda text, progress_share: None
     )
     assert not failed, failed
@@ -258,11 +263,13 @@ def _results_of_long_runs(work_folder: Path) -> list[Saved]:
     """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the hand-written reference."""
     scene = load(STUDY_SCENE, FULL_SCENE_CHANGES)
     (work_folder / "long").mkdir()
-    bench = Bench(scene, "road", read(Options, scene.options, "", "options"), work_folder / "long")
+    bench = StabiliserBench(scene, "road", read(StabiliserOptions, scene.options, "", "options"), work_folder / "long")
     return [_score_of_stabiliser(bench, name) for name in PROTOTYPE_RESULTS]
 
 
-def _score_of_stabiliser(stabiliser_bench: Bench, stabiliser_name: str, engine_name: str = "reference") -> Saved:
+def _score_of_stabiliser(
+    stabiliser_bench: StabiliserBench, stabiliser_name: str, engine_name: str = "reference"
+) -> Saved:
     """Score of a run with one stabiliser."""
     effects = stabiliser_bench.methods[stabiliser_name]
     return stabiliser_bench.row(stabiliser_name, effects, stabiliser_bench.simulate(engine_name, effects))
@@ -344,6 +351,6 @@ def draw(case_data: Saved) -> Drawn:
     from models.drawing.drift import decision_figure
 
     scene = load(STUDY_SCENE)
-    options = read(Options, scene.options, "", "options")
+    options = read(StabiliserOptions, scene.options, "", "options")
     rows = [row for row in case_data["study"] if row["engine"] == "reference"]
     return [("What each stabiliser leaves in the section forces", decision_figure(rows, options.limits, options.grade))]

@@ -8,7 +8,7 @@ import numpy as np
 from models.multibody.numbers import Handling, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
-from models.systems.handling.run import Drive, drive_run
+from models.systems.handling.run import SimulatedDrive, drive_run
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_row
 from validation.spatial.towing import circle_error, give_towed_wheels_car_heading, static_load_error, towed_turn
@@ -37,7 +37,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {}
 
 
-def _rough_turn(engine_name: str, vehicle: SpatialVehicle, duration: float) -> Drive:
+def _rough_turn(engine_name: str, vehicle: SpatialVehicle, duration: float) -> SimulatedDrive:
     """A turn on a rough road, steered, braked and driven."""
     return drive_run(engine_name, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
 

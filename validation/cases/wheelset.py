@@ -15,7 +15,7 @@ from models.rail.equations import Equations
 from models.rail.limit_cycle import Orbit, attained_cycle, guess_from_orbit, refined_orbit, solved_orbit
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel_wavelength
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
-from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, implementation
+from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, equations_class
 from validation.common.checks import largest_relative_difference
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.contact.drawn_wheelsets import (
@@ -79,7 +79,7 @@ def _wavelength_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     rails, with Klingel's formula."""
     closed, edges, among = [], [], []
     for wheelset in wheelsets.values():
-        waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
+        waves = {engine: wavelength(equations_class(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
         closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
         among.append(_relative_spread(waves.values()))
         edge = wheelset.changed(head_radius=EDGE_RAIL_HEAD_RADIUS)
@@ -146,7 +146,7 @@ def _no_critical_speed_row(wheelset_name: str, wheelset: Wheelset, expected_outc
     outcomes = set()
     for engine in IMPLEMENTATION_MODULES:
         try:
-            outcomes.add(f"{critical_speed(wheelset, partial(largest_growth, implementation(engine))):.3g} m/s")
+            outcomes.add(f"{critical_speed(wheelset, partial(largest_growth, equations_class(engine))):.3g} m/s")
         except NoCriticalSpeed as error:
             outcomes.add("unstable" if error.unstable else "stable")
     return behaviour_row(
@@ -165,7 +165,7 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     for engine in ENGINE_NAMES:
         worst = 0.0
         for wheelset in wheelsets.values():
-            written, built = (implementation(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
+            written, built = (equations_class(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
             states = written.rest + RANDOM_STATE_DEVIATIONS * draw.normal(size=(20, eq.STATE_COUNT))
             worst = max(
                 worst, *(largest_relative_difference(built.rates(state), written.rates(state)) for state in states)
@@ -206,7 +206,7 @@ def _simulation_rows(
         )
         step = _time_step_of_wheelset(Equations(*setup))
         for engine in IMPLEMENTATION_MODULES:
-            equations = implementation(engine)(*setup)
+            equations = equations_class(engine)(*setup)
             paths[engine] = equations.run(equations.displaced_state(4e-3), DURATION, step)
             power = paths[engine].contacts["power"]
             positive, steps = positive + int((power > 0.0).sum()), steps + power.size
@@ -264,7 +264,7 @@ def _limit_cycles(
         setup: tuple[Any, ...] = (wheelset, _travel_speed_of_simulation(critical_speed_table, name), "fastsim", 11)
         first = attained_cycle(Equations(*setup), step=_time_step_of_wheelset(Equations(*setup)))
         if first is not None:
-            guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engine_names}
+            guesses = {engine: guess_from_orbit(first, equations_class(engine)(*setup)) for engine in engine_names}
             cycles[name] = {
                 engine: refined_orbit(solved_orbit(guess, "amplitude", precise=False), "amplitude")
                 for engine, guess in guesses.items()
@@ -344,7 +344,7 @@ def _energy_rows() -> list[Row]:
 
 def _planted_fault_rows() -> list[Row]:
     """Rows: a small fault planted in one implementation must exceed the tolerances of the other rows."""
-    equations, engine = Equations(CHOSEN_WHEELSET, 60.0), implementation("mujoco")(CHOSEN_WHEELSET, 60.0)
+    equations, engine = Equations(CHOSEN_WHEELSET, 60.0), equations_class("mujoco")(CHOSEN_WHEELSET, 60.0)
     state = equations.displaced_state(3e-3)
     right = largest_relative_difference(engine.rates(state), equations.rates(state))
     with faults.creep_law_patch(faults.spin_reversed)()():

@@ -16,7 +16,7 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.theories import Simplified
-from models.systems.contact.run import interpenetrating
+from models.systems.contact.run import interpenetration_contact
 from models.systems.contact.work_precision import ContactCase
 from validation.contact.contact_set import FITTED_PART, FRICTION, LOAD, read_contacts, read_drawn, read_wide
 
@@ -69,7 +69,7 @@ def theory_forces(name: str, cases: list[ContactCase], cells: int) -> Array:
     axes, motions = _arrays_of_contacts(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":
-        pressed = [interpenetrating(by_axes(c.a, c.b, c.pair, load=LOAD), c.pair) for c in cases]
+        pressed = [interpenetration_contact(by_axes(c.a, c.b, c.pair, load=LOAD), c.pair) for c in cases]
         theory_forces = [Simplified(p, FRICTION).roll(c.motion, cells) for p, c in zip(pressed, cases, strict=True)]
         return np.array([(force.fx, force.fy, force.mz) for force in theory_forces]) / unit
     kind, bound = name.split()

@@ -10,7 +10,7 @@ from models.contact.hertz import by_axes
 from models.contact.simplified_theory import FINE_CELLS, PAPER, NormalContact, Rolling, roll
 from models.machine.seconds import cost
 from models.machine.timing import interleave
-from models.systems.contact.run import interpenetrating
+from models.systems.contact.run import interpenetration_contact
 from models.systems.contact.work_precision import ContactCase
 from validation.common.rows import Table
 
@@ -32,7 +32,7 @@ def compare_programs(cases: list[ContactCase]) -> dict[str, Any]:
         return roll(pressed[case.a, case.b], case.friction, *case.motion)
 
     def error(case: ContactCase, forces: Creep | Rolling) -> float:
-        return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.limit - case.force)))
+        return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.friction_limit - case.force)))
 
     errors = {
         "1982": [error(case, program_1982(case)) for case in cases],
@@ -50,7 +50,7 @@ PROGRAM_OF_1982: dict[str, Any] = {"cells": FINE_CELLS, "march": "plain", "flexi
 
 
 def _normal_contact(case: ContactCase) -> NormalContact:
-    return interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
+    return interpenetration_contact(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
 
 
 def _normal_errors(case: ContactCase, pressed: NormalContact) -> dict[str, float]:

@@ -20,13 +20,13 @@ from models.engines.stability import first_order, linearised
 from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.effects.kalman_filter import PULL_BANDWIDTH, guide_of
 from models.systems.pitch_plane.pitch_filter import (
-    KEPT_STATES,
+    FILTERED_STATES,
     PITCH,
     PITCH_RATE,
     RELATIVE_STATES,
-    Measurement,
     PitchEstimate,
-    estimate,
+    PitchMeasurement,
+    estimate_pitch,
 )
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
@@ -113,8 +113,8 @@ def filter_consistency(
     noisy = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
     figures = {}
     for name, (q, r) in scales.items():
-        measurement = Measurement(measured_pitch[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
-        filtered = estimate(noisy, measurement, force * np.sqrt(q), start_deviation=START_DEVIATION)
+        measurement = PitchMeasurement(measured_pitch[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
+        filtered = estimate_pitch(noisy, measurement, force * np.sqrt(q), start_deviation=START_DEVIATION)
         first = round(1 / COARSE_PERIOD)
         figures[name] = (
             normalised_estimation_error(filtered, states),
@@ -175,7 +175,7 @@ def relative_state_matrices(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]
     p = assembly.parameters
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, KEPT_STATES], RELATIVE_STATES @ pushes
+    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, FILTERED_STATES], RELATIVE_STATES @ pushes
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -294,7 +294,9 @@ def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str,
     assembly = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
     clean = true.states
     measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
-    estimated = estimate(assembly, Measurement(measured_rate[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force)
+    estimated = estimate_pitch(
+        assembly, PitchMeasurement(measured_rate[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force
+    )
     p, sure = assembly.parameters, np.sqrt(estimated.error_covariances()[:, PITCH, PITCH])
     inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
     growth = root_mean_square(true["pitch_rate"]) * np.sqrt(p.I / inertia)

@@ -9,7 +9,7 @@ import numpy as np
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.energy import bodies_energy
-from models.systems.handling.run import build
+from models.systems.handling.run import build_in_engine
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
@@ -36,7 +36,7 @@ def car_in_a_turn(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray
 
 def _accelerations(engine: str, steer: float = 0.05) -> np.ndarray:
     car, q, v = car_in_a_turn(steer)
-    return build(engine, car).acceleration(0.0, q, v)
+    return build_in_engine(engine, car).acceleration(0.0, q, v)
 
 
 @cache
@@ -59,7 +59,7 @@ def _read_report(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarra
 def _energy_balance_error() -> float:
     """Error of the car's energy balance along its motion, divided by the largest power of a tyre."""
     car, q, v = car_in_a_turn()
-    a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read_report(car, q, v)
+    a, (report, ledger) = build_in_engine("mujoco", car).acceleration(0.0, q, v), _read_report(car, q, v)
     ends = [
         bodies_energy(car, state, rate) + _read_report(car, state, rate)[1][at.POTENTIAL]
         for state, rate in ((q + time_shift * v, v + time_shift * a) for time_shift in (1e-5, -1e-5))

@@ -17,7 +17,7 @@ from models.multibody import cut_kernel as cut_at
 from models.multibody import forces as at
 from models.multibody.cut_table import HubInputs
 from models.multibody.parts import FRAME, PER_PART
-from models.systems.handling.run import REFERENCE, build
+from models.systems.handling.run import REFERENCE_ENGINE, build_in_engine
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import Preloads
 from validation.common.checks import largest_relative_difference
@@ -34,7 +34,9 @@ def _car_difference(name: str = "twin") -> float:
     plain equations."""
     car = rolling_cars()[name]
     ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
-    return largest_relative_difference(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
+    return largest_relative_difference(
+        *(build_in_engine(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE_ENGINE))
+    )
 
 
 def _hub_twin_difference(choose: Callable[[list[HubInputs]], HubInputs]) -> float:

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from models.core.noise import PITCH_SENSOR, normal_samples
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
-from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE_STATES, Measurement, PitchStep, estimate
+from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE_STATES, PitchMeasurement, PitchStep, estimate_pitch
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
@@ -98,8 +98,8 @@ def certain_start_error(engine: str, folder: Path) -> float:
         ),
     )
     measured_pitch = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
-    estimated = estimate(
-        assembly, Measurement(measured_pitch, SAMPLE_PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0
+    estimated = estimate_pitch(
+        assembly, PitchMeasurement(measured_pitch, SAMPLE_PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0
     )
     P = estimated.error_covariances()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))

@@ -23,7 +23,7 @@ from models.engines.spatial_reference import SpatialReference
 from models.road.iso8608 import iso8608_road
 from models.road.polyline import PolylineProfile
 from models.road.signal import RoadUnderWheels
-from models.systems.hub_forces.measurement import true_run, two_tracks
+from models.systems.hub_forces.measurement import road_under_wheels, true_run
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
@@ -167,7 +167,7 @@ def hub_force_in_air(engine: str, folder: Path) -> float:
     infinite if no wheel is."""
     car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
     left, right = (iso8608_road("F", seed) for seed in (1, 2))
-    drive = two_tracks(car, left, right, 20.0, 1e-3, 1500)
+    drive = road_under_wheels(car, left, right, 20.0, 1e-3, 1500)
     wrenches = true_run(engine, car, drive, "inertial", 1e-3, 1.5).wrenches
     air = wrenches[:, :, 2] <= 0.0
     return float(np.abs(wrenches[air]).max()) if air.any() else np.inf

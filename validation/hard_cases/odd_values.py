@@ -26,8 +26,8 @@ from models.ride.covariance import lyapunov_solution
 from models.ride.measures import dynamic_load_factor, time_share_beyond
 from models.ride.nonlinear_copies import copies_in_time
 from models.road.excitation import Excitation
-from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.tilt_filter import Deviations, estimate
+from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
+from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build
 from models.vehicles.cut_vehicle import cut
@@ -101,10 +101,12 @@ def scaled_drift_off_error(implementation: str, folder: Path) -> float:
 def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
     """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
     the filter's deviations divided by the stated ones."""
-    vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
+    vehicle, angles = cut(load_vehicle("r19_free"), "body"), MeasuredAngles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
     fits = [
-        estimate(vehicle, forces, angles, Deviations(np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0))
+        estimate_tilt(
+            vehicle, forces, angles, StatedDeviations(np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0)
+        )
         for noise in (1.0, 8.0)
     ]
     return max(float(np.nan_to_num(fit.deviations / 1e-12, nan=np.inf).max()) for fit in fits)

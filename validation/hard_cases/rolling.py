@@ -17,7 +17,7 @@ from models.rail.eigenvalues import free_wheelset
 from models.rail.equations import Equations
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
-from models.systems.wheelset.of_scene import implementation as kind_of
+from models.systems.wheelset.of_scene import equations_class as kind_of
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
 KINDS = {name: kind_of(name) for name in IMPLEMENTATIONS}

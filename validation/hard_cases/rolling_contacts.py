@@ -29,7 +29,7 @@ from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULARISED_SPEED
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.handling.energy import drive_energy
-from models.systems.handling.run import Drive, build, drive_of_fixed_steps, drive_run
+from models.systems.handling.run import SimulatedDrive, build_in_engine, drive_of_fixed_steps, drive_run
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
 from validation.hard_cases.rolling import built_wheelset, displaced_state
@@ -121,26 +121,26 @@ def patch_jump_energy_error(implementation: str, folder: Path) -> float:
     return float(np.abs(book.residual).max() / book.creep[-1])
 
 
-def car_run(implementation: str, handling: Handling, speed: float, duration: float, step: float) -> Drive:
+def car_run(implementation: str, handling: Handling, speed: float, duration: float, step: float) -> SimulatedDrive:
     """Run of a car on its tyres in an implementation, from a speed (m/s); duration and step in s."""
     if implementation != "reference":
         return drive_run(implementation, handling, speed, duration, step)
-    model, start = build("mujoco", handling), handling.straight(speed)
+    model, start = build_in_engine("mujoco", handling), handling.straight(speed)
     states = march(lambda _, q, v: model.acceleration(0.0, q, v), *start, round(duration / step), step)
     return drive_of_fixed_steps(handling, Trajectory(step * np.arange(len(states)), states))
 
 
-def violates_friction(run: Drive) -> bool:
+def violates_friction(run: SimulatedDrive) -> bool:
     """Whether a tyre contact of a run gains energy, or its force exceeds mu N."""
     force = np.hypot(run["fx"], run["fy"])
-    return bool(run["power"].max() > 0.0 or (force > run.grip() * (1.0 + 1e-9)).any())
+    return bool(run["power"].max() > 0.0 or (force > run.largest_tyre_forces() * (1.0 + 1e-9)).any())
 
 
-def energy_balance_error(run: Drive) -> float:
+def energy_balance_error(run: SimulatedDrive) -> float:
     """Error of the energy balance over a run with equal steps, divided by the initial energy."""
     run_times, ends = run.run.times, [0, -1]
     run_ends = Trajectory(run_times[ends], run.run.states[ends])
-    first_energy, last_energy = drive_energy(Drive(run.handling, run_ends, run.tyres[ends], run.ledger[ends]))
+    first_energy, last_energy = drive_energy(SimulatedDrive(run.handling, run_ends, run.tyres[ends], run.ledger[ends]))
     return float(abs(last_energy - first_energy - simpson(run.power(), x=run_times)) / first_energy)
 
 
@@ -164,7 +164,7 @@ def creep_when_parked(implementation: str, folder: Path) -> float:
 def locked_wheel_error(implementation: str, folder: Path) -> float:
     """Case: a car with locked wheels. Error: relative difference of the tyre forces from mu N against the sliding."""
     run = car_run(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
-    return float(np.abs(run["fx"] / run.grip() + 1.0).max())
+    return float(np.abs(run["fx"] / run.largest_tyre_forces() + 1.0).max())
 
 
 def roll_back_error(implementation: str, folder: Path) -> float:

@@ -15,7 +15,7 @@ from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import AttitudeHold, SectionRun, run
+from models.systems.measured.section_run import AttitudeHold, SectionRunSettings, run
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.common.peak_memory import peak_memory
@@ -95,11 +95,11 @@ def section_run_of_recording(
     engine: str = "mujoco",
     hold: AttitudeHold | None = None,
     step: float | None = None,
-) -> SectionRun:
+) -> SectionRunSettings:
     """A run that computes section forces from the long recording in this folder. The recording is created if it is
     missing."""
     recording = long_recording(seconds, folder / "recording.f64", pattern_seconds)
-    return SectionRun(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
+    return SectionRunSettings(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
 
 
 def computed_channel_bytes(folder: Path, name: str = "run") -> bytes:

@@ -13,7 +13,7 @@ from models.core.finding import Finding
 from models.measured.checks import check
 from models.measured.faults_of_measurement import Faults
 from models.measured.signal import HUB_COMPONENTS, TransducerPlace
-from models.systems.hub_forces.scene import Road
+from models.systems.hub_forces.scene import TwoTrackRoadTable
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.spatial import SpatialVehicle
@@ -121,7 +121,7 @@ def measurement(
     """Virtual measurement of a car on a road, with four accelerometers and a given sampling rate (Hz)."""
     kind, seed, speed, duration = road
     virtual = VirtualTable(
-        road=Road(iso8608=kind, seed=seed, speed=speed),
+        road=TwoTrackRoadTable(iso8608=kind, seed=seed, speed=speed),
         duration=duration,
         step=2e-3,
         sampling_rate=rate,

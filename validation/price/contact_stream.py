@@ -16,7 +16,7 @@ from models.contact.material import MaterialPair
 from models.ensemble.workers import process_pool
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
-from models.systems.contact.scene import Method
+from models.systems.contact.scene import ContactMethod
 from validation.common.peak_memory import peak_memory
 
 ROW_COUNTS = (100_000, 1_000_000)
@@ -48,7 +48,11 @@ def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
     write_table(folder / "cases.csv", row_count)
     start_time = time.perf_counter()
     counts = solve_table(
-        folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
+        folder / "cases.csv",
+        folder / "forces.csv",
+        partial(Built, MaterialPair()),
+        ContactMethod(cells=5),
+        with_errors=False,
     )
     if counts != {"rows": row_count, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {row_count} sound rows")

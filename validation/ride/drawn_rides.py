@@ -47,7 +47,7 @@ class NonlinearRide:
     def prepared_in_time(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
         """The random scene prepared for runs in time, with ``copies`` Monte Carlo copies."""
         options = {"copies": copies, "lasting": RUN_DURATION, "seed": seed}
-        return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
+        return in_time(replace(self.scene, ride_scene=self.scene.ride_scene.model_copy(update={"options": options})))
 
 
 class RandomNumbers:

@@ -13,7 +13,7 @@ from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import largest_error_seen, statistically_linear
 from models.road.excitation import Excitation
 from models.road.two_track import TRACK_DENSITY_LEVEL
-from models.systems.ride.nonlinear import Ride, drive_over_road
+from models.systems.ride.nonlinear import EngineRide, drive_over_road
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
@@ -54,9 +54,9 @@ def nonlinear_engine_rows(quick: bool) -> list[Row]:
             vehicle,
             road,
             NONLINEAR_DURATIONS[not quick],
-            seed=SEED,
-            skipped=SKIPPED_SECONDS * (not quick),
-            stride=5,
+            road_seed=SEED,
+            skipped_time=SKIPPED_SECONDS * (not quick),
+            steps_per_output=5,
         )
         for engine in ENGINES
     }
@@ -94,7 +94,7 @@ def nonlinear_engine_rows(quick: bool) -> list[Row]:
     return rows
 
 
-def _engine_difference_row(id: str, run_description: str, runs: dict[str, Ride]) -> Row:
+def _engine_difference_row(id: str, run_description: str, runs: dict[str, EngineRide]) -> Row:
     first, other_run = (runs[engine].run for engine in ENGINES)
     gap = max(np.abs(first.positions - other_run.positions).max(), np.abs(first.rates - other_run.rates).max())
     return Observed(
@@ -112,7 +112,9 @@ def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
     vehicle, excitation_ = vehicle_and_road("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
     runs = {
-        engine: drive_over_road(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, stride=2)
+        engine: drive_over_road(
+            engine, vehicle, road, RUN_DURATION, road_seed=SEED, skipped_time=SKIPPED_SECONDS, steps_per_output=2
+        )
         for engine in ENGINES
     }
     linear = linearise(vehicle)
@@ -143,7 +145,9 @@ def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
     return rows, _spectral_densities(runs, linear, excitation_)
 
 
-def _spectral_densities(runs: dict[str, Ride], linear_vehicle: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
+def _spectral_densities(
+    runs: dict[str, EngineRide], linear_vehicle: LinearVehicle, excitation: Excitation
+) -> dict[str, Any]:
     """One-sided spectral densities (1/Hz) of SHOWN_OUTPUTS: of the linear vehicle in closed form, and by Welch's method
     of each engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)

@@ -8,8 +8,8 @@ import numpy as np
 
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
-from models.systems.handling.run import Drive, drive_run
-from models.systems.handling.single_track import steady_turn
+from models.systems.handling.run import SimulatedDrive, drive_run
+from models.systems.handling.single_track import steady_turn_gains
 from models.vehicles.spatial import SpatialVehicle, hitch_of
 from models.vehicles.towing import hitch_load
 from validation.spatial.trains import caravan
@@ -69,7 +69,7 @@ def towed_turn(
     turns = []
     for steer in (SMALL_STEER, -SMALL_STEER):
         car = Handling(replace(vehicle, drags=()), controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
-        wanted = steady_turn(car, speed)
+        wanted = steady_turn_gains(car, speed)
         if change_handling is not None:
             change_handling(car)
         turns.append(drive_run("mujoco", car, speed, duration))
@@ -78,7 +78,7 @@ def towed_turn(
     return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.towed_headings)
 
 
-def final_headings(drive: Drive) -> list[float]:
+def final_headings(drive: SimulatedDrive) -> list[float]:
     """Final heading (rad) of each towed body relative to the car: the sum of the yaw angles of the hitches between
     them."""
     free = drive.handling.vehicle

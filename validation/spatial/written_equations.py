@@ -20,8 +20,8 @@ from models.multibody.plain.bristles import tyre_forces as plain_tyre_forces
 from models.multibody.plain.rolling import PlainRolling
 from models.road.iso8608 import iso8608_road
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import REFERENCE, build
-from models.systems.hub_forces.measurement import HubForces, two_tracks
+from models.systems.handling.run import REFERENCE_ENGINE, build_in_engine
+from models.systems.hub_forces.measurement import HubForces, road_under_wheels
 from models.tyre.bristles import brush_forces
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
 from models.vehicles.spatial import Curve, SpatialVehicle, hitch_of
@@ -94,7 +94,7 @@ def rolling_states(car: Handling, state_count: int) -> Iterator[tuple[float, np.
 def rolling_acceleration_difference(car: Handling, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
-    plain, model = build(REFERENCE, car), build(engine, car)
+    plain, model = build_in_engine(REFERENCE_ENGINE, car), build_in_engine(engine, car)
     states = rolling_states(car, state_count)
     return max(
         largest_relative_difference(model.acceleration(t, q, v), plain.acceleration(t, q, v)) for t, q, v in states
@@ -119,7 +119,9 @@ def report_difference(car: Handling, state_count: int) -> float:
 def rolling_path_difference(car: Handling, engine: str, duration: float) -> float:
     """Largest difference of a car's coordinates and rates between runs by an engine and by the plain equations."""
     settings = Settings("RK4", ROLLING_STEP, duration)
-    ours, theirs = (build(name, car, settings).run(*car.straight(SPEED)) for name in (engine, REFERENCE))
+    ours, theirs = (
+        build_in_engine(name, car, settings).run(*car.straight(SPEED)) for name in (engine, REFERENCE_ENGINE)
+    )
     return float(max(np.abs(ours.positions - theirs.positions).max(), np.abs(ours.rates - theirs.rates).max()))
 
 
@@ -181,7 +183,7 @@ def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, r
     steps = round(duration / STEP)
     if rough_road:
         left, right = (iso8608_road("C", seed) for seed in (1, 2))
-        hub_inputs = two_tracks(vehicle, left, right, SPEED, STEP, steps)
+        hub_inputs = road_under_wheels(vehicle, left, right, SPEED, STEP, steps)
     else:
         deviation = np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs))
         hub_inputs = (

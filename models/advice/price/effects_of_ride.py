@@ -26,7 +26,7 @@ from models.core.scene_effects import absent_effects, effect_sentences, with_eff
 from models.machine.timing import paired_ratio
 from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_without, refusal_reason
+from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, reduced_without, refusal_reason
 
 TIMED_STEPS = 500
 """Number of Runge-Kutta steps that are timed in every turn."""
@@ -70,7 +70,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
     )
 
 
-def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
+def _without_effect(full_scene: FullScene, effect: OmissibleEffect) -> Reduced | str:
     """The linear ride system without an effect, or the reason why it cannot be left out."""
     why = refusal_reason([effect])
     if why:

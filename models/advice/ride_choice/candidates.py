@@ -17,7 +17,7 @@ from models.advice.ride_choice.screen import Screen, exact_variances, variances_
 from models.core.errors import InputError
 from models.core.runge_kutta import RK4_STAGES
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_without
+from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, reduced_without
 from models.systems.ride.scene import RideScene
 
 SCREENED_SPEEDS = 3
@@ -31,7 +31,7 @@ rounding.
 VARIANCE_DIFFERENCE = 1e-9
 """Largest relative difference between a variance from eigenmodes and the one in extended precision."""
 
-EffectSet = frozenset[Effect]
+EffectSet = frozenset[OmissibleEffect]
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
@@ -88,7 +88,7 @@ class Candidates:
         """For a quantity, the row of the vehicle's output and the name of its weighting filter, "" if it has none."""
         weighted = {
             f"{name} {weighting_name}": (name, weighting_name)
-            for name, weighting_name in self.scene.ride.weighting.items()
+            for name, weighting_name in self.scene.ride_scene.weighting.items()
         }
         name, weighting_name = weighted.get(quantity, (quantity, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), weighting_name

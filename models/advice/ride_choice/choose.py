@@ -27,7 +27,7 @@ from models.advice.ride_choice.candidates import Candidates, EffectSet, cached_i
 from models.advice.ride_choice.march import Cost
 from models.advice.ride_choice.marched import confirms_step
 from models.systems.ride.omissions import TYRE_DAMPING
-from models.systems.ride.reduced_scene import Effect, refusal_reason
+from models.systems.ride.reduced_scene import OmissibleEffect, refusal_reason
 
 MOST_CONFIRMATIONS = 30
 """Largest number of sets of effects that are confirmed."""
@@ -58,8 +58,8 @@ class RideChoice:
     confirmations : choices that were confirmed. refusal_texts : reasons why promising effects were not left out.
     """
 
-    candidates: tuple[Effect, ...]
-    left_out: tuple[Effect, ...]
+    candidates: tuple[OmissibleEffect, ...]
+    left_out: tuple[OmissibleEffect, ...]
     predicted_change: np.ndarray
     confirmed_change: np.ndarray
     change_between_speeds: np.ndarray
@@ -155,7 +155,7 @@ class Chooser(Candidates):
     def choose(self) -> RideChoice:
         """The choice by greedy search, confirmed, without effects whose removal saves nothing at equal accuracy."""
         chosen, rounds = self._certified_choice()
-        unchanged, no_effects = np.zeros(len(self.rows)), frozenset[Effect]()
+        unchanged, no_effects = np.zeros(len(self.rows)), frozenset[OmissibleEffect]()
         looks = (self.confirmed_changes, self.changes_between_speeds, self.off)
         changes, between, perturbed_changes = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
@@ -204,7 +204,7 @@ class Chooser(Candidates):
         """The set of effects to leave out by greedy search, and the number of sets that were tested, also those that
         failed.
         """
-        steps_taken, refused_steps, rounds = [frozenset[Effect]()], set[EffectSet](), 0
+        steps_taken, refused_steps, rounds = [frozenset[OmissibleEffect]()], set[EffectSet](), 0
         while rounds < MOST_CONFIRMATIONS:
             path = self.path(steps_taken, refused_steps)
             if path == steps_taken:
@@ -249,7 +249,7 @@ class Chooser(Candidates):
             1 + EQUAL_COST_LOG
         )
 
-    def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[Effect, float]:
+    def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[OmissibleEffect, float]:
         """Largest relative change for each effect that stayed, if it were left out as well with what it needs: with a
         larger tolerance than this, it could be. Only legal sets and finite changes.
         """
@@ -303,7 +303,7 @@ class Chooser(Candidates):
         """The set of effects that saves the most for what it adds to the predicted error; empty if none keeps the
         tolerance.
         """
-        best, best_score, current_share = frozenset[Effect](), 0.0, self.share(omitted_effects)
+        best, best_score, current_share = frozenset[OmissibleEffect](), 0.0, self.share(omitted_effects)
         for step in self._smallest_sets():
             further = omitted_effects | step
             if (

@@ -22,7 +22,7 @@ from models.ride.statistical_linearisation import BentSpring, statistically_line
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import has_no_linear_equivalent
 from models.systems.ride.omissions import effects_of, wheels_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
+from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, refusal_reason
 from models.systems.ride.reduced_scene import reduced_without as without_effects
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
@@ -74,7 +74,7 @@ class CopiesInTime:
     scene: ReducedScene
     samples: Samples
     steps_at_speeds: tuple[CopySteps, ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[OmissibleEffect, ...]
     left_out: frozenset[str] = frozenset()
     step_factor: int = 1
     system = "ride"
@@ -82,7 +82,7 @@ class CopiesInTime:
     @property
     def file(self) -> str:
         """Name of the scene file."""
-        return self.scene.ride.file
+        return self.scene.ride_scene.file
 
     @property
     def effect_names(self) -> tuple[str, ...]:
@@ -97,11 +97,11 @@ class CopiesInTime:
     @property
     def absent_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene could have but does not name."""
-        return absent_effects(self.scene.ride)
+        return absent_effects(self.scene.ride_scene)
 
     def with_effect(self, name: str) -> "CopiesInTime":
         """The copies with an absent effect added at its usual values; InputError where the effect cannot be added."""
-        scene = ReducedScene.complete(with_effects(self.scene.ride, name))
+        scene = ReducedScene.complete(with_effects(self.scene.ride_scene, name))
         _check(scene)
         return replace(self, scene=scene)
 
@@ -165,7 +165,7 @@ def in_time(scene: ReducedScene) -> CopiesInTime:
     whose effects or weightings copies cannot represent.
     """
     _check(scene)
-    speeds, options = scene.ride.speeds, scene.ride.options
+    speeds, options = scene.ride_scene.speeds, scene.ride_scene.options
     assert speeds is not None
     samples = Samples.model_validate({key: value for key, value in options.items() if key in Samples.model_fields})
     paces = tuple(_copy_steps(scene, float(speed), samples.lasting) for speed in speeds.all())
@@ -175,7 +175,7 @@ def in_time(scene: ReducedScene) -> CopiesInTime:
 
 
 def _check(scene: ReducedScene) -> None:
-    ride = scene.ride
+    ride = scene.ride_scene
     if ride.vehicle.small_motion or not has_no_linear_equivalent(scene.vehicle):
         raise InputError(ride.file, "vehicle.file", ride.vehicle.file, "is linear, and has a closed form")
     if ride.speeds is None:
@@ -195,7 +195,7 @@ def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
     return CopySteps(speed, half, settling, counted, linear.springs)
 
 
-def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
+def _can_be_left_out(scene: ReducedScene, effect: OmissibleEffect) -> bool:
     """Whether a run in time can do without an effect and the parts that must leave with it."""
     reduced_scene = effect.without(scene)
     rigid = (spring for spring in scene.vehicle.springs if spring.name in reduced_scene.rigid)

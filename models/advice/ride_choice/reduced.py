@@ -127,7 +127,7 @@ class Roads:
         """Index number that is the same for scenes with the same road: the same road effects, and the same tables that
         add to the road.
         """
-        ride = scene.ride
+        ride = scene.ride_scene
         return self._numbers.index_of(ride, lambda: (ride.road, *tables_of(ride)))
 
     def excitation_of(self, scene: ReducedScene) -> Excitation:
@@ -233,7 +233,7 @@ class FullScene:
 
     def _weighted(self, reduced: Reduced) -> Reduced:
         """The system with the weighting filters of the scene's outputs added."""
-        weightings = self.scene.ride.weighting
+        weightings = self.scene.ride_scene.weighting
         if not weightings:
             return reduced
         system = system_with_weightings(reduced.system, weightings)
@@ -273,10 +273,10 @@ def _filter_state_maps(
     """Matrices from the filter states of the reduced road to those of the full road, axle by axle, and back; states
     that effects add are last.
     """
-    count, cutoff = full_road.G.shape[1], scene.ride.road.cutoff
+    count, cutoff = full_road.G.shape[1], scene.ride_scene.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto
-    if cutoff is not None and reduced_scene.ride.road.cutoff is None:
+    if cutoff is not None and reduced_scene.ride_scene.road.cutoff is None:
         onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
     added = np.eye(len(full_road.F) - len(onto), len(reduced_road.F) - len(back))
     onto, back = block_diag(onto, added), block_diag(back, added.T)

@@ -17,9 +17,9 @@ QUESTION_KEYS = ("quantities", "tolerance", "options")
 
 def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     """Write the reduced scene and its vehicle into a folder; returns the path of the scene file."""
-    scene = table_without_defaults(reduced_scene.ride)
+    scene = table_without_defaults(reduced_scene.ride_scene)
     vehicle_file = scene["vehicle"]["file"]
-    vehicle = reduced_tables(parse(vehicle_path(vehicle_file, reduced_scene.ride.folder)), reduced_scene)
+    vehicle = reduced_tables(parse(vehicle_path(vehicle_file, reduced_scene.ride_scene.folder)), reduced_scene)
     origin = f"Reduced by a choice of effects; the whole vehicle is {vehicle_file}."
     notes = f"{vehicle.get('notes', '').strip()}\n{origin}".strip()
     with (folder / VEHICLE_FILE_NAME).open("x") as file:
@@ -27,9 +27,9 @@ def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     table = {key: value for key, value in scene.items() if key not in QUESTION_KEYS and value != "auto"}
     road = dict(table.get("road", {}))
     if "file" in road:
-        road["file"] = str(reduced_scene.ride.path(road["file"], "road.file").resolve())
+        road["file"] = str(reduced_scene.ride_scene.path(road["file"], "road.file").resolve())
     changes = {
-        "title": f"{reduced_scene.ride.title}, less what was left out",
+        "title": f"{reduced_scene.ride_scene.title}, less what was left out",
         "system": "ride",
         "study": CLOSED_FORM_STUDY,
         "vehicle": {**scene["vehicle"], "file": VEHICLE_FILE_NAME},

@@ -4,14 +4,14 @@ from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.scene_effects import check as check_effects
 from models.core.scene_effects import effect_lines as effect_lines
-from models.systems.bicycle.run import REFERENCE, assumptions
+from models.systems.bicycle.run import REFERENCE_ENGINE, bicycle_assumptions
 from models.systems.bicycle.scene import BicycleScene
 
 
 def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
     """Check the effects and parameters of a bicycle scene before any file is written; raises InputError."""
     check_effects(scene)
-    if set(engines) != {REFERENCE}:
+    if set(engines) != {REFERENCE_ENGINE}:
         try:
             scene.bicycle_on_tyres()
         except InputError as error:
@@ -51,4 +51,4 @@ def describe(scene: BicycleScene) -> str:
         "reference": "plain equations, ideal rolling, DOP853, where --engine reference asks for it",
     }
     lines = [f"  {head:<10} {text}" for head, text in rows.items()]
-    return "\n".join([scene.title, *lines, *effect_lines(scene), *assumption_lines(assumptions(scene))])
+    return "\n".join([scene.title, *lines, *effect_lines(scene), *assumption_lines(bicycle_assumptions(scene))])

@@ -19,9 +19,9 @@ from models.engines.free_vehicle import FreeModel, free_model
 from models.multibody.forces import DISSIPATED, FX, FY, POTENTIAL, PRESS, STEER_POWER
 from models.systems.bicycle.scene import BicycleScene
 
-REFERENCE = "reference"
-COORDINATES = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
-COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
+REFERENCE_ENGINE = "reference"
+UNIT_OF_COORDINATE = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
+UNIT_OF_COORDINATE |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
 """Channels of the bicycle's coordinates with their units, in the order of ``models.bicycle.four_bodies``. Each has a
 second channel for its rate, whose name ends in _rate.
 """
@@ -32,7 +32,7 @@ bristles of the tyres begin to slide.
 """
 CHANNELS_WITH_ERROR = ("lean", "steer", "yaw")
 """Channels whose discretisation error is stated in the result."""
-UNACCOUNTED_ENERGY_SHARE = 1e-3
+LARGEST_UNACCOUNTED_ENERGY_SHARE = 1e-3
 """Largest share of the energy that a run may leave unaccounted for. Below 0.1 m/s the equations of the tyres are stiff,
 and long steps lose more.
 """
@@ -48,10 +48,10 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     error : whether the error of the time steps is estimated, by further runs in longer steps.
     """
     start_time = time.process_time()
-    ride = run_with_ideal_rolling(scene) if engine == REFERENCE else run_on_tyres(scene, engine, scene.run.step)
+    ride = run_with_ideal_rolling(scene) if engine == REFERENCE_ENGINE else run_on_tyres(scene, engine, scene.run.step)
     seconds = time.process_time() - start_time
     channels = dict[str, Channel]()
-    for i, (name, unit) in enumerate(COORDINATES.items()):
+    for i, (name, unit) in enumerate(UNIT_OF_COORDINATE.items()):
         channels[name] = Channel("time", ride.positions[:, i], unit)
         channels[f"{name}_rate"] = Channel("time", ride.rates[:, i], f"{unit}/s")
     encoder = scene.control.encoder_gain * ride.positions[:, STEER]
@@ -64,17 +64,17 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
         axes["wheel"] = Channel("wheel", ["rear", "front"])
     counts = {"steps": ride.steps}
     labelled = result(scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=ride)
-    with_assumptions(labelled, assumptions(scene))
+    with_assumptions(labelled, bicycle_assumptions(scene))
     if not error:
         return labelled
     return (
         not_estimated(labelled, "its steps are kept to a tolerance")
-        if engine == REFERENCE
+        if engine == REFERENCE_ENGINE
         else _with_step_error(labelled, scene)
     )
 
 
-def assumptions(scene: BicycleScene) -> list[Assumption]:
+def bicycle_assumptions(scene: BicycleScene) -> list[Assumption]:
     """Assumption of a bicycle run that only the wheels touch the ground, with its limits of the lean angle (rad)."""
     return [
         Assumption(
@@ -90,13 +90,15 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
 
 
 def run_on_tyres(
-    scene: BicycleScene, engine: str, step: float, duration: float | None = None, stride: int | None = None
+    scene: BicycleScene, engine: str, time_step: float, duration: float | None = None, steps_per_row: int | None = None
 ) -> Ride:
     """Run the bicycle on its tyres in an engine with a step (s). The work is summed over all steps. Recorded rows are
-    ``stride`` steps apart, by default at most LARGEST_ROW_SPACING (s); the last row is the end of the run.
+    ``steps_per_row`` steps apart, by default at most LARGEST_ROW_SPACING (s); the last row is the end of the run.
     """
     rolling, run = scene.bicycle_on_tyres(), scene.run
-    model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
+    model = free_model(
+        engine, rolling.driven, Settings("RK4", time_step, run.duration if duration is None else duration)
+    )
     path = model.run(*straight_rolling(rolling.bicycle, run.speed, run.lean_rate))
     fallen = np.abs(path.positions[:, LEAN]) > FALLEN_LEAN
     if fallen.any():
@@ -104,7 +106,7 @@ def run_on_tyres(
     tyres, ledger = rolling.report(path.positions, path.rates)
     work = cumulative_simpson(ledger[:, DISSIPATED] + ledger[:, STEER_POWER], x=path.times, initial=0.0)
     step_count = len(path.times) - 1
-    kept_rows = slice(None, None, stride or _steps_between_rows(step_count, step))
+    kept_rows = slice(None, None, steps_per_row or _steps_between_rows(step_count, time_step))
     plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept_rows], path.rates[kept_rows]
     motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
     ride = Ride(
@@ -116,19 +118,21 @@ def run_on_tyres(
         step_count,
         tyres[kept_rows],
     )
-    if not ride.unaccounted() < UNACCOUNTED_ENERGY_SHARE:
-        why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
+    if not ride.unaccounted() < LARGEST_UNACCOUNTED_ENERGY_SHARE:
+        why = (
+            f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {time_step:g} s is too long"
+        )
         raise RunFailed(engine, why, float(path.times[-1]))
     return ride
 
 
-def _steps_between_rows(step_count: int, step: float) -> int:
+def _steps_between_rows(step_count: int, time_step: float) -> int:
     """Returns the largest number of steps between recorded rows such that rows are at most LARGEST_ROW_SPACING (s) and
     a twentieth of the run apart, and the last row is the end of the run.
 
-    step_count : number of steps of the run; step : their length (s).
+    step_count : number of steps of the run; time_step : their length (s).
     """
-    most_steps = max(1, min(int(LARGEST_ROW_SPACING / step * (1.0 + 1e-9)), step_count // 20))
+    most_steps = max(1, min(int(LARGEST_ROW_SPACING / time_step * (1.0 + 1e-9)), step_count // 20))
     return next(stride for stride in range(most_steps, 0, -1) if step_count % stride == 0)
 
 
@@ -140,53 +144,53 @@ def run_with_ideal_rolling(scene: BicycleScene) -> Ride:
     return bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
 
 
-def _with_step_error(run: Result, scene: BicycleScene) -> Result:
+def _with_step_error(run_result: Result, scene: BicycleScene) -> Result:
     """Returns the result with the error that its finite time steps cause, estimated by runs in longer steps."""
-    ride, engine, duration = run.detail, run.data.attrs["engine"], scene.run.duration
+    ride, engine, duration = run_result.detail, run_result.data.attrs["engine"], scene.run.duration
     stride = _steps_between_rows(
         ride.steps, scene.run.step
     )  # in steps of any length: rows of longer ones are among these rows
 
     def series(ride: Ride) -> Series:
-        columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in CHANNELS_WITH_ERROR}
+        columns = {name: ride.positions[:, list(UNIT_OF_COORDINATE).index(name)] for name in CHANNELS_WITH_ERROR}
         return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 
-    def rerun(factor: float, share: float) -> Series:
-        step = factor * scene.run.step
-        step_count = int(share * duration / step * (1.0 + 1e-9))
-        if factor > 1.0 and step_count < 2 * stride:
-            raise RunFailed(engine, f"steps of {step:g} s are too long for {share * duration:g} s")
+    def rerun(step_factor: float, run_share: float) -> Series:
+        step = step_factor * scene.run.step
+        step_count = int(run_share * duration / step * (1.0 + 1e-9))
+        if step_factor > 1.0 and step_count < 2 * stride:
+            raise RunFailed(engine, f"steps of {step:g} s are too long for {run_share * duration:g} s")
         step_count = max(step_count, 2 * stride)
         return series(run_on_tyres(scene, engine, step, step_count * step, stride))
 
     estimates, method_text = step_errors(series(ride), rerun, 4.0, scene.run.step)
-    return with_stated_errors(run, estimates, method_text)
+    return with_stated_errors(run_result, estimates, method_text)
 
 
-def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
+def lateral_matrix(free_model: FreeModel, rolling_bicycle: RollingBicycle, speed: float) -> np.ndarray:
     """State matrix (8, 8) of an engine's model, linearised about straight upright rolling at a speed (m/s). The state
     is lateral position (m), yaw, lean and steer (rad), then their rates.
     """
-    q, v = straight_rolling(rolling.bicycle, speed)
+    q, v = straight_rolling(rolling_bicycle.bicycle, speed)
     matrix = np.eye(8, 8, 4)
     for j in range(8):
         ends = []
         for displacement in (LINEARISATION_STEP, -LINEARISATION_STEP):
             state = np.array([q, v])
             state[j // 4, LATERAL_COORDINATES[j % 4]] += displacement
-            ends.append(model.acceleration(0.0, *state)[LATERAL_COORDINATES])
+            ends.append(free_model.acceleration(0.0, *state)[LATERAL_COORDINATES])
         matrix[4:, j] = np.subtract(*ends) / (2.0 * LINEARISATION_STEP)
     return matrix
 
 
-def engine_eigenvalues(engine: str, rolling: RollingBicycle, speed: float) -> np.ndarray:
+def engine_eigenvalues(engine: str, rolling_bicycle: RollingBicycle, speed: float) -> np.ndarray:
     """Eigenvalues (4,) in 1/s of the bicycle on its tyres in an engine: the nearest to each eigenvalue of the linear
     (Whipple) equations, in the same order.
 
     The other four eigenvalues are not returned. Two of them belong to the tyres and decay far faster; lateral position
     and yaw give a double zero.
     """
-    values = np.linalg.eigvals(lateral_matrix(free_model(engine, rolling.driven), rolling, speed))
+    values = np.linalg.eigvals(lateral_matrix(free_model(engine, rolling_bicycle.driven), rolling_bicycle, speed))
     kept_rows = np.sort(np.argsort(np.abs(values))[2:])  # without the double zero
-    wanted = rolling.bicycle.eigenvalues(speed, rolling.control)
+    wanted = rolling_bicycle.bicycle.eigenvalues(speed, rolling_bicycle.control)
     return np.array([values[kept_rows][np.argmin(np.abs(values[kept_rows] - value))] for value in wanted])

@@ -27,7 +27,7 @@ class BicycleTable(Strict):
     parameters: str = Field(default="benchmark", description="a parameter set, or a TOML file with every parameter")
 
 
-class RunTable(Strict):
+class BicycleRunTable(Strict):
     """[run]: a run that begins straight ahead and upright, with a lean rate."""
 
     speed: float = quantity("m/s", "speed at the start, backwards below 0", default=4.6, signed=True)
@@ -36,7 +36,7 @@ class RunTable(Strict):
     step: float = quantity("s", "step of Runge-Kutta 4 in engines", default=2e-4)
 
 
-class SpeedsTable(Strict):
+class EigenvalueSpeedsTable(Strict):
     """[speeds]: speeds at which eigenvalues are computed, evenly spaced from start to stop (backwards below 0)."""
 
     start: float = quantity("m/s", "first speed", default=0.0, signed=True)
@@ -52,8 +52,8 @@ class BicycleScene(SceneFile):
     bicycle: BicycleTable = BicycleTable()
     tyres: BicycleTyre = UNCHANGED_TYRE
     control: Control = Control()
-    speeds: SpeedsTable = SpeedsTable()
-    run: RunTable = RunTable()
+    speeds: EigenvalueSpeedsTable = EigenvalueSpeedsTable()
+    run: BicycleRunTable = BicycleRunTable()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     @cached_property
@@ -66,11 +66,11 @@ class BicycleScene(SceneFile):
         return extended_by_effects(RollingBicycle(self.whipple, self.tyres, self.control), self)
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BicycleScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> BicycleScene:
     """Build a checked bicycle scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(BicycleScene, table, file, folder)
+    scene = checked(BicycleScene, scene_tables, scene_path, scene_folder)
     run, speeds = scene.run, scene.speeds
     for key_path, value, largest, unit in (
         ("run.speed", run.speed, HIGHEST_SPEED, "m/s"),
@@ -79,14 +79,14 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Bi
         ("speeds.stop", speeds.stop, HIGHEST_SPEED, "m/s"),
     ):
         if abs(value) > largest:
-            raise InputError(file, key_path, value, f"must be from -{largest:g} to {largest:g} {unit}")
+            raise InputError(scene_path, key_path, value, f"must be from -{largest:g} to {largest:g} {unit}")
     if speeds.start >= speeds.stop:
-        raise InputError(file, "speeds.stop", speeds.stop, f"must be above speeds.start = {speeds.start:g} m/s")
+        raise InputError(scene_path, "speeds.stop", speeds.stop, f"must be above speeds.start = {speeds.start:g} m/s")
     if run.duration / run.step > MOST_STEPS:
-        raise InputError(file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
+        raise InputError(scene_path, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
     if not divides(run.step, run.duration):
         allowed = (
             f"must divide run.duration = {run.duration:g} s; use for example {dividing_step(run.step, run.duration)}"
         )
-        raise InputError(file, "run.step", run.step, allowed)
+        raise InputError(scene_path, "run.step", run.step, allowed)
     return with_effect_tables(scene)

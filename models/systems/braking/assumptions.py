@@ -16,7 +16,7 @@ from models.core.result import Result
 from models.systems.braking.march import BrakedVehicle
 from models.systems.braking.of_scene import measured_pressures_of, tyre_tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, Stop, wheel_names
+from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, StopHistory, wheel_names
 
 WITHOUT_VALVES = ("none", "slip_pi")
 """Controllers that never switch valves on and off."""
@@ -53,7 +53,7 @@ LEAST_SLIP_ANGLE = 1e-3
 """Slip angle (rad) below which side forces are too small to be wrong."""
 
 
-def assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> list[Assumption]:
+def assumptions(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle) -> list[Assumption]:
     """Assumptions of a braking procedure, about loads, course, tyres, brakes, steering, air drag and the end of the
     stop.
     """
@@ -61,7 +61,7 @@ def assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> 
         _load_assumptions(scene),
         _body_assumptions(scene, vehicle),
         _tyre_assumptions(scene, vehicle),
-        _brake_assumptions(scene, procedure, vehicle),
+        _brake_assumptions(scene, procedure_name, vehicle),
     )
     return [*chain.from_iterable(parts), *_drive_assumptions(scene, vehicle)]
 
@@ -90,21 +90,21 @@ def _load_assumptions(scene: BrakingScene) -> Iterator[Assumption]:
         )
 
 
-def _wheel_loads(run: Result) -> np.ndarray:
+def _wheel_loads(run_result: Result) -> np.ndarray:
     """Wheel loads (n, W) in N; NaN in the sample in which the vehicle comes to rest, as its deceleration there is not
     caused by tyre forces.
     """
-    loads = np.array(run["load"])
-    if run.detail.ended_at_rest:
+    loads = np.array(run_result["load"])
+    if run_result.detail.ended_at_rest:
         loads[-1] = np.nan
     return loads
 
 
-def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
+def _transferred_load(scene: BrakingScene, run_result: Result) -> Watched:
     """Load transfer divided by wheel load at rest, of truck and trailer over time, that the truck's accelerations would
     cause by the height of the centre of mass.
     """
-    states, path_times = run.detail.states, run.detail.times
+    states, path_times = run_result.detail.states, run_result.detail.times
     rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(path_times), 1e-9)[:, None]
     heading = states[1:, 0, 2]
     acceleration_along = np.abs(rates[:, 0] * np.cos(heading) + rates[:, 1] * np.sin(heading))
@@ -129,7 +129,7 @@ def _body_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[A
         "forwards",
         "the vehicle moves forwards",
         "name the effect anti_lock, or brake the rear axle less: the vehicle spins",
-        lambda run: {"vehicle": Stop(run.detail).side_slip},
+        lambda run: {"vehicle": StopHistory(run.detail).side_slip},
         "rad",
         -math.pi / 2,
         math.pi / 2,
@@ -183,35 +183,35 @@ def _has_spring_without_stops(vehicle: BrakedVehicle) -> bool:
     )
 
 
-def _hinge_angles(run: Result) -> Watched:
-    bends = np.diff(run.detail.states[:, 0, 2:], axis=1)
+def _hinge_angles(run_result: Result) -> Watched:
+    bends = np.diff(run_result.detail.states[:, 0, 2:], axis=1)
     return dict(zip(("drawbar against the truck", "trailer against the drawbar"), bends.T, strict=True))
 
 
-def _hitch_angles(run: Result) -> Watched:
-    columns = {name: i for i, name in enumerate(run.detail.coordinates) if name.endswith(HITCH_SUFFIX)}
-    return {name.removesuffix(HITCH_SUFFIX): run.detail.states[:, 0, i] for name, i in columns.items()}
+def _hitch_angles(run_result: Result) -> Watched:
+    columns = {name: i for i, name in enumerate(run_result.detail.coordinates) if name.endswith(HITCH_SUFFIX)}
+    return {name.removesuffix(HITCH_SUFFIX): run_result.detail.states[:, 0, i] for name, i in columns.items()}
 
 
-def _share_lifted_by_hook(scene: BrakingScene, run: Result) -> Watched:
+def _share_lifted_by_hook(scene: BrakingScene, run_result: Result) -> Watched:
     """Share of the load on the trailer's lighter axle that the hook force moves, over time. The hook force follows from
     the balance of longitudinal forces on the truck.
     """
-    trailer, path = scene.trailer, run.detail
+    trailer, path = scene.trailer, run_result.detail
     assert trailer is not None
     heading, slowed = path.states[1:, 0, 2], np.diff(path.states[:, 1, :2], axis=0)
     deceleration = slowed[:, 0] * np.cos(heading) + slowed[:, 1] * np.sin(heading)
-    pull = run["force_x"][1:, :4].sum(axis=1) - vehicle_of(scene).mass * deceleration / np.maximum(
+    pull = run_result["force_x"][1:, :4].sum(axis=1) - vehicle_of(scene).mass * deceleration / np.maximum(
         np.diff(path.times), 1e-9
     )
     span = trailer.wheelbase
     lighter = trailer.mass * GRAVITY * min(trailer.front.x, -trailer.rear.x) / span
     share = np.abs(pull) * HOOK_HEIGHT / span / lighter
-    return {"hook": _with_start_row(np.where(Stop(path).speed[1:] > SLOWEST_SLIP_SPEED, share, np.nan))}
+    return {"hook": _with_start_row(np.where(StopHistory(path).speed[1:] > SLOWEST_SLIP_SPEED, share, np.nan))}
 
 
-def _lean_angles(run: Result) -> Watched:
-    lean = Stop(run.detail).lean
+def _lean_angles(run_result: Result) -> Watched:
+    lean = StopHistory(run_result.detail).lean
     assert lean is not None
     return dict(zip(("roll", "pitch"), lean.T, strict=True))
 
@@ -249,21 +249,23 @@ def _tyre_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[A
         )
 
 
-def _resolved_speed(vehicle: BrakedVehicle, run: Result) -> Watched:
+def _resolved_speed(vehicle: BrakedVehicle, run_result: Result) -> Watched:
     """Least speed (m/s) at which the time steps resolve slip angles, for samples where tyres corner below this speed;
     NaN elsewhere.
     """
     lively = GRAVITY if vehicle.sprung is None else vehicle.engine.liveliness
     least_resolved = vehicle.slope * lively * vehicle.sample / vehicle.substeps
-    angles = np.nanmax(np.nan_to_num(np.abs(run["slip_angle"])), axis=1)
+    angles = np.nanmax(np.nan_to_num(np.abs(run_result["slip_angle"])), axis=1)
     return {
         "vehicle": np.where(
-            (angles > LEAST_SLIP_ANGLE) & (Stop(run.detail).speed < least_resolved), least_resolved, np.nan
+            (angles > LEAST_SLIP_ANGLE) & (StopHistory(run_result.detail).speed < least_resolved),
+            least_resolved,
+            np.nan,
         )
     }
 
 
-def _brake_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
+def _brake_assumptions(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Yields assumptions on brake pressures, brake work and the valves that set the pressures."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
@@ -293,7 +295,7 @@ def _brake_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehic
             "m/s",
             upper_limit=port.signals.range,
         )
-    measured = measured_pressures_of(scene, procedure, vehicle.plane.wheels)
+    measured = measured_pressures_of(scene, procedure_name, vehicle.plane.wheels)
     if measured is not None:
         yield Assumption(
             "measured pressures",
@@ -313,10 +315,10 @@ def _brake_assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehic
     )
 
 
-def _brake_work(run: Result) -> Watched:
+def _brake_work(run_result: Result) -> Watched:
     """Work (n, W) in J that each wheel's brake has done up to each sample."""
-    power = run["torque"] * np.abs(run["turning"])
-    steps = np.diff(run.times)[:, None] * 0.5 * (power[1:] + power[:-1])
+    power = run_result["torque"] * np.abs(run_result["turning"])
+    steps = np.diff(run_result.times)[:, None] * 0.5 * (power[1:] + power[:-1])
     return _by_wheel_name(np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0))))
 
 
@@ -343,38 +345,38 @@ def _drive_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[
         "stop",
         "the vehicle stands at the end",
         "raise run.duration",
-        lambda run: {"vehicle": np.zeros(1) if run.detail.ended_at_rest else Stop(run.detail).speed[-1:]},
+        lambda run: {"vehicle": np.zeros(1) if run.detail.ended_at_rest else StopHistory(run.detail).speed[-1:]},
         "m/s",
         upper_limit=0.0,
     )
 
 
-def _steer_angles(vehicle: BrakedVehicle, run: Result) -> Watched:
+def _steer_angles(vehicle: BrakedVehicle, run_result: Result) -> Watched:
     if vehicle.steering is None:
         return {"front wheels": np.full(1, vehicle.steer[0])}
-    return {"front wheels": np.array([vehicle.steering(float(time))[0] for time in run.times])}
+    return {"front wheels": np.array([vehicle.steering(float(time))[0] for time in run_result.times])}
 
 
-def _drag_work_share(scene: BrakingScene, mass: float, run: Result) -> Watched:
-    """Work of air drag over a stop, divided by the initial kinetic energy of ``mass`` (kg). The drag is that of a box
-    as wide as the track and twice as high as the centre of mass.
+def _drag_work_share(scene: BrakingScene, vehicle_mass: float, run_result: Result) -> Watched:
+    """Work of air drag over a stop, divided by the initial kinetic energy of ``vehicle_mass`` (kg). The drag is that of
+    a box as wide as the track and twice as high as the centre of mass.
     """
-    truck, stop = vehicle_of(scene), Stop(run.detail)
+    truck, stop = vehicle_of(scene), StopHistory(run_result.detail)
     drag = 0.5 * AIR_DENSITY * DRAG_COEFFICIENT * truck.front.track * 2.0 * truck.height
-    work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
-    return {"vehicle": np.full(1, work / (0.5 * mass * stop.speed[0] ** 2))}
+    work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.distance_travelled)))
+    return {"vehicle": np.full(1, work / (0.5 * vehicle_mass * stop.speed[0] ** 2))}
 
 
-def _by_wheel_name(values: np.ndarray) -> Watched:
+def _by_wheel_name(wheel_values: np.ndarray) -> Watched:
     """Returns the columns of values (n, W) by wheel name."""
-    return dict(zip(wheel_names(values.shape[1]), values.T, strict=True))
+    return dict(zip(wheel_names(wheel_values.shape[1]), wheel_values.T, strict=True))
 
 
-def _while_moving(run: Result, values: np.ndarray) -> np.ndarray:
+def _while_moving(run_result: Result, wheel_values: np.ndarray) -> np.ndarray:
     """Returns values (n, W) with NaN at samples in which the vehicle is not faster than SLOWEST_SLIP_SPEED."""
-    return np.where(Stop(run.detail).speed[:, None] > SLOWEST_SLIP_SPEED, values, np.nan)
+    return np.where(StopHistory(run_result.detail).speed[:, None] > SLOWEST_SLIP_SPEED, wheel_values, np.nan)
 
 
-def _with_start_row(values: np.ndarray) -> np.ndarray:
+def _with_start_row(sampled_values: np.ndarray) -> np.ndarray:
     """Returns values (n, ...) with a row of NaN before them, for the start of a run, which has no value."""
-    return np.concatenate((np.full((1, *values.shape[1:]), np.nan), values))
+    return np.concatenate((np.full((1, *sampled_values.shape[1:]), np.nan), sampled_values))

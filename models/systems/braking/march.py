@@ -22,7 +22,7 @@ from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, check_way
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
-MOST_SAMPLES_AT_ONCE = 1024
+LARGEST_SAMPLE_BATCH = 1024
 """Most samples that are computed at a time where the controller's command is constant."""
 
 
@@ -97,14 +97,19 @@ class BrakedVehicle:
         state[1, 0] = speed
         return StartState(state, speed / self.plane.radius)
 
-    def run(self, controller: Controller, start: float | StartState, duration: float = 60.0) -> BrakingPath:
-        """Run the vehicle from a start state, or from steady rolling along x at a speed (m/s), for at most ``duration``
-        (s).
+    def run(
+        self, controller: Controller, start_or_speed: float | StartState, longest_duration: float = 60.0
+    ) -> BrakingPath:
+        """Run the vehicle from a start state, or from steady rolling along x at a speed (m/s), for at most
+        ``longest_duration`` (s).
 
         The brake switch closes at ``switch_time``; until then all valves release, whatever valve states the controller
         commands. Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
-        start_state, wheels = start if isinstance(start, StartState) else self.rolling(start), self.plane.wheels
+        start_state, wheels = (
+            start_or_speed if isinstance(start_or_speed, StartState) else self.rolling(start_or_speed),
+            self.plane.wheels,
+        )
         check_way(self.road, self.sample / self.substeps * float(np.hypot(*start_state.state[1, :2])))
         current_row = row(start_state.state.shape[1], wheels)
         current_row.state[:], current_row.turning[:] = start_state.state, start_state.turning
@@ -112,12 +117,12 @@ class BrakedVehicle:
             np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy()
         )
         steady = self.steering is None and is_steady(controller)
-        samples_at_once = int(min(duration / self.sample + 2.0, MOST_SAMPLES_AT_ONCE)) if steady else 1
+        samples_at_once = int(min(longest_duration / self.sample + 2.0, LARGEST_SAMPLE_BATCH)) if steady else 1
         record = Record(
             current_row.whole,
             np.empty((samples_at_once, current_row.whole.size)),
             np.zeros(1, dtype=np.int64),
-            duration - 1e-9,
+            longest_duration - 1e-9,
         )
         states = STATES_WITH_SLOW_APPLY if self.chambers.slow.size else VALVE_STATES
         beyond = (
@@ -152,21 +157,23 @@ class BrakedVehicle:
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
-        self, commands: Commands, record: Record, row: Row, motion: PlaneMotion
+        self, commands: Commands, sample_record: Record, sample_row: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
-        """Returns the iterator that integrates the motion sample by sample from the state in ``row`` and ``motion``; it
-        yields status, time (s), speed (m/s) and supply pressure (bar).
+        """Returns the iterator that integrates the motion sample by sample from the state in ``sample_row`` and
+        ``motion``; it yields status, time (s), speed (m/s) and supply pressure (bar).
         """
-        air = resting_chambers(self.chambers, self.sample)._replace(pressure=row.pressure, torque=row.torque)
+        air = resting_chambers(self.chambers, self.sample)._replace(
+            pressure=sample_row.pressure, torque=sample_row.torque
+        )
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
-        go, arguments = by_steps, [commands, record, self.sample, braking, motion, self.on_road]
+        go, arguments = by_steps, [commands, sample_record, self.sample, braking, motion, self.on_road]
         if self.relaxation is not None:
             from models.brake.relaxation import Lag, by_lagging_steps
 
             # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady
             # one
-            angle = np.full(self.plane.wheels, np.nan if row.state[1, 1:].any() else 0.0)
+            angle = np.full(self.plane.wheels, np.nan if sample_row.state[1, 1:].any() else 0.0)
             go, arguments = by_lagging_steps, [*arguments, Lag(self.relaxation, angle)]
         moving: Iterator[tuple[int, float, float, float]] = (go if self.engine is None else self.engine.moving)(
             *arguments
@@ -174,8 +181,8 @@ class BrakedVehicle:
         return moving
 
 
-def on_tyres(
-    plane: Plane,
+def braked_vehicle_on_tyres(
+    plane_vehicle: Plane,
     tyres: Sequence[TyreTable],
     brakes: Brakes,
     chambers: Chambers,
@@ -186,7 +193,7 @@ def on_tyres(
 
     tyres : tyre tables, surface by surface and kind by kind; other_fields : further fields of ``BrakedVehicle``.
     """
-    zeros = np.zeros(plane.wheels)
+    zeros = np.zeros(plane_vehicle.wheels)
     slope = max(tyre.cornering for tyre in tyres)
     vehicle_fields = {
         "kind": zeros.astype(int),
@@ -195,28 +202,30 @@ def on_tyres(
         "slope": slope,
         **other_fields,
     }
-    return BrakedVehicle(plane=plane, road=road, brakes=brakes, chambers=chambers, **vehicle_fields)
+    return BrakedVehicle(plane=plane_vehicle, road=road, brakes=brakes, chambers=chambers, **vehicle_fields)
 
 
-def _write_command(commands: Commands, command: Command, braked: bool) -> None:
+def _write_command(commands: Commands, command: Command, brake_switch_closed: bool) -> None:
     """Write a controller's command into ``commands`` for the next sample; valves release until the brake switch
     closes.
     """
     if command.pressures is not None:
         commands.pressures[:] = command.pressures
     else:
-        commands.valves[:] = command.valves if braked else RELEASE
+        commands.valves[:] = command.valves if brake_switch_closed else RELEASE
         commands.pressures[0] = math.nan
 
 
-def _move_rows(rows: list[np.ndarray], record: Record) -> None:
-    """Append a copy of the recorded rows to ``rows``, and empty the record."""
-    rows.append(record.rows[: record.left[0]].copy())
-    record.left[0] = 0
+def _move_rows(recorded_rows: list[np.ndarray], sample_record: Record) -> None:
+    """Append a copy of the recorded rows to ``recorded_rows``, and empty the record."""
+    recorded_rows.append(sample_record.rows[: sample_record.left[0]].copy())
+    sample_record.left[0] = 0
 
 
-def _braking_path(rows: list[np.ndarray], row: Row, stands: bool, names: tuple[str, ...]) -> BrakingPath:
-    all_of = parts(rows, row)
+def _braking_path(
+    recorded_rows: list[np.ndarray], last_row: Row, stands_at_end: bool, coordinate_names: tuple[str, ...]
+) -> BrakingPath:
+    all_of = parts(recorded_rows, last_row)
     return BrakingPath(
         all_of.time[:, 0],
         all_of.state,
@@ -224,6 +233,6 @@ def _braking_path(rows: list[np.ndarray], row: Row, stands: bool, names: tuple[s
         all_of.pressure,
         all_of.torque,
         Report(*np.moveaxis(all_of.report[1:], 1, 0)),
-        stands,
-        names,
+        stands_at_end,
+        coordinate_names,
     )

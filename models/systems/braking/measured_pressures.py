@@ -20,10 +20,10 @@ FASTEST_WHEEL_SPEED = 150.0
 """Largest circumferential speed (m/s) of a wheel that a file may have."""
 
 
-def wheel_names(wheels: int) -> tuple[str, ...]:
+def wheel_names(wheel_count: int) -> tuple[str, ...]:
     """Names of the wheels in files: fl, fr, rl, rr for four wheels; 1l, 1r, 2l and so on for another number."""
-    axles = ("f", "r") if wheels == 4 else tuple(str(axle + 1) for axle in range((wheels + 1) // 2))
-    return tuple(axles[i // 2] + "lr"[i % 2] for i in range(wheels))
+    axles = ("f", "r") if wheel_count == 4 else tuple(str(axle + 1) for axle in range((wheel_count + 1) // 2))
+    return tuple(axles[i // 2] + "lr"[i % 2] for i in range(wheel_count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,54 +60,59 @@ class MeasuredPressures:
         return np.sqrt(((wheel_speeds[shared] - measured) ** 2).mean(axis=0))
 
 
-def read_pressures(path: str | Path, wheels: int, sample_period: float = SAMPLE) -> MeasuredPressures:
+def read_pressures(csv_path: str | Path, wheel_count: int, sample_period: float = SAMPLE) -> MeasuredPressures:
     """Reads measured pressures of a number of wheels from a CSV file with units. Raises InputError for a file that
     cannot be used.
     """
-    names, header = wheel_names(wheels), _header_line(path)
+    names, header = wheel_names(wheel_count), _header_line(csv_path)
     columns = {"time": SECONDS, **{f"pressure_{name}": FACTOR_TO_BAR for name in names}}
     measured = "speed" in header
     if measured:
         columns |= {f"speed_{name}": FACTOR_TO_METRES_PER_SECOND for name in names}
-    table = read_table(path, columns, increasing="time", least_rows=2)
+    table = read_table(csv_path, columns, increasing="time", least_rows=2)
     if table["time"][0] != 0.0:
-        raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
-    pressures = _columns_of_wheels(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
-    speeds = _columns_of_wheels(path, table, "speed", names, FASTEST_WHEEL_SPEED, "m/s") if measured else None
+        raise InputError(csv_path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
+    pressures = _columns_of_wheels(csv_path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
+    speeds = _columns_of_wheels(csv_path, table, "speed", names, FASTEST_WHEEL_SPEED, "m/s") if measured else None
     return MeasuredPressures(table["time"], pressures, speeds, sample_period)
 
 
-def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, wheel_speeds: np.ndarray) -> None:
+def write_pressures(csv_path: str | Path, times: np.ndarray, pressures: np.ndarray, wheel_speeds: np.ndarray) -> None:
     """Write a run's pressures to a file for ``read_pressures``: times (n,) in s, pressures (n, W) in bar, and wheel
     speeds (n, W) in m/s."""
     names, later = wheel_names(pressures.shape[1]), np.diff(times, prepend=-1.0) > 0.0
     columns = {"time": ("s", times[later])}
     for head, unit, values in (("pressure", "bar", pressures), ("speed", "m/s", wheel_speeds)):
         columns |= {f"{head}_{name}": (unit, values[later, i]) for i, name in enumerate(names)}
-    write_table(path, columns)
+    write_table(csv_path, columns)
 
 
 def _columns_of_wheels(
-    path: str | Path, table: dict[str, np.ndarray], heading: str, names: tuple[str, ...], largest: float, unit: str
+    csv_path: str | Path,
+    csv_columns: dict[str, np.ndarray],
+    heading_prefix: str,
+    wheel_names_in_file: tuple[str, ...],
+    largest_value: float,
+    unit: str,
 ) -> np.ndarray:
     """Returns the columns (n, W) of a quantity for all wheels. Raises InputError for a value that is not from 0 to
-    ``largest``.
+    ``largest_value``.
     """
-    for name in names:
-        column = table[f"{heading}_{name}"]
-        wrong = np.flatnonzero((column < 0.0) | (column > largest))
+    for name in wheel_names_in_file:
+        column = csv_columns[f"{heading_prefix}_{name}"]
+        wrong = np.flatnonzero((column < 0.0) | (column > largest_value))
         if wrong.size:
-            location = f"{heading}_{name} at {table['time'][wrong[0]]:g} s"
-            raise InputError(path, location, float(column[wrong[0]]), f"must be from 0 to {largest:g} {unit}")
-    return np.column_stack([table[f"{heading}_{name}"] for name in names])
+            location = f"{heading_prefix}_{name} at {csv_columns['time'][wrong[0]]:g} s"
+            raise InputError(csv_path, location, float(column[wrong[0]]), f"must be from 0 to {largest_value:g} {unit}")
+    return np.column_stack([csv_columns[f"{heading_prefix}_{name}"] for name in wheel_names_in_file])
 
 
-def _header_line(path: str | Path) -> str:
+def _header_line(csv_path: str | Path) -> str:
     """Returns the first line of a file that is no comment; "" if the file cannot be read, as ``read_table`` then says
     what is wrong.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
+        lines = Path(csv_path).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         return ""
     return next((line for line in lines if line.strip() and not line.startswith("#")), "")

@@ -19,9 +19,15 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
 from models.core.scene_file import parse
 from models.core.strict import read
-from models.systems.braking.march import BrakedVehicle, on_tyres
+from models.systems.braking.march import BrakedVehicle, braked_vehicle_on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
-from models.systems.braking.scene import MOST_SUBSTEPS, BrakeTable, BrakingScene, Procedure, Stretch
+from models.systems.braking.scene import (
+    LARGEST_SUBSTEP_COUNT,
+    AxleBrakeTable,
+    BrakingProcedure,
+    BrakingScene,
+    RoadStretch,
+)
 from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, table_from_file, table_of_named_tyre
 from models.tyre.tyre_table import TyreTable
 
@@ -29,7 +35,7 @@ SPRUNG_ENGINE = "mujoco"
 """Engine of a vehicle on its suspension where the user names none."""
 
 
-def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
+def braked_vehicle(scene: BrakingScene, procedure: BrakingProcedure) -> BrakedVehicle:
     """Build the scene's vehicle with its brakes on the road of a procedure. Raises InputError for inconsistent
     parts.
     """
@@ -44,7 +50,7 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
     on_front_unit = np.arange(plane.wheels) < 2
-    vehicle = on_tyres(
+    vehicle = braked_vehicle_on_tyres(
         plane,
         [tyre_table_of(scene, name, kind) for name in names for kind in kinds],
         of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
@@ -63,20 +69,24 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     return extended_by_effects(vehicle, scene)
 
 
-def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest: float) -> None:
-    """Raise InputError for time steps so long that the vehicle at rest would start to rock on its tyres. ``shortest`` :
-    shortest relaxation length (m).
+def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest_relaxation_length: float) -> None:
+    """Raise InputError for time steps so long that the vehicle at rest would start to rock on its tyres.
+    ``shortest_relaxation_length`` : shortest relaxation length (m).
     """
     from models.brake.relaxation import longest_step
 
     lively = GRAVITY if vehicle.engine is None else vehicle.engine.liveliness
-    longest = longest_step(vehicle.slope, lively, shortest)
+    longest = longest_step(vehicle.slope, lively, shortest_relaxation_length)
     if vehicle.sample / vehicle.substeps > longest:
         least_substeps = math.ceil(vehicle.sample / longest)
-        if least_substeps > MOST_SUBSTEPS:
-            length = shortest * (vehicle.sample / (MOST_SUBSTEPS * longest)) ** 2  # longest goes with its root
-            allowed = f"must be at least {1.01 * length:.2g} m: shorter ones need more than {MOST_SUBSTEPS} substeps"
-            raise InputError(scene.file, "relaxation", shortest, allowed)
+        if least_substeps > LARGEST_SUBSTEP_COUNT:
+            length = (
+                shortest_relaxation_length * (vehicle.sample / (LARGEST_SUBSTEP_COUNT * longest)) ** 2
+            )  # longest goes with its root
+            allowed = (
+                f"must be at least {1.01 * length:.2g} m: shorter ones need more than {LARGEST_SUBSTEP_COUNT} substeps"
+            )
+            raise InputError(scene.file, "relaxation", shortest_relaxation_length, allowed)
         allowed = f"must be at least {least_substeps}: at rest the vehicle rocks up on tyres of so short a [relaxation]"
         raise InputError(scene.file, "run.substeps", vehicle.substeps, allowed)
 
@@ -156,34 +166,34 @@ def vehicle_of(scene: BrakingScene) -> Truck:
     return vehicle
 
 
-def merged_tables(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def merged_tables(base_tables: Mapping[str, Any], changed_values: Mapping[str, Any]) -> dict[str, Any]:
     """Returns nested tables with some of their values changed; a table that gives another ``kind`` replaces the old
     table.
     """
-    new = dict(table)
-    for key, value in changes.items():
-        old = table.get(key)
+    new = dict(base_tables)
+    for key, value in changed_values.items():
+        old = base_tables.get(key)
         are_tables = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
         new[key] = merged_tables(old, value) if are_tables else value  # type: ignore[arg-type]
     return new
 
 
-def surfaces_of_stretch(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
+def surfaces_of_stretch(procedure: BrakingProcedure, stretch: RoadStretch) -> tuple[str, str]:
     """Names of the surfaces left and right of the line on a stretch; a split procedure may name the right surface."""
     return stretch.left, procedure.right or stretch.right or stretch.left
 
 
-def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
+def surfaces_of(scene: BrakingScene, procedure: BrakingProcedure) -> list[str]:
     """Names of all surfaces of the road of a procedure, without repetition."""
     return list(
         dict.fromkeys(name for stretch in scene.road.stretches for name in surfaces_of_stretch(procedure, stretch))
     )
 
 
-def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road:
-    """Returns the road of a procedure, with surfaces numbered by their index in ``names``."""
+def road_of(scene: BrakingScene, procedure: BrakingProcedure, surface_names: list[str]) -> Road:
+    """Returns the road of a procedure, with surfaces numbered by their index in ``surface_names``."""
     stretches = [
-        NumberedStretch(s.x, *(names.index(name) for name in surfaces_of_stretch(procedure, s)))
+        NumberedStretch(s.x, *(surface_names.index(name) for name in surfaces_of_stretch(procedure, s)))
         for s in scene.road.stretches
     ]
     try:
@@ -199,19 +209,21 @@ def tyre_kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
     return (False, True) if scene.tyres.own_rear else (False,)
 
 
-def tyre_table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
+def tyre_table_of(scene: BrakingScene, surface_name: str, for_rear_tyre: bool = False) -> TyreTable:
     """Returns the tyre table (friction over slip) of a surface, from a file of the scene if it names one, scaled as in
     [tyres].
     """
-    scale = scene.tyres.scale.get(name, 1.0)
+    scale = scene.tyres.scale.get(surface_name, 1.0)
     if not SCALE_BOUNDS[0] < scale <= SCALE_BOUNDS[1]:
-        raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
-    if name in scene.tyres.files:
-        table = table_from_file(scene.path(scene.tyres.files[name], f"tyres.files.{name}"))
-    elif name in SURFACE_NAMES:
-        table = table_of_named_tyre(name, rear)
+        raise InputError(scene.file, f"tyres.scale.{surface_name}", scale, "must be above 0 and at most 2")
+    if surface_name in scene.tyres.files:
+        table = table_from_file(scene.path(scene.tyres.files[surface_name], f"tyres.files.{surface_name}"))
+    elif surface_name in SURFACE_NAMES:
+        table = table_of_named_tyre(surface_name, for_rear_tyre)
     else:
-        raise InputError(scene.file, "road.stretches", name, "no such surface", (*SURFACE_NAMES, *scene.tyres.files))
+        raise InputError(
+            scene.file, "road.stretches", surface_name, "no such surface", (*SURFACE_NAMES, *scene.tyres.files)
+        )
     return table if scale == 1.0 else table.scaled(scale)
 
 
@@ -227,9 +239,9 @@ def tyre_tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
     }
 
 
-def brake_of(scene: BrakingScene, axle: str) -> Brake:
+def brake_of(scene: BrakingScene, axle_name: str) -> Brake:
     """Returns the law of torque over pressure of the brakes of "front", "rear" or "trailer"."""
-    brake: BrakeTable = getattr(scene.brakes, axle)
+    brake: AxleBrakeTable = getattr(scene.brakes, axle_name)
     return read(
         Brake,
         {
@@ -239,13 +251,13 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
             "falling": brake.gradient if brake.falling is None else brake.falling,
         },
         scene.file,
-        f"brakes.{axle}",
+        f"brakes.{axle_name}",
     )
 
 
-def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
+def chambers_of(scene: BrakingScene, wheel_count: int) -> Chambers:
     """Returns the brake chambers of all wheels; without [pressure] their time constants are zero."""
-    pressure, zeros = scene.pressure, np.zeros(wheels)
+    pressure, zeros = scene.pressure, np.zeros(wheel_count)
     if pressure is None:
         return Chambers(zeros, zeros, scene.brakes.supply)
     chambers = Chambers(zeros + pressure.fill, zeros + pressure.empty, scene.brakes.supply, delay=pressure.delay)
@@ -257,12 +269,12 @@ def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     )
 
 
-def measured_pressures_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
+def measured_pressures_of(scene: BrakingScene, procedure_name: str, wheel_count: int) -> MeasuredPressures | None:
     """Reads the measured pressures of a procedure; None if the scene has no [measured]."""
     if scene.measured is None:
         return None
-    name = scene.measured.file.replace("{procedure}", procedure)
-    measured = read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
+    name = scene.measured.file.replace("{procedure}", procedure_name)
+    measured = read_pressures(scene.path(name, "measured.file"), wheel_count, scene.run.sample)
     largest_pressure, supply = float(measured.pressures.max()), scene.brakes.supply
     if largest_pressure > supply:
         allowed = f"must be at least {largest_pressure:g} bar, the largest pressure in {name}"
@@ -270,9 +282,9 @@ def measured_pressures_of(scene: BrakingScene, procedure: str, wheels: int) -> M
     return measured
 
 
-def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
+def controller_of(scene: BrakingScene, wheel_count: int, procedure_name: str) -> Controller:
     """Returns the controller of a procedure's run: measured pressures, or a new controller of the scene."""
-    measured = measured_pressures_of(scene, procedure, wheels)
+    measured = measured_pressures_of(scene, procedure_name, wheel_count)
     if measured is not None:
         return measured
     kind = scene.controller.kind
@@ -288,7 +300,7 @@ def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controlle
         raise InputError(scene.file, "controller.parameters.slow", True, allowed)
     period = {"period": scene.run.sample} if kind != "none" else {}
     try:
-        return make(wheels, **parameters, **period)
+        return make(wheel_count, **parameters, **period)
     except InputError as error:
         raise InputError(scene.file, error.place, error.value, error.allowed) from None
     except TypeError:

@@ -10,7 +10,7 @@ from models.core.finding import Finding
 from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.braking.assumptions import assumptions
 from models.systems.braking.of_scene import braked_vehicle, controller_of, sprung_of, surfaces_of, vehicle_of
-from models.systems.braking.procedures import engines_of, port_of, vehicle_and_start
+from models.systems.braking.procedures import engines_of, port_run_of, vehicle_and_start_state
 from models.systems.braking.scene import BrakingScene
 from models.tyre.tyre_source import SURFACE_NAMES
 from models.vehicles.plausible import (
@@ -36,7 +36,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """
     _check_parts(scene, engines_of(scene, engines))
     for name in scene.procedures:
-        vehicle_and_start(scene, name)
+        vehicle_and_start_state(scene, name)
 
 
 def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -49,20 +49,20 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         controller_of(scene, vehicle.plane.wheels, name)
         if scene.port is not None:
             for engine in engines:
-                check_port(scene.port, port_of(scene, name, vehicle, engine))
+                check_port(scene.port, port_run_of(scene, name, vehicle, engine))
     if scene.port is not None and scene.port.log is not None:
         _check_log(scene, scene.port.log, len(engines))
 
 
-def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
+def _check_log(scene: BrakingScene, log_template: str, engine_count: int) -> None:
     """Raise InputError for a name of the port's log under which several procedures or engines would write the same
     file.
     """
-    drives = {"procedure": len(scene.procedures), "engine": engines}
+    drives = {"procedure": len(scene.procedures), "engine": engine_count}
     for key, several in drives.items():
-        if several > 1 and f"{{{key}}}" not in log:
+        if several > 1 and f"{{{key}}}" not in log_template:
             allowed = f"must have {{{key}}} in it: {several} of them are driven, and each writes a log of its own"
-            raise InputError(scene.file, "port.log", log, allowed)
+            raise InputError(scene.file, "port.log", log_template, allowed)
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -180,8 +180,8 @@ def _towed_body_lines(scene: BrakingScene) -> list[tuple[str, str]]:
     return [("trailer", hitch_line(handling.vehicle, handling.held, name)) for name in handling.vehicle.towed]
 
 
-def _assumptions_of_scene(scene: BrakingScene, name: str) -> list[Assumption]:
-    return assumptions(scene, name, braked_vehicle(scene, scene.procedures[name]))
+def _assumptions_of_scene(scene: BrakingScene, procedure_name: str) -> list[Assumption]:
+    return assumptions(scene, procedure_name, braked_vehicle(scene, scene.procedures[procedure_name]))
 
 
 def user_code(scene: BrakingScene) -> str:

@@ -17,7 +17,7 @@ from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError
 from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked_vehicle, controller_of
-from models.systems.braking.scene import BrakingScene, Procedure
+from models.systems.braking.scene import BrakingProcedure, BrakingScene
 
 UNBRAKED_DURATION = 4.0
 """Time (s) after the last steering knot over which the yaw response without brakes is computed."""
@@ -35,11 +35,11 @@ STEADY_ACCELERATION = 1e-6
 """Largest residual acceleration (m/s^2 and rad/s^2) of a steady turn."""
 
 
-def vehicle_and_start(scene: BrakingScene, name: str) -> tuple[BrakedVehicle, StartState]:
+def vehicle_and_start_state(scene: BrakingScene, procedure_name: str) -> tuple[BrakedVehicle, StartState]:
     """Returns vehicle and start state of a procedure. Raises InputError for a circle that the tyres' side forces cannot
     hold.
     """
-    procedure = scene.procedures[name]
+    procedure = scene.procedures[procedure_name]
     vehicle = braked_vehicle(scene, procedure)
     try:
         check_way(vehicle.road, scene.run.sample / scene.run.substeps * procedure.speed)
@@ -49,23 +49,23 @@ def vehicle_and_start(scene: BrakingScene, name: str) -> tuple[BrakedVehicle, St
         turn = steady_turn(vehicle, procedure.speed, procedure.radius)
         if turn is None:
             allowed = f"tyres do not hold a steady circle of this radius at {procedure.speed:g} m/s on this surface"
-            raise InputError(scene.file, f"procedures.{name}.radius", procedure.radius, allowed)
+            raise InputError(scene.file, f"procedures.{procedure_name}.radius", procedure.radius, allowed)
         return replace(vehicle, steer=turn.steer), turn.start
     start, steering = vehicle.rolling(procedure.speed), steering_of(procedure, vehicle)
     return replace(vehicle, steer=steering(0.0), steering=steering if procedure.steering else None), start
 
 
-def steering_of(procedure: Procedure, vehicle: BrakedVehicle) -> Steering:
+def steering_of(procedure: BrakingProcedure, vehicle: BrakedVehicle) -> Steering:
     """Returns the driver's steering over time from time 0 on; a single angle is applied at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     knot_times, angles = np.array(knots, float).T
     return Steering(knot_times, angles, steer_angles(vehicle, 1.0))
 
 
-def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
+def step_steer_response(scene: BrakingScene, procedure_name: str) -> YawResponse | None:
     """Computes the yaw rate's response to the steering of a J-turn without brakes; None where it does not settle."""
-    vehicle, start = vehicle_and_start(scene, name)
-    steering = steering_of(scene.procedures[name], vehicle)
+    vehicle, start = vehicle_and_start_state(scene, procedure_name)
+    steering = steering_of(scene.procedures[procedure_name], vehicle)
     path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED_DURATION)
     return yaw_response(path.times, path.states[:, 1, 2], steering.half)
 
@@ -85,22 +85,25 @@ def engines_of(scene: BrakingScene, requested_engines: tuple[str, ...]) -> tuple
 
 
 def controlled_run(
-    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start_state: StartState, engine: str = ""
+    scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, start_state: StartState, engine: str = ""
 ) -> BrakingPath:
     """Run a procedure from a start state, with the scene's controller in the loop or with what is connected to the
     port. ``engine`` : name of the engine in file names; the vehicle's engine is used.
     """
-    usual = controller_of(scene, vehicle.plane.wheels, name)
+    usual = controller_of(scene, vehicle.plane.wheels, procedure_name)
     if scene.port is None:
         return vehicle.run(usual, start_state, scene.run.duration)
-    with controller_of_run(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
+    with controller_of_run(scene.port, port_run_of(scene, procedure_name, vehicle, engine), usual) as (
+        controller,
+        clock,
+    ):
         path = vehicle.run(controller, start_state, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 
 
 def controller_commands(
     scene: BrakingScene,
-    name: str,
+    procedure_name: str,
     vehicle: BrakedVehicle,
     times: np.ndarray,
     wheel_speeds: np.ndarray,
@@ -109,11 +112,11 @@ def controller_commands(
     """Returns the commands (n, W), valve states or pressures (bar), of a run's controller to given wheel speeds (n, W)
     and vehicle speeds (n,) in m/s at times (n,) in s. No vehicle is simulated.
     """
-    usual, supply = controller_of(scene, vehicle.plane.wheels, name), vehicle.chambers.supply
+    usual, supply = controller_of(scene, vehicle.plane.wheels, procedure_name), vehicle.chambers.supply
     with ExitStack() as stack:
         if scene.port is not None:
             usual, _ = stack.enter_context(
-                controller_of_run(scene.port, port_of(scene, name, vehicle, "reference"), usual)
+                controller_of_run(scene.port, port_run_of(scene, procedure_name, vehicle, "reference"), usual)
             )
         known = speeds if vehicle.speed_given else np.full(speeds.shape, np.nan)
         commands = [
@@ -123,31 +126,31 @@ def controller_commands(
     return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
-def port_of(scene: BrakingScene, name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
+def port_run_of(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
     """Returns the facts of a run that the port needs. The key of a log depends on vehicle and procedure, not on the
     controller.
     """
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
-    text = json.dumps([name, known], sort_keys=True)
+    text = json.dumps([procedure_name, known], sort_keys=True)
     return ControllerRun(
         vehicle.plane.radius,
         scene.run.sample,
         text,
         Folder(scene.folder),
         scene.file,
-        name,
+        procedure_name,
         engine,
         vehicle.chambers.slow.size > 0,
     )
 
 
-def steer_angles(vehicle: BrakedVehicle, angle: float) -> np.ndarray:
+def steer_angles(vehicle: BrakedVehicle, front_angle: float) -> np.ndarray:
     """Steer angles (W,) of all wheels with the front wheels at an angle (rad), the other wheels straight."""
-    return np.where(np.arange(vehicle.plane.wheels) < STEERED_WHEELS, angle, 0.0)
+    return np.where(np.arange(vehicle.plane.wheels) < STEERED_WHEELS, front_angle, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyTurn:
+class SteadyCircle:
     """A steady circle: steer angles (W,) in rad, and a start state in which the towing vehicle heads along x."""
 
     steer: np.ndarray
@@ -206,14 +209,14 @@ class CircleMotion:
         unknown: np.ndarray = root(self.residual_accelerations, unknowns_guess, tol=1e-12).x
         return unknown, bool(np.abs(self.residual_accelerations(unknown)).max() <= STEADY_ACCELERATION)
 
-    def steady_turn(self, unknowns: np.ndarray) -> SteadyTurn:
+    def steady_turn(self, unknowns: np.ndarray) -> SteadyCircle:
         """Returns the steady turn for given unknowns, with which a procedure begins."""
-        return SteadyTurn(
+        return SteadyCircle(
             steer_angles(self.vehicle, unknowns[0]), StartState(self.state(unknowns), self.motion(unknowns)[1])
         )
 
 
-def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTurn | None:
+def steady_turn(vehicle: BrakedVehicle, speed: float, turn_radius: float) -> SteadyCircle | None:
     """Solve the steady circle of a vehicle (see ``CircleMotion``) at a speed (m/s) and radius (m); None if there is
     none.
 
@@ -223,53 +226,57 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
     plane, units = vehicle.plane, vehicle.plane.masses.size
     rearmost_x = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
     unknown = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
-    unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -rearmost_x[0] / radius
-    unknown[2:] = (rearmost_x[1:] - rearmost_x[0]) / radius
+    unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / turn_radius, -rearmost_x[0] / turn_radius
+    unknown[2:] = (rearmost_x[1:] - rearmost_x[0]) / turn_radius
     for slower in speed * CONTINUATION_SHARES:
-        unknown, steady = CircleMotion(vehicle, slower, radius).solve_steady_circle(unknown)
+        unknown, steady = CircleMotion(vehicle, slower, turn_radius).solve_steady_circle(unknown)
         if not steady or np.abs(unknown).max() > LARGEST_TURN_ANGLE:
             return None
-    circle, state = CircleMotion(vehicle, speed, radius), CircleMotion(vehicle, speed, radius).state(unknown)
+    circle, state = CircleMotion(vehicle, speed, turn_radius), CircleMotion(vehicle, speed, turn_radius).state(unknown)
     if vehicle.sprung is not None:
         guess = np.zeros(vehicle.engine.size - 1)
         guess[0], guess[1] = unknown[0], np.arctan2(state[1, 1], state[1, 0])
         guess[vehicle.sprung.turns - 1] = np.diff(state[0, 2:])
-        circle = CircleMotion(vehicle, speed, radius, sprung=True)
+        circle = CircleMotion(vehicle, speed, turn_radius, sprung=True)
         unknown, steady = circle.solve_steady_circle(guess)
     return circle.steady_turn(unknown) if steady else None
 
 
-def _rolling_speeds(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
+def _rolling_speeds(plane_vehicle: Plane, motion_state: np.ndarray, wheel_steer_angles: np.ndarray) -> np.ndarray:
     """Angular speeds (W,) in rad/s of wheels that roll without slip, for positions and rates (2, 2 + U) of a plane
     vehicle.
     """
-    headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
+    headings, rates, unit = motion_state[0, 2:], motion_state[1, 2:], plane_vehicle.unit
     forward = np.column_stack((np.cos(headings), np.sin(headings)))
     leftward = np.column_stack((-forward[:, 1], forward[:, 0]))
-    centres = state[1, :2] + plane.reach @ (rates[:, None] * leftward)
-    spun = rates[unit, None] * (plane.place[:, :1] * leftward[unit] - plane.place[:, 1:] * forward[unit])
-    course = headings[unit] + steer
+    centres = motion_state[1, :2] + plane_vehicle.reach @ (rates[:, None] * leftward)
+    spun = rates[unit, None] * (
+        plane_vehicle.place[:, :1] * leftward[unit] - plane_vehicle.place[:, 1:] * forward[unit]
+    )
+    course = headings[unit] + wheel_steer_angles
     rolling_direction = np.column_stack((np.cos(course), np.sin(course)))
-    return ((centres[unit] + spun) * rolling_direction).sum(axis=1) / plane.radius
+    return ((centres[unit] + spun) * rolling_direction).sum(axis=1) / plane_vehicle.radius
 
 
-def _accelerations(vehicle: BrakedVehicle, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _accelerations(
+    vehicle: BrakedVehicle, motion_state: np.ndarray, wheel_steer_angles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns accelerations (2 + U,) of a plane vehicle whose wheels roll freely without brakes, and angular speeds of
     the wheels (W,) in rad/s.
     """
     plane, no_torques, turning = (
         vehicle.plane,
         np.zeros((2, vehicle.plane.wheels)),
-        _rolling_speeds(vehicle.plane, state, steer),
+        _rolling_speeds(vehicle.plane, motion_state, wheel_steer_angles),
     )
-    motion, ground = motion_of(state.copy(), turning.copy()), surfaces(plane.wheels)
-    motion.accelerations[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
-    under_wheels(state, 0.0, vehicle.on_road, ground)
+    motion, ground = motion_of(motion_state.copy(), turning.copy()), surfaces(plane.wheels)
+    motion.accelerations[:2] = motion_state[1, 2] * np.array([-motion_state[1, 1], motion_state[1, 0]])
+    under_wheels(motion_state, 0.0, vehicle.on_road, ground)
     step_on(
         motion,
         no_torques,
         ACCELERATION_INTERVAL,
-        steer,
+        wheel_steer_angles,
         vehicle.slope * 9.81 * ACCELERATION_INTERVAL,
         vehicle.on_road,
         ground,

@@ -12,7 +12,7 @@ from models.systems.braking.assumptions import assumptions
 from models.systems.braking.errors import RepeatedRuns, with_error
 from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
 from models.systems.braking.of_scene import suspended_in_engine
-from models.systems.braking.procedures import controlled_run, controller_commands, engines_of, vehicle_and_start
+from models.systems.braking.procedures import controlled_run, controller_commands, engines_of, vehicle_and_start_state
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import wheel_names
 
@@ -30,7 +30,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     """
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
-    vehicle, start = vehicle_and_start(scene, name)
+    vehicle, start = vehicle_and_start_state(scene, name)
     vehicle = vehicle_in_engine(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
@@ -59,56 +59,65 @@ def vehicle_in_engine(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
 
 
 def _repeated_runs(
-    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str
+    scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, start_state: StartState, engine: str
 ) -> RepeatedRuns:
     """Returns functions that repeat the procedure in other time steps, and the controller's commands, without a log."""
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
-    def rerun(steps: int, end_time: float) -> BrakingPath:
+    def rerun(steps_per_sample: int, end_time: float) -> BrakingPath:
         shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": end_time})})
-        return controlled_run(shorter, name, replace(vehicle, substeps=steps), start, engine)
+        return controlled_run(shorter, procedure_name, replace(vehicle, substeps=steps_per_sample), start_state, engine)
 
-    def commands_for_speeds(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    def commands_for_speeds(
+        braking_path: BrakingPath, wheel_turning_speeds: np.ndarray, speeds: np.ndarray
+    ) -> np.ndarray:
         return controller_commands(
-            scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds
+            scene,
+            procedure_name,
+            vehicle,
+            braking_path.times[:-1],
+            np.abs(wheel_turning_speeds) * vehicle.plane.radius,
+            speeds,
         )
 
     return RepeatedRuns(rerun, commands_for_speeds)
 
 
-def _labelled_result(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:
+def _labelled_result(
+    scene: BrakingScene, procedure_name: str, engine: str, braking_path: BrakingPath, run_seconds: float
+) -> Result:
     """Returns the result of a procedure: motion of each coordinate; turning, brake pressure, torque, forces, load and
     slips of each wheel.
     """
-    units = ", ".join("rad" if coordinate.split()[-1][0] in "hr" else "m" for coordinate in path.coordinates)
+    units = ", ".join("rad" if coordinate.split()[-1][0] in "hr" else "m" for coordinate in braking_path.coordinates)
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
     moving, wheel = ("time", "coordinate"), ("time", "wheel")
     channels = {
-        "positions": Channel(moving, path.states[:, 0], units),
-        "rates": Channel(moving, path.states[:, 1], rates),
-        "turning": Channel(wheel, path.turning, "rad/s"),
-        "pressure": Channel(wheel, path.pressures, "bar"),
-        "torque": Channel(wheel, path.torques, "N m"),
+        "positions": Channel(moving, braking_path.states[:, 0], units),
+        "rates": Channel(moving, braking_path.states[:, 1], rates),
+        "turning": Channel(wheel, braking_path.turning, "rad/s"),
+        "pressure": Channel(wheel, braking_path.pressures, "bar"),
+        "torque": Channel(wheel, braking_path.torques, "N m"),
     }
-    start_row = np.full((1, path.turning.shape[1]), np.nan)
+    start_row = np.full((1, braking_path.turning.shape[1]), np.nan)
     channels |= {
-        name: Channel(wheel, np.concatenate((start_row, getattr(path.reports, name))), unit)
-        for name, unit in REPORT_CHANNELS.items()
+        procedure_name: Channel(wheel, np.concatenate((start_row, getattr(braking_path.reports, procedure_name))), unit)
+        for procedure_name, unit in REPORT_CHANNELS.items()
     }
-    samples = len(path.times) - 1
+    samples = len(braking_path.times) - 1
     return result(
         scene,
         channels,
         {
-            "time": Channel("time", path.times, "s"),
-            "coordinate": Channel("coordinate", list(path.coordinates)),
-            "wheel": Channel("wheel", list(wheel_names(path.turning.shape[1]))),
+            "time": Channel("time", braking_path.times, "s"),
+            "coordinate": Channel("coordinate", list(braking_path.coordinates)),
+            "wheel": Channel("wheel", list(wheel_names(braking_path.turning.shape[1]))),
         },
         engine=engine,
         counts={"samples": samples, "steps": samples * scene.run.substeps},
-        seconds=seconds,
-        detail=path,
-        title=f"{scene.title}: {name}",
-        stands=int(path.ended_at_rest),
+        seconds=run_seconds,
+        detail=braking_path,
+        title=f"{scene.title}: {procedure_name}",
+        stands=int(braking_path.ended_at_rest),
     )

@@ -22,9 +22,9 @@ LARGEST_SPEED = 100.0
 """Largest speed (m/s) at which braking may begin; no road vehicle is faster."""
 LARGEST_TORQUE = 1e6
 """Largest brake torque of a wheel (N m) that a scene may have: twenty times that of a real brake."""
-LONGEST_STEP = 0.02
+LONGEST_TIME_STEP = 0.02
 """Longest time step (s) for which light braking and braking from rolling were compared with closed forms."""
-MOST_SUBSTEPS = 1000
+LARGEST_SUBSTEP_COUNT = 1000
 """Most time steps within a sample of the controller."""
 ProcedureKind = Literal["straight", "split", "turn", "j_turn"]
 
@@ -32,7 +32,7 @@ ProcedureKind = Literal["straight", "split", "turn", "j_turn"]
 TimeAnglePair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class VehicleTable(Strict):
+class BrakedVehicleTable(Strict):
     """[vehicle]: parameters of a vehicle in the plane, or the file of a vehicle on its suspension."""
 
     parameters: str = Field(default="paper", description="paper, or a TOML file with every parameter")
@@ -54,7 +54,7 @@ class LoadTransfer(Strict):
     front: float = Field(default=0.3, ge=0.0, le=1.0, description="share of the front axle in that of cornering")
 
 
-class Stretch(Strict):
+class RoadStretch(Strict):
     """[[road.stretches]]: surfaces of the road from x on, left and right of the line."""
 
     x: float = quantity("m", "where it begins; the first also holds before", default=0.0, signed=True)
@@ -62,14 +62,14 @@ class Stretch(Strict):
     right: str | None = Field(default=None, description="surface right of it, if it is another one")
 
 
-class RoadTable(Strict):
+class BrakingRoadTable(Strict):
     """[road]: stretches along x, each with its surfaces left and right of a line."""
 
-    stretches: list[Stretch] = Field(default=[Stretch(left="ice")], min_length=1, description="along the road")
+    stretches: list[RoadStretch] = Field(default=[RoadStretch(left="ice")], min_length=1, description="along the road")
     line: float = quantity("m", "y of the line between left and right", default=0.0, signed=True)
 
 
-class TyreTables(Strict):
+class SurfaceFrictionTable(Strict):
     """[tyres]: friction of tyres on the surfaces of the road."""
 
     scale: dict[str, float] = Field(default_factory=dict, description="factor on the friction of a surface")
@@ -77,7 +77,7 @@ class TyreTables(Strict):
     own_rear: bool = Field(default=False, description="rear tyres by their own figures, where a surface has them")
 
 
-class BrakeTable(Strict):
+class AxleBrakeTable(Strict):
     """[brakes.front], [brakes.rear], [brakes.trailer]: torque of a wheel's brake over pressure, linear unless falling
     pressure has another line.
     """
@@ -95,13 +95,13 @@ class BrakeTable(Strict):
 class BrakesTable(Strict):
     """[brakes]: brakes of the front axle, the rear axle and the trailer's wheels, and the supply pressure."""
 
-    front: BrakeTable = BrakeTable(gradient=1500.0)
-    rear: BrakeTable = BrakeTable(gradient=1200.0)
-    trailer: BrakeTable = BrakeTable(gradient=1200.0)
+    front: AxleBrakeTable = AxleBrakeTable(gradient=1500.0)
+    rear: AxleBrakeTable = AxleBrakeTable(gradient=1200.0)
+    trailer: AxleBrakeTable = AxleBrakeTable(gradient=1200.0)
     supply: float = quantity("bar", "pressure at the valves", default=6.0)
 
 
-class PressureTable(Strict):
+class ChamberTable(Strict):
     """[pressure]: brake chambers that fill and empty with first-order lag; without this table pressures follow the
     valves at once.
     """
@@ -120,7 +120,7 @@ class PressureTable(Strict):
     volume: float = quantity("l", "of one chamber, which the reservoir fills", default=1.5)
 
 
-class Relaxation(Strict):
+class RelaxationLengths(Strict):
     """[relaxation]: relaxation lengths over which slip angles lag; without this table side forces build up at once."""
 
     front: float = quantity("m", "relaxation length across the front wheels")
@@ -135,13 +135,13 @@ class ControllerTable(Strict):
     true_speed: bool = Field(default=True, description="the vehicle's speed is given to it")
 
 
-class MeasuredTable(Strict):
+class MeasuredPressureTable(Strict):
     """[measured]: measured chamber pressures that brake the vehicle in place of a controller."""
 
     file: str = Field(description="CSV of them, and of wheel speeds if they were measured; {procedure} is its name")
 
 
-class Procedure(Strict):
+class BrakingProcedure(Strict):
     """[procedures.NAME]: a test procedure: initial speed, and steering of the driver, positive to the left."""
 
     kind: ProcedureKind = Field(default="straight", description="straight, split, turn or j_turn")
@@ -156,11 +156,11 @@ class Procedure(Strict):
     radius: float | None = quantity("m", "of the steady circle before braking (turn)", default=None, signed=True)
 
 
-class RunTable(Strict):
+class BrakingRunTable(Strict):
     """[run]: sample time of the controller, time steps within a sample, and duration."""
 
     sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
-    substeps: int = Field(default=4, ge=1, le=MOST_SUBSTEPS, description="steps of the vehicle within a sample")
+    substeps: int = Field(default=4, ge=1, le=LARGEST_SUBSTEP_COUNT, description="steps of the vehicle within a sample")
     forces: Literal["native", "compiled"] = Field(
         default="native",
         description="springs of what vehicle.file tows: the engine's own as far as it has them, or compiled forces",
@@ -175,34 +175,34 @@ class BrakingScene(SceneFile):
 
     system: Literal["braking"] = "braking"
     study: str = Field(default="braking", description="the study that runs the scene")
-    vehicle: VehicleTable = VehicleTable()
+    vehicle: BrakedVehicleTable = BrakedVehicleTable()
     trailer: Trailer | None = Field(default=None, description="a drawbar trailer of two axles")
     load_transfer: LoadTransfer | None = Field(default=None, description="semi-static load transfer")
-    road: RoadTable = RoadTable()
-    tyres: TyreTables = TyreTables()
-    relaxation: Relaxation | None = Field(default=None, description="lag of the slip angles")
+    road: BrakingRoadTable = BrakingRoadTable()
+    tyres: SurfaceFrictionTable = SurfaceFrictionTable()
+    relaxation: RelaxationLengths | None = Field(default=None, description="lag of the slip angles")
     brakes: BrakesTable = BrakesTable()
-    pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
+    pressure: ChamberTable | None = Field(default=None, description="dynamics of the chambers")
     controller: ControllerTable = ControllerTable()
     port: PortTable | None = Field(default=None, description="what stands behind the port, its signals and faults")
-    measured: MeasuredTable | None = Field(
+    measured: MeasuredPressureTable | None = Field(
         default=None, description="pressures that were measured, instead of a controller"
     )
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
-    procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
-    run: RunTable = RunTable()
+    procedures: dict[str, BrakingProcedure] = Field(min_length=1, description="driven one by one, a table each")
+    run: BrakingRunTable = BrakingRunTable()
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> BrakingScene:
     """Build a checked braking scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(BrakingScene, table, file, folder)
+    scene = checked(BrakingScene, scene_tables, scene_path, scene_folder)
     parts = (_procedure_refusals, _vehicle_refusals, _brake_refusals, _run_refusals)
     for key_path, value, allowed in chain.from_iterable(refusals_of(scene) for refusals_of in parts):
         raise InputError(scene.file, key_path, value, allowed)
     check(scene)
-    return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
+    return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene_path)})
 
 
 KEYS_OF_PROCEDURE = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
@@ -218,7 +218,7 @@ def _procedure_refusals(scene: BrakingScene) -> Refusals:
         yield from ((f"procedures.{name}.{key}", *wrong) for key, *wrong in _refusals_of_procedure(procedure))
 
 
-def _refusals_of_procedure(procedure: Procedure) -> Refusals:
+def _refusals_of_procedure(procedure: BrakingProcedure) -> Refusals:
     if procedure.speed > LARGEST_SPEED:
         yield "speed", procedure.speed, f"must be at most {LARGEST_SPEED:g} m/s"
     read = KEYS_OF_PROCEDURE[procedure.kind]
@@ -278,9 +278,9 @@ def _run_refusals(scene: BrakingScene) -> Refusals:
     run, pressure = scene.run, scene.pressure
     if not 1e-4 <= run.sample <= 0.1:
         yield "run.sample", run.sample, "must be from 0.0001 to 0.1 s"
-    if run.sample / run.substeps > LONGEST_STEP * (1.0 + 1e-9):
-        least_substeps = math.ceil(run.sample / LONGEST_STEP - 1e-9)
-        longer = f"steps of more than {LONGEST_STEP:g} s mistake stopping distances by percents"
+    if run.sample / run.substeps > LONGEST_TIME_STEP * (1.0 + 1e-9):
+        least_substeps = math.ceil(run.sample / LONGEST_TIME_STEP - 1e-9)
+        longer = f"steps of more than {LONGEST_TIME_STEP:g} s mistake stopping distances by percents"
         yield "run.substeps", run.substeps, f"must be at least {least_substeps}: {longer}"
     if pressure is not None and pressure.delay > 1.0:
         yield "pressure.delay", pressure.delay, "must be at most 1 s"

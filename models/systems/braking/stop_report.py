@@ -32,7 +32,7 @@ def wheel_names(wheel_count: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopHistory:
     """Time histories of a braking run for the centre of mass of the towing vehicle, along and across its path.
 
     times, speed, way, side_slip (n,): s, m/s, m, rad; lateral_acceleration (n - 1,): m/s^2 to the left; lengths (n -
@@ -57,7 +57,7 @@ class Stop:
         return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
 
     @property
-    def way(self) -> np.ndarray:
+    def distance_travelled(self) -> np.ndarray:
         """Distance (n,) in m along the path since the start."""
         steps = np.diff(self.path.states[:, 0, :2], axis=0)
         return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
@@ -81,7 +81,7 @@ class Stop:
 
     def vehicle_results(self) -> dict[str, float]:
         """Results of the vehicle over a stop, by name and unit: distance, time, decelerations, yaw, side slip."""
-        path, speed, distances = self.path, self.speed, self.way
+        path, speed, distances = self.path, self.speed, self.distance_travelled
         slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.lateral_acceleration)
         time, distance = float(path.times[-1]), float(distances[-1])
         return {
@@ -163,7 +163,7 @@ class Stop:
             f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / fast_duration
             for limit in SLIP_LIMITS
         }
-        locks = self.locks()
+        locks = self.lock_times()
         return wheels | {
             "locked above 15 km/h [s]": locks.time,
             "longest lock [s]": locks.longest_lock,
@@ -171,31 +171,31 @@ class Stop:
             "final pressure [bar]": path.pressures[-1],
         }
 
-    def results_in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
-        """Results at ``time`` (s) after the brake is applied on a circle (radius in m, positive to the left), by name
-        and unit.
+    def results_in_turn(self, turn_radius: float, time_after_braking: float = 1.0) -> dict[str, float]:
+        """Results at ``time_after_braking`` (s) after the brake is applied on a circle (radius in m, positive to the
+        left), by name and unit.
 
         Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
         """
         speed, yaw_rate, slip = (
-            float(np.interp(time, self.times, values))
+            float(np.interp(time_after_braking, self.times, values))
             for values in (self.speed, self.path.states[:, 1, 2], self.side_slip)
         )
-        position = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
+        position = [np.interp(time_after_braking, self.times, self.path.states[:, 0, i]) for i in range(2)]
         vx, vy = self.path.states[0, 1, :2] / self.speed[0]
-        centre = self.path.states[0, 0, :2] + radius * np.array([-vy, vx])
+        centre = self.path.states[0, 0, :2] + turn_radius * np.array([-vy, vx])
         return {
-            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, radius),
-            "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time,
-            "outside of the circle [m]": float(np.hypot(*(position - centre)) - abs(radius)),
+            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, turn_radius),
+            "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time_after_braking,
+            "outside of the circle [m]": float(np.hypot(*(position - centre)) - abs(turn_radius)),
             "side slip [deg]": float(np.degrees(slip)),
         }
 
-    def locks(self) -> Locks:
+    def lock_times(self) -> Locks:
         """Times for which wheels lock at speeds above 15 km/h."""
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 
-def _index_of_peak(values: np.ndarray) -> int:
+def _index_of_peak(signed_values: np.ndarray) -> int:
     """Index of the value with the largest magnitude."""
-    return int(np.argmax(np.abs(values)))
+    return int(np.argmax(np.abs(signed_values)))

@@ -32,7 +32,7 @@ from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, tab
 from models.core.whole_files import whole_file
 from models.ensemble.runner import values_in_order
 from models.ensemble.store import Arrays, Store
-from models.systems.contact.scene import Method
+from models.systems.contact.scene import ContactMethod
 
 MOTION_COLUMNS = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
 BY_AXES = {"a": METRES, "b": METRES, **MOTION_COLUMNS}
@@ -59,134 +59,153 @@ ERROR_COLUMNS = slice(6, 10)
 """Columns of the output that hold errors."""
 ROWS_PER_BLOCK = 10_000
 """Rows of an output file that are read at once, and most rows that a result contains."""
-BLOCKS_IN_ADVANCE = 8
+LARGEST_BLOCKS_IN_ADVANCE = 8
 """Most blocks of rows that are computed in advance of the block being written."""
-Build = Callable[[Array, Array], Any]
+BuildContacts = Callable[[Array, Array], Any]
 """Function that makes ``Built`` from the coefficients of friction and the loads (N) of some rows."""
 
 
 def solve_table(
-    path: Path,
+    cases_path: Path,
     output_path: Path,
-    build: Build,
-    method: Method,
-    progress: Callable[[int], None] = lambda rows: None,
+    build_contacts: BuildContacts,
+    contact_method: ContactMethod,
+    report_row_count: Callable[[int], None] = lambda rows: None,
     *,
-    errors: bool = True,
+    with_errors: bool = True,
     executor: Executor | None = None,
-    store: Store | None = None,
+    block_store: Store | None = None,
 ) -> dict[str, int]:
-    """Compute the creep forces of all contacts in the CSV file ``path`` and write them to ``output_path``. Returns the
-    numbers of all rows and of refused rows.
+    """Compute the creep forces of all contacts in the CSV file ``cases_path`` and write them to ``output_path``.
+    Returns the numbers of all rows and of refused rows.
 
-    errors : whether the output has columns of errors, for which forces are computed again on half the cells. executor :
-    computes the blocks of rows; store : keeps the finished blocks (see ``models.ensemble.runner``). Raises InputError
-    for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
+    with_errors : whether the output has columns of errors, for which forces are computed again on half the cells.
+    executor : computes the blocks of rows; block_store : keeps the finished blocks (see ``models.ensemble.runner``).
+    Raises InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
-    build(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
+    build_contacts(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
     reading, solve = (
-        table_blocks(path, (BY_AXES, BY_CURVATURES)),
-        partial(solved_rows, build=build, method=method, errors=errors),
+        table_blocks(cases_path, (BY_AXES, BY_CURVATURES)),
+        partial(solved_rows, build_contacts=build_contacts, contact_method=contact_method, with_errors=with_errors),
     )
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(output_path) as partial_path, partial_path.open("w") as file:
         heads = (
             OUTPUT_HEADINGS
-            if errors
+            if with_errors
             else tuple(head for head in OUTPUT_HEADINGS if head not in OUTPUT_HEADINGS[ERROR_COLUMNS])
         )
         file.write(",".join(heads) + "\n")
-        for block, answers in values_in_order(solve, chain(first, reading), executor, store, BLOCKS_IN_ADVANCE):
+        for block, answers in values_in_order(
+            solve, chain(first, reading), executor, block_store, LARGEST_BLOCKS_IN_ADVANCE
+        ):
             wrong = dict(zip(answers["wrong"].tolist(), answers["why"].tolist(), strict=True))
             rows = enumerate(zip(block.lines, answers["forces"].tolist(), strict=True))
             file.writelines(_output_line(line, row, wrong.get(i)) for i, (line, row) in rows)
             counts["rows"] += len(block.lines)
             counts["wrong"] += len(wrong)
-            progress(counts["rows"])
+            report_row_count(counts["rows"])
     return counts
 
 
-def compile_kernels(build: Build, method: Method) -> None:
+def compile_kernels(build_contacts: BuildContacts, contact_method: ContactMethod) -> None:
     """Compile the contact kernels or load them from the cache, so that a time measured later is that of the rows."""
     unit = np.ones(1)
-    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION_COLUMNS, unit)}, build, method)
+    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION_COLUMNS, unit)}, build_contacts, contact_method)
 
 
-def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> Arrays:
+def solved_rows(
+    row_block: RowBlock, build_contacts: BuildContacts, contact_method: ContactMethod, with_errors: bool
+) -> Arrays:
     """Solve a block of rows. Returns ``forces`` (rows, columns), the indices ``wrong`` (m,) of refused rows, and the
     reasons ``why`` (m,).
     """
-    columns = len(OUTPUT_HEADINGS) - 2 - (0 if errors else ERROR_COLUMNS.stop - ERROR_COLUMNS.start)
-    forces, wrong = _forces_or_refusals(block, partial(_forces, build=build, method=method, errors=errors), columns)
+    columns = len(OUTPUT_HEADINGS) - 2 - (0 if with_errors else ERROR_COLUMNS.stop - ERROR_COLUMNS.start)
+    forces, wrong = _forces_or_refusals(
+        row_block,
+        partial(_forces, build_contacts=build_contacts, contact_method=contact_method, with_errors=with_errors),
+        columns,
+    )
     return {"forces": forces, "wrong": np.array([*wrong], dtype=int), "why": np.array([*wrong.values()], dtype=str)}
 
 
 def _forces_or_refusals(
-    block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int
+    row_block: RowBlock, solve_rows: Callable[[dict[str, Any]], Array], column_count: int
 ) -> tuple[Array, dict[int, str]]:
     """Solve the sound rows of a block. Returns forces (rows, columns), NaN in refused rows, and the reason for each
     refusal by row index.
     """
-    answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.faulty_rows)
-    good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
+    answers, wrong = np.full((len(row_block.lines), column_count), np.nan), dict(row_block.faulty_rows)
+    good = np.array([i for i in range(len(row_block.lines)) if i not in wrong], dtype=int)
     answers[good], refused = _forces_of_rows(
-        {name: column[good] for name, column in block.values.items()}, solve, columns
+        {name: column[good] for name, column in row_block.values.items()}, solve_rows, column_count
     )
     return answers, wrong | {int(good[i]): text for i, text in refused.items()}
 
 
 def _forces_of_rows(
-    values: dict[str, Array], solve: Callable[[dict[str, Any]], Array], columns: int
+    columns_by_name: dict[str, Array], solve_rows: Callable[[dict[str, Any]], Array], column_count: int
 ) -> tuple[Array, dict[int, str]]:
     """Solve all rows. Returns forces (rows, columns), and the reason for each row that the theory refuses, by row
     index. Refused rows are located by halving the block.
     """
-    count = len(next(iter(values.values())))
+    count = len(next(iter(columns_by_name.values())))
     if count == 0:
-        return np.empty((0, columns)), {}
+        return np.empty((0, column_count)), {}
     try:
-        return solve(values), {}
+        return solve_rows(columns_by_name), {}
     except InputError as error:
         if count == 1:
-            return np.full((1, columns), np.nan), {0: str(error).replace("[0]", "")}
+            return np.full((1, column_count), np.nan), {0: str(error).replace("[0]", "")}
     half = count // 2
     (low, wrong), (high, wrong_in_high) = (
-        _forces_of_rows({name: column[rows] for name, column in values.items()}, solve, columns)
+        _forces_of_rows({name: column[rows] for name, column in columns_by_name.items()}, solve_rows, column_count)
         for rows in (slice(half), slice(half, None))
     )
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in wrong_in_high.items()}
 
 
-def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool = True) -> Array:
+def _forces(
+    columns_by_name: dict[str, Any],
+    build_contacts: BuildContacts,
+    contact_method: ContactMethod,
+    with_errors: bool = True,
+) -> Array:
     """Creep forces, moment, stick share, dissipation and errors by FASTSIM, shape (rows, columns). Raises InputError if
     a row is outside the range of the theory.
     """
-    load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION_COLUMNS)
-    touching = build(friction, load)
+    load, friction, xi_x, xi_y, spin = (columns_by_name[name] for name in MOTION_COLUMNS)
+    touching = build_contacts(friction, load)
     load, friction, pair = touching.load, touching.friction, touching.pair
     if touching.falling is not None:
         raise InputError("", "effects", None, "make friction fall, and a table of cases has constant friction")
-    if "A" in values:
-        area = by_load(values["A"], values["B"], load, pair)
+    if "A" in columns_by_name:
+        area = by_load(columns_by_name["A"], columns_by_name["B"], load, pair)
         a, b = area.a, area.b
     else:
-        a, b = values["a"], values["b"]
-    choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
+        a, b = columns_by_name["a"], columns_by_name["b"]
+    choices: dict[str, Any] = contact_method.model_dump(include={"march", "bound", "flexibilities"})
     ellipses = RollingEllipse(a, b, load, friction, xi_x, xi_y, spin)
-    fine = fastsim(ellipses, pair, cells=method.cells, **choices)
+    fine = fastsim(ellipses, pair, cells=contact_method.cells, **choices)
     forces = [fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation]
-    if errors:
-        coarse = fastsim(ellipses, pair, cells=coarser_cells(method.cells), **choices)
+    if with_errors:
+        coarse = fastsim(ellipses, pair, cells=coarser_cells(contact_method.cells), **choices)
         limit = friction * np.maximum(load, 0.0)
         a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
         share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
-        forces += _force_errors(fine, coarse, limit, a, b, share, method)
+        forces += _force_errors(fine, coarse, limit, a, b, share, contact_method)
     return np.column_stack(forces) + 0.0
 
 
 def _force_errors(
-    fine_forces: Any, coarse_forces: Any, friction_limit: Array, a: Array, b: Array, share: Array, method: Method
+    fine_forces: Any,
+    coarse_forces: Any,
+    friction_limit: Array,
+    a: Array,
+    b: Array,
+    spin_share_of_creepage: Array,
+    contact_method: ContactMethod,
 ) -> list[Array]:
     """Errors of the cells and of the theory in the forces (N), then in the moments (N m). friction_limit : mu N; share
     : share of the creepage that is due to spin.
@@ -201,27 +220,33 @@ def _force_errors(
         )
         for creep in (fine_forces, coarse_forces)
     )
-    left = cells_error(relative, relative_coarse, method.cells, method.order)
+    left = cells_error(relative, relative_coarse, contact_method.cells, contact_method.order)
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
-    theory = wider * friction_limit * band(method.band, used, share)
-    moment = wider * moment_limit * moment_band(method.band, used_with_moment(used, relative[2]), share)
+    theory = wider * friction_limit * band(contact_method.error_band_name, used, spin_share_of_creepage)
+    moment = (
+        wider
+        * moment_limit
+        * moment_band(contact_method.error_band_name, used_with_moment(used, relative[2]), spin_share_of_creepage)
+    )
     return [friction_limit * left, theory, moment_limit * left, moment]
 
 
-def _output_line(line_number: int, row: list[float], wrong: str | None) -> str:
+def _output_line(line_number: int, force_row: list[float], refusal_reason: str | None) -> str:
     """Returns a line of the output file; the reason for a refused row is put into quotation marks."""
-    if wrong is None:
+    if refusal_reason is None:
         numbers, errors, status = ROW_FORMAT
-        return (numbers + (errors if len(row) > ERROR_COLUMNS.start else "") + status).format(line_number, *row)
-    text = wrong.replace('"', "'")
-    return f'{line_number}{"," * (len(row) + 1)}"{text}"\n'
+        return (numbers + (errors if len(force_row) > ERROR_COLUMNS.start else "") + status).format(
+            line_number, *force_row
+        )
+    text = refusal_reason.replace('"', "'")
+    return f'{line_number}{"," * (len(force_row) + 1)}"{text}"\n'
 
 
-def column_sizes(path: Path) -> dict[str, dict[str, Any]]:
+def column_sizes(output_path: Path) -> dict[str, dict[str, Any]]:
     """Largest magnitude and root mean square of every column of an output file, with its unit, over the rows with
     status ``ok``. The file is read block by block.
     """
-    with path.open(newline="") as file:
+    with output_path.open(newline="") as file:
         rows = csv.reader(file)
         heads = [_name_and_unit(head) for head in next(rows)[1:-1]]
         largest, squares, count = np.zeros(len(heads)), np.zeros(len(heads)), 0
@@ -236,9 +261,9 @@ def column_sizes(path: Path) -> dict[str, dict[str, Any]]:
     }
 
 
-def first_rows(path: Path) -> dict[str, tuple[str, np.ndarray]]:
+def first_rows(output_path: Path) -> dict[str, tuple[str, np.ndarray]]:
     """Columns of the first ROWS_PER_BLOCK rows of an output file, as name -> (unit, values); NaN in refused rows."""
-    with path.open(newline="") as file:
+    with output_path.open(newline="") as file:
         heads, *rows = islice(csv.reader(file), ROWS_PER_BLOCK + 1)
     *columns, status = np.array(rows, dtype=object).reshape(-1, len(heads)).T
     columns = [np.array([float(cell or "nan") for cell in column]) for column in columns]

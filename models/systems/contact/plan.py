@@ -26,9 +26,9 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     """Returns a doubt for every radius of curvature that is not large compared with the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
-    from models.systems.contact.run import hertz_of
+    from models.systems.contact.run import hertzian_contact
 
-    area = hertz_of(scene)
+    area = hertzian_contact(scene)
     doubts = list[Finding]()
     for name, radius in scene.radii:
         axis = float(area.a if name.endswith("x") else area.b)
@@ -60,7 +60,7 @@ def describe(scene: ContactScene) -> str:
         heads["creepage"] = _values_text(scene.creepage)
     if scene.sweep is not None:
         heads["sweep"] = _values_text(scene.sweep)
-    method = _values_text(scene.method, {"name", *scene.method.unread()})
+    method = _values_text(scene.method, {"name", *scene.method.unread_keys()})
     heads["theory"] = THEORY_TEXTS[scene.method.name] + (f"; {method}" if method else "")
     lines = [scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)]
     return "\n".join([*lines, *assumption_lines(_contact_assumptions(scene))])
@@ -79,11 +79,11 @@ def _contact_assumptions(scene: ContactScene) -> list[Assumption]:
     return []
 
 
-def _values_text(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
+def _values_text(scene_table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
     """Text of a scene table: its keys, values and units, without keys that have no value."""
-    model = type(table)
+    model = type(scene_table)
     parts = []
-    for name, value in table:  # type: ignore[attr-defined]
+    for name, value in scene_table:  # type: ignore[attr-defined]
         extra = model.model_fields[name].json_schema_extra  # type: ignore[attr-defined]
         unit = f" {extra['unit']}".rstrip() if isinstance(extra, dict) else ""
         if value is not None and name not in omitted_keys:

@@ -44,7 +44,7 @@ from models.systems.contact.cases_table import column_sizes, compile_kernels, fi
 from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
-BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
+BUILT_IN_PROFILES = {"wheel": WHEELS, "rail": RAILS}
 FORCES_OF_ROLLED = attrgetter("fx", "fy", "mz", "stick", "dissipation")
 ERRORS_OF_ROLLED = attrgetter("cells", "theory", "moment_cells", "moment_theory")
 CONTACT_CHANNELS = {
@@ -65,7 +65,7 @@ CONTACT_CHANNELS = {
 this order.
 """
 FIELD_UNITS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
-CELL_POWER = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
+ERROR_ORDER_OF_CELLS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
 """Power of the number of cells along an axis with which the work of a call grows, by theory; in the exact theory each
 cell acts on every other cell.
 """
@@ -116,7 +116,7 @@ def run(
     error: bool = True,
     fields: bool = False,
     answers: Path | None = None,
-    progress: Progress = lambda stage, share: None,
+    report_progress: Progress = lambda stage, share: None,
 ) -> Result:
     """Compute the creep forces of a scene at every creepage, with ``ContactResults`` as detail, or those of its table
     of cases.
@@ -130,15 +130,15 @@ def run(
     if scene.cases is not None:
         if answers is None:
             raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
-        return _table_result(scene, answers, progress, error)
-    motions, cells = creepages(scene), scene.method.cells
-    progress("loading", 0.0)
+        return _table_result(scene, answers, report_progress, error)
+    motions, cells = swept_creepages(scene), scene.method.cells
+    report_progress("loading", 0.0)
     shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
     contact = solved_contact(scene)
     steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
-        progress("rolling", i / len(motions))
+        report_progress("rolling", i / len(motions))
         steps.append(rolled(contact, motion, cells) if error else (contact.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun
@@ -152,15 +152,19 @@ def run(
     return with_error(labelled, scene, contact, errors_of_forces) if error else labelled
 
 
-def _labelled_result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Result:
-    contact, count, power = rolls.contact, len(rolls.motions), CELL_POWER[scene.method.name]
-    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in rolls.errors] or [()] * count
-    rows = zip(rolls.motions, map(FORCES_OF_ROLLED, rolls.rolled), errors, strict=True)
+def _labelled_result(scene: ContactScene, contact_results: ContactResults, run_seconds: float) -> Result:
+    contact, count, power = (
+        contact_results.contact,
+        len(contact_results.motions),
+        ERROR_ORDER_OF_CELLS[scene.method.name],
+    )
+    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in contact_results.errors] or [()] * count
+    rows = zip(contact_results.motions, map(FORCES_OF_ROLLED, contact_results.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *errors_of_forces] for motion, forces, errors_of_forces in rows]).T
     doubt = ""
     if isinstance(contact, LinearTheory):
         with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
-            used = np.array([np.linalg.norm(force.force) for force in rolls.rolled])
+            used = np.array([np.linalg.norm(force.force) for force in contact_results.rolled])
             doubt = beyond_friction(used / (contact.friction * contact.pressing.load))
     return result(
         scene,
@@ -175,75 +179,84 @@ def _labelled_result(scene: ContactScene, rolls: ContactResults, seconds: float)
             "states": 0,
             "terms": 0 if power is None else scene.method.cells**power,
         },
-        seconds=seconds,
+        seconds=run_seconds,
         doubts=[doubt] if doubt else [],
-        detail=rolls,
+        detail=contact_results,
     )
 
 
-def cells_of(scene: ContactScene, rolls: ContactResults) -> Result | None:
+def fields_by_cell(scene: ContactScene, contact_results: ContactResults) -> Result | None:
     """Result with pressure and tractions (Pa) in every cell in contact at the last creepage, patch after patch; None if
     ``run`` was called without fields.
     """
-    patches = rolls.rolled[-1].fields
+    patches = contact_results.rolled[-1].fields
     if not patches:
         return None
     columns = {
         name: Channel("cell", np.concatenate([getattr(patch, name)[patch.inside] for patch in patches]), unit)
         for name, unit in FIELD_UNITS.items()
     }
-    return result(scene, columns, {}, motion=list(rolls.motions[-1]))
+    return result(scene, columns, {}, motion=list(contact_results.motions[-1]))
 
 
-def _table_result(scene: ContactScene, answers_path: Path, progress: Progress, error: bool) -> Result:
+def _table_result(scene: ContactScene, output_path: Path, report_progress: Progress, estimate_error: bool) -> Result:
     """Solve the scene's table of cases, and write the forces to a file; the result has the first rows."""
-    built = partial(table_contacts, scene)
+    built = partial(inputs_of_table_contacts, scene)
     compile_kernels(built, scene.method)  # no part of the time below
     start = time.perf_counter()
-    counts = _solved_table(scene, answers_path, built, progress, error)
+    counts = _solved_table(scene, output_path, built, report_progress, estimate_error)
     seconds = time.perf_counter() - start
-    rows = {name: Channel("row", values, unit) for name, (unit, values) in first_rows(answers_path).items()}
-    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(column_sizes(answers_path)))
+    rows = {name: Channel("row", values, unit) for name, (unit, values) in first_rows(output_path).items()}
+    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(column_sizes(output_path)))
     with_assumptions(table, assumptions_of_rows(scene.cases_file()))
-    return with_error_of_rows(table, scene) if error else table
+    return with_error_of_rows(table, scene) if estimate_error else table
 
 
 def _solved_table(
-    scene: ContactScene, answers_path: Path, built: Any, progress: Progress, error: bool
+    scene: ContactScene, output_path: Path, built_contact: Any, report_progress: Progress, estimate_error: bool
 ) -> dict[str, int]:
     """Solve a table of cases, and return the numbers of its rows and of refused rows. A table of many blocks is solved
     by the scene's worker processes, and finished blocks are stored.
     """
     file = scene.cases_file()
     rows, several = _line_count(file), file.stat().st_size > LARGE_TABLE_BYTES
-    count = partial(_count_rows, progress, rows)
+    count = partial(_count_rows, report_progress, rows)
     if not several:
-        return solve_table(file, answers_path, built, scene.method, count, errors=error)
-    store = Store(answers_path.parent / BLOCKS_FOLDER)
-    facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
+        return solve_table(file, output_path, built_contact, scene.method, count, with_errors=estimate_error)
+    store = Store(output_path.parent / BLOCKS_FOLDER)
+    facts = {"scene": scene.table(), "error": estimate_error, "files": named_files(scene.table(), Path(scene.folder))}
     with (
         store.reserved_folder(facts),
         Crew.of(scene).at_work(rows // ROWS_PER_TABLE_BLOCK + 1, *folders_for_workers(scene)) as pool,
     ):
-        return solve_table(file, answers_path, built, scene.method, count, errors=error, executor=pool, store=store)
+        return solve_table(
+            file,
+            output_path,
+            built_contact,
+            scene.method,
+            count,
+            with_errors=estimate_error,
+            executor=pool,
+            block_store=store,
+        )
 
 
-def _line_count(file: Path) -> int:
+def _line_count(text_path: Path) -> int:
     """Number of line ends in a file, which is about its number of rows."""
-    with file.open("rb") as lines:
+    with text_path.open("rb") as lines:
         return sum(block.count(b"\n") for block in iter(partial(lines.read, 1 << 20), b""))
 
 
-def _count_rows(progress: Progress, total_rows: int, rows: int) -> None:
-    progress(f"{rows:,} of {total_rows:,} rows", min(rows / max(total_rows, 1), 1.0))
+def _count_rows(report_progress: Progress, total_rows: int, finished_rows: int) -> None:
+    report_progress(f"{finished_rows:,} of {total_rows:,} rows", min(finished_rows / max(total_rows, 1), 1.0))
 
 
-def table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
+def inputs_of_table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
     """Inputs of the contacts in the rows of a table of cases, with the scene's materials and effects."""
     return extended_by_effects(Built(scene.pair, friction, load), scene)
 
 
-def scene_contact(scene: ContactScene) -> Built:
+def inputs_of_scene_contact(scene: ContactScene) -> Built:
     """Inputs of a scene's contact (materials, friction, load or approach, profiles), changed by the scene's effects."""
     table = scene.contact
     assert table is not None
@@ -256,7 +269,7 @@ def scene_contact(scene: ContactScene) -> Built:
 
 def solved_contact(scene: ContactScene) -> RollingContact:
     """Solve the normal problem of a scene's contact. Returns the contact, ready to roll by the scene's theory."""
-    method, built = scene.method, scene_contact(scene)
+    method, built = scene.method, inputs_of_scene_contact(scene)
     friction, pair = built.friction, built.pair
     if built.falling is not None and method.name != "fastsim":
         raise InputError(
@@ -267,42 +280,44 @@ def solved_contact(scene: ContactScene) -> RollingContact:
         )
     if scene.profiles is not None:
         with scene_errors(scene):
-            patches = [touch.patch for touch in touching_places(scene, built)]
+            patches = [touch.patch for touch in touching_points(scene, built)]
             pressed = press(patches, pair, load=built.load, approach=built.approach)
             exact = method.name == "exact"
             return Exact(pressed, friction, method.cells) if exact else Simplified(pressed, friction)
-    hertz = hertz_of(scene)
+    hertz = hertzian_contact(scene)
     if method.name == "simplified":
-        return Simplified(interpenetrating(hertz, pair), friction)
+        return Simplified(interpenetration_contact(hertz, pair), friction)
     if method.name == "fastsim":
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
         return Fastsim(hertz, friction, pair, **choices, falling=built.falling)
     return (LinearTheory if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
 
 
-def creepages(scene: ContactScene) -> list[Motion]:
+def swept_creepages(scene: ContactScene) -> list[Motion]:
     """Creepages (xi_x, xi_y, spin) of a scene, with spin in 1/m: a single triple, or one for each value of [sweep]."""
     fixed = scene.creepage.model_dump()
     values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
     return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
-def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN) -> NormalContact:
+def interpenetration_contact(
+    hertz_contact: Hertz, material_pair: MaterialPair, simplified_options: SimplifiedOptions = PLAIN
+) -> NormalContact:
     """Solve the normal problem of a Hertzian contact by the simplified theory of 1983 (interpenetration), on a
     rectangle larger than the ellipse.
     """
-    A, B = float(hertz.A), float(hertz.B)
-    x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
-    return press(quadratic(A, B, x, y), material_pair, load=float(hertz.load), options=options)
+    A, B = float(hertz_contact.A), float(hertz_contact.B)
+    x, y = (float(np.sqrt(1.5 * hertz_contact.approach / curvature)) for curvature in (A, B))
+    return press(quadratic(A, B, x, y), material_pair, load=float(hertz_contact.load), options=simplified_options)
 
 
-def touching_places(scene: ContactScene, built: Built) -> list[TouchingPlace]:
+def touching_points(scene: ContactScene, built_contact: Built) -> list[TouchingPlace]:
     """Points at which the profiles of wheel and rail touch."""
     p = scene.profiles
     assert p is not None
     return wheel_on_rail(
-        built.profiles["wheel"],
-        built.profiles["rail"],
+        built_contact.profiles["wheel"],
+        built_contact.profiles["rail"],
         lateral_shift=p.lateral_shift,
         yaw=p.yaw,
         track=Track(p.gauge, p.gauge_depth, p.inclination),
@@ -310,20 +325,28 @@ def touching_places(scene: ContactScene, built: Built) -> list[TouchingPlace]:
     )
 
 
-def _profile_by_name(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProfile:
+def _profile_by_name(scene: ContactScene, wheel_or_rail: Literal["wheel", "rail"]) -> ContactProfile:
     """Returns the profile of "wheel" or "rail": a built-in profile, or the profile in the user's file."""
     assert scene.profiles is not None
-    name = getattr(scene.profiles, kind)
-    if name in BUILT_IN[kind]:
+    name = getattr(scene.profiles, wheel_or_rail)
+    if name in BUILT_IN_PROFILES[wheel_or_rail]:
         return built_in(name)
     if "." not in name:
-        raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(BUILT_IN[kind]))
-    return read_profile(scene.path(name, f"profiles.{kind}"), kind, smoothing=scene.profiles.smoothing)
+        raise InputError(
+            scene.file,
+            f"profiles.{wheel_or_rail}",
+            name,
+            "must be a file or built in",
+            tuple(BUILT_IN_PROFILES[wheel_or_rail]),
+        )
+    return read_profile(
+        scene.path(name, f"profiles.{wheel_or_rail}"), wheel_or_rail, smoothing=scene.profiles.smoothing
+    )
 
 
-def hertz_of(scene: ContactScene) -> Hertz:
+def hertzian_contact(scene: ContactScene) -> Hertz:
     """Solve the Hertzian contact of a scene from semi-axes, curvatures or radii, under a load or at an approach."""
-    built = scene_contact(scene)
+    built = inputs_of_scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:
         return by_axes(scene.ellipse.a, scene.ellipse.b, pair, load=load, approach=approach)

@@ -20,28 +20,28 @@ GEOMETRY_TABLES = ("ellipse", "curvatures", "radii", "profiles", "cases")
 """Scene tables that describe the geometry of the contact; a scene has exactly one of them."""
 
 
-class Bodies(Strict):
+class WheelRailBodies(Strict):
     """[bodies]: elastic constants of wheel and rail, by default steel."""
 
     wheel: Material = Field(default=STEEL, description="E in Pa and nu of body 1")
     rail: Material = Field(default=STEEL, description="E in Pa and nu of body 2")
 
 
-class Ellipse(Strict):
+class ContactEllipse(Strict):
     """[ellipse]: semi-axes of the contact area."""
 
     a: float = quantity("m", "semi-axis along x, the direction of rolling")
     b: float = quantity("m", "semi-axis along y")
 
 
-class Curvatures(Strict):
+class ContactCurvatures(Strict):
     """[curvatures]: coefficients A and B of the undeformed distance A x^2 + B y^2 between the bodies."""
 
     A: float = quantity("1/m", "curvature along x, half the sum of both bodies' curvatures")
     B: float = quantity("1/m", "curvature along y, half the sum of both bodies' curvatures")
 
 
-class Radii(Strict):
+class CurvatureRadii(Strict):
     """[radii]: radii of curvature of both bodies, positive where convex; flat in a direction without a radius."""
 
     wheel_x: float | None = quantity("m", "rolling radius of the wheel", default=None, signed=True)
@@ -49,19 +49,21 @@ class Radii(Strict):
     rail_x: float | None = quantity("m", "radius of the rail along x", default=None, signed=True)
     rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
 
-    def curvatures(self, file: str) -> tuple[float, float]:
+    def curvatures(self, scene_path: str) -> tuple[float, float]:
         """Coefficients A and B (1/m) of the undeformed distance A x^2 + B y^2. Raises InputError for a radius of zero,
         or bodies that do not touch on an ellipse.
         """
         for name, radius in self:
             if radius == 0:
-                raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
+                raise InputError(
+                    scene_path, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)"
+                )
         curvature_pair = []
         for axis in ("x", "y"):
             value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
             if value <= 0:
                 raise InputError(
-                    file,
+                    scene_path,
                     f"radii.wheel_{axis}, rail_{axis}",
                     None,
                     f"are flat or conform along {axis}: "
@@ -71,7 +73,7 @@ class Radii(Strict):
         return curvature_pair[0], curvature_pair[1]
 
 
-class Profiles(Strict):
+class WheelRailProfiles(Strict):
     """[profiles]: cross-sections of wheel and rail, and their position relative to each other."""
 
     wheel: str = Field(default="S1002", description="S1002, or a file of a profile")
@@ -86,13 +88,13 @@ class Profiles(Strict):
     smoothing: float = quantity("m", "wavelength of which half is left in profiles from files", default=0.0, zero=True)
 
 
-class Cases(Strict):
+class CasesFile(Strict):
     """[cases]: file of a table in which each row has a contact, its load, friction and creepages."""
 
     file: str = Field(description="CSV file, beside the scene or in the folder in which the command runs")
 
 
-class Contact(Strict):
+class ContactTable(Strict):
     """[contact]: normal load or approach of the bodies, and coefficient of friction."""
 
     load: float | None = quantity("N", "normal load, on profiles the vertical one", default=None)
@@ -100,7 +102,7 @@ class Contact(Strict):
     friction: float = quantity("", "coefficient of friction")
 
 
-class Creepage(Strict):
+class CreepageTable(Strict):
     """[creepage]: velocity of the wheel relative to the rail, divided by the rolling speed."""
 
     xi_x: float = quantity("", "longitudinal creepage", default=0.0, signed=True)
@@ -108,7 +110,7 @@ class Creepage(Strict):
     spin: float = quantity("1/m", "spin by the rolling speed", default=0.0, signed=True)
 
 
-class Sweep(Strict):
+class CreepageSweep(Strict):
     """[sweep]: range through which one creepage is varied; the other creepages are those of [creepage]."""
 
     of: Literal["xi_x", "xi_y", "spin"] = Field(description="the creepage that is swept")
@@ -123,7 +125,7 @@ class Sweep(Strict):
         return spaced(self.start, self.stop, self.count)
 
 
-class Method(Strict):
+class ContactMethod(Strict):
     """[method]: theory of the creep forces, and number of cells along each axis of the contact."""
 
     name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
@@ -138,11 +140,11 @@ class Method(Strict):
         return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
 
     @property
-    def band(self) -> str:
+    def error_band_name(self) -> str:
         """Name of the theory's error band in ``models.contact.accuracy``."""
         return f"{self.flexibilities} {self.bound}" if self.name == "fastsim" else self.name
 
-    def unread(self) -> frozenset[str]:
+    def unread_keys(self) -> frozenset[str]:
         """Keys of [method] that have no meaning for the scene's theory."""
         fastsim = {"march", "bound", "flexibilities"}
         return frozenset({"fastsim": set(), "linear": {"cells", *fastsim}}.get(self.name, fastsim))
@@ -153,17 +155,17 @@ class ContactScene(SceneFile):
 
     system: Literal["contact"] = "contact"
     study: str = Field(default="contact", description="the study that runs the scene")
-    bodies: Bodies = Bodies()
-    ellipse: Ellipse | None = Field(default=None, description="semi-axes of the contact area")
-    curvatures: Curvatures | None = Field(default=None, description="of the undeformed distance")
-    radii: Radii | None = Field(default=None, description="of both bodies")
-    profiles: Profiles | None = Field(default=None, description="cross-sections of wheel and rail")
-    cases: Cases | None = Field(default=None, description="a contact in every row of a file")
-    contact: Contact | None = Field(default=None, description="table with load or approach, and friction")
+    bodies: WheelRailBodies = WheelRailBodies()
+    ellipse: ContactEllipse | None = Field(default=None, description="semi-axes of the contact area")
+    curvatures: ContactCurvatures | None = Field(default=None, description="of the undeformed distance")
+    radii: CurvatureRadii | None = Field(default=None, description="of both bodies")
+    profiles: WheelRailProfiles | None = Field(default=None, description="cross-sections of wheel and rail")
+    cases: CasesFile | None = Field(default=None, description="a contact in every row of a file")
+    contact: ContactTable | None = Field(default=None, description="table with load or approach, and friction")
     falling_friction: Falling | None = Field(default=None, description="friction that falls with the speed of slip")
-    creepage: Creepage = Creepage()
-    sweep: Sweep | None = Field(default=None, description="one creepage through a range")
-    method: Method = Method()
+    creepage: CreepageTable = CreepageTable()
+    sweep: CreepageSweep | None = Field(default=None, description="one creepage through a range")
+    method: ContactMethod = ContactMethod()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     @property
@@ -190,16 +192,16 @@ def scene_errors(scene: ContactScene) -> Iterator[None]:
     except InputError as error:
         if error.file:
             raise
-        tables: dict[str, type[Strict]] = {"profiles": Profiles, "contact": Contact}
+        tables: dict[str, type[Strict]] = {"profiles": WheelRailProfiles, "contact": ContactTable}
         within = next((f"{name}." for name, keys in tables.items() if error.place in keys.model_fields), "")
         raise InputError(scene.file, f"{within}{error.place}", error.value, error.allowed, error.choices) from None
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> ContactScene:
     """Build a checked contact scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(ContactScene, table, file, folder)
+    scene = checked(ContactScene, scene_tables, scene_path, scene_folder)
     _raise_first_refusal(
         scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method_refusals
     )
@@ -213,8 +215,8 @@ Refusals = Iterator[tuple[str, Any, str]]
 """Wrong keys of a scene, their values and what is allowed there; the first of them is reported."""
 
 
-def _raise_first_refusal(scene: ContactScene, *checks: Callable[[ContactScene], Refusals]) -> None:
-    for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
+def _raise_first_refusal(scene: ContactScene, *refusal_checks: Callable[[ContactScene], Refusals]) -> None:
+    for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in refusal_checks):
         raise InputError(scene.file, key_path, value, allowed)
 
 
@@ -306,7 +308,7 @@ def _method_refusals(scene: ContactScene) -> Refusals:
     geometry.
     """
     method = scene.method
-    for key in sorted(method.model_fields_set & method.unread()):
+    for key in sorted(method.model_fields_set & method.unread_keys()):
         yield f"method.{key}", getattr(method, key), f"has no meaning for {method.name}"
     if scene.cases is not None and method.name != "fastsim":
         yield "method.name", method.name, "a table of cases is computed by fastsim"

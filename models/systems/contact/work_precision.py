@@ -25,9 +25,9 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
 from models.systems.contact.assumptions import pressing_assumptions
-from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
+from models.systems.contact.run import Progress, hertzian_contact, inputs_of_scene_contact, interpenetration_contact
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.stated_error import MOST_CELLS
+from models.systems.contact.stated_error import LARGEST_CELL_COUNT
 
 CreepageParts = tuple[float, float, float]
 CREEPAGE_KINDS: dict[str, CreepageParts] = {
@@ -71,7 +71,7 @@ class ContactCase:
     error: float = np.nan
 
     @property
-    def limit(self) -> float:
+    def friction_limit(self) -> float:
         """Largest tangential force (N): coefficient of friction times load."""
         return self.friction * self.load
 
@@ -82,7 +82,7 @@ class ContactCase:
         """
         c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
         parts = np.array(self.parts)
-        unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
+        unit = self.friction_limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
 
     @property
@@ -90,24 +90,26 @@ class ContactCase:
         """Exact tangential force (2,), fx and fy, divided by mu N."""
         return np.array([self.fx, self.fy])
 
-    def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
-        """Returns the case's contact as an object of ``theory``, a theory of elliptic contacts."""
-        return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
+    def contact(self, theory_class: Callable[..., OnEllipse], **theory_choices: Any) -> OnEllipse:
+        """Returns the case's contact as an object of ``theory_class``, a theory of elliptic contacts."""
+        return theory_class(
+            by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **theory_choices
+        )
 
 
-def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = EXACT_GRID_CELLS) -> ContactCase:
+def with_exact_forces(contact_case: ContactCase, finest_cell_counts: tuple[int, ...] = EXACT_GRID_CELLS) -> ContactCase:
     """Returns the case with its exact forces, extrapolated to vanishing cells, and with the error that remains.
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
     """
-    contact = case.contact(ExactOnEllipse)
-    scale = case.limit * np.array([1.0, 1.0, np.sqrt(case.a * case.b)])
+    contact = contact_case.contact(ExactOnEllipse)
+    scale = contact_case.friction_limit * np.array([1.0, 1.0, np.sqrt(contact_case.a * contact_case.b)])
     best, error = np.full(3, np.nan), np.inf
-    for fine in finest:
+    for fine in finest_cell_counts:
         try:
-            rolled = [contact.roll(case.motion, cells) for cells in (fine // 4, fine // 2, fine)]
+            rolled = [contact.roll(contact_case.motion, cells) for cells in (fine // 4, fine // 2, fine)]
         except RunFailed:
-            if fine == finest[0]:
+            if fine == finest_cell_counts[0]:
                 raise
             break
         best, error = extrapolated_to_vanishing_cells(
@@ -115,17 +117,17 @@ def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = EXACT_GRID_CE
         )
         if error < GRID_ERROR_LIMIT:
             break
-    return replace(case, fx=float(best[0]), fy=float(best[1]), mz=float(best[2]), error=error)
+    return replace(contact_case, fx=float(best[0]), fy=float(best[1]), mz=float(best[2]), error=error)
 
 
-def extrapolated_to_vanishing_cells(grids: list[Array]) -> tuple[Array, float]:
-    """Returns fx, fy and mz (3,) extrapolated to vanishing cells, and the error of fx and fy. ``grids`` : fx, fy and mz
-    on three grids, each with cells half as long as the grid before.
+def extrapolated_to_vanishing_cells(forces_by_grid: list[Array]) -> tuple[Array, float]:
+    """Returns fx, fy and mz (3,) extrapolated to vanishing cells, and the error of fx and fy. ``forces_by_grid`` : fx,
+    fy and mz on three grids, each with cells half as long as the grid before.
 
     The error of the cells is of first order where much sticks and of second where all slips. The order is chosen with
     which the extrapolations from the two coarser and the two finer grids agree best; their difference is the error.
     """
-    coarse, middle, fine = grids
+    coarse, middle, fine = forces_by_grid
     extrapolations = [
         (fine + (fine - middle) / divisor, middle + (middle - coarse) / divisor) for divisor in (1.0, 3.0)
     ]
@@ -146,24 +148,26 @@ class TheorySettings:
     rolled: Callable[[ContactCase, int], ForcesOfMotion]
 
 
-def _fastsim(**choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
-    def rolled(case: ContactCase, cells: int) -> ForcesOfMotion:
-        ellipse = Ellipse(case.a / case.b, case.pair, cells=cells, **choices)
-        return lambda motion: ellipse(case.a, case.load, case.friction, *motion)
+def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
+        ellipse = Ellipse(contact_case.a / contact_case.b, contact_case.pair, cells=cell_count, **fastsim_choices)
+        return lambda motion: ellipse(contact_case.a, contact_case.load, contact_case.friction, *motion)
 
     return rolled
 
 
-def _simplified(case: ContactCase, cells: int) -> ForcesOfMotion:
-    pressed = interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair)
-    contact = Simplified(pressed, case.friction)
-    return lambda motion: contact.roll(motion, cells)
+def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
+    pressed = interpenetration_contact(
+        by_axes(contact_case.a, contact_case.b, contact_case.pair, load=contact_case.load), contact_case.pair
+    )
+    contact = Simplified(pressed, contact_case.friction)
+    return lambda motion: contact.roll(motion, cell_count)
 
 
-def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
-    def rolled(case: ContactCase, cells: int) -> ForcesOfMotion:
-        contact = case.contact(theory)
-        return lambda motion: contact.roll(motion, cells)
+def _rolled_by_theory(theory_class: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
+        contact = contact_case.contact(theory_class)
+        return lambda motion: contact.roll(motion, cell_count)
 
     return rolled
 
@@ -212,19 +216,23 @@ class TheoryPoint:
         return float(np.quantile(self.errors, 0.95))
 
 
-def measure_theory(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
-    """Measure force errors and evaluation time of a theory over all cases. The time is the median of ``repeats`` in
-    each case, then the median over the cases.
+def measure_theory(
+    theory_settings: TheorySettings, cell_count: int, contact_cases: list[ContactCase], repeat_count: int = 3
+) -> TheoryPoint:
+    """Measure force errors and evaluation time of a theory over all cases. The time is the median of ``repeat_count``
+    in each case, then the median over the cases.
     """
     errors, seconds = [], []
-    for case in cases:
-        answer, seconds_taken = _forces_and_seconds(theory.rolled(case, cells), case.motion, repeats)
-        errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
+    for case in contact_cases:
+        answer, seconds_taken = _forces_and_seconds(theory_settings.rolled(case, cell_count), case.motion, repeat_count)
+        errors.append(float(np.linalg.norm(tangential_force_of(answer) / case.friction_limit - case.force)))
         seconds.append(seconds_taken)
-    return TheoryPoint(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
+    return TheoryPoint(
+        theory_settings.name, cell_count, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds))
+    )
 
 
-def force_of(computed_forces: Any) -> Array:
+def tangential_force_of(computed_forces: Any) -> Array:
     """Tangential force (2,) in N from what a theory returns: a tuple of forces and moment, or an object with
     ``force``.
     """
@@ -235,26 +243,26 @@ LEAST_TIMED_SECONDS = 2e-5
 """Least time (s) over which an evaluation is repeated to measure its time."""
 
 
-def _forces_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tuple[Any, float]:
+def _forces_and_seconds(forces_of_motion: ForcesOfMotion, motion: Motion, repeat_count: int) -> tuple[Any, float]:
     start = time.perf_counter()
-    answer = roll(motion)
+    answer = forces_of_motion(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))
     seconds_taken = []
-    for _ in range(repeats if count > 1 else 1):
+    for _ in range(repeat_count if count > 1 else 1):
         start = time.perf_counter()
         for _ in range(count):
-            answer = roll(motion)
+            answer = forces_of_motion(motion)
         seconds_taken.append((time.perf_counter() - start) / count)
     return answer, float(np.median(seconds_taken))
 
 
 def fastest_point(
-    points: list[TheoryPoint], target_error: float, error: Callable[[TheoryPoint], float]
+    theory_points: list[TheoryPoint], target_error: float, error_of_point: Callable[[TheoryPoint], float]
 ) -> TheoryPoint | None:
     """Returns the fastest theory, with its number of cells, whose error is at most ``target_error``; None if no error
     is so small.
     """
-    meets = [point for point in points if error(point) <= target_error]
+    meets = [point for point in theory_points if error_of_point(point) <= target_error]
     return min(meets, key=lambda point: point.seconds, default=None)
 
 
@@ -276,22 +284,22 @@ def ellipse_cases(
     ]
 
 
-def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], progress: Progress) -> Result:
+def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], report_progress: Progress) -> Result:
     """Measure errors and times of every theory on every number of cells, on the scene's ellipse; the result's detail is
     the list of ``TheoryPoint``.
 
     creepage_levels : sizes of the creepage; at 1 the linear theory reaches mu N.
     """
-    hertz, built = hertz_of(scene), scene_contact(scene)
+    hertz, built = hertzian_contact(scene), inputs_of_scene_contact(scene)
     cases = ellipse_cases(
         float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, creepage_levels
     )
     known, points = list[ContactCase](), list[TheoryPoint]()
     for i, case in enumerate(cases):
-        progress("exact theory", 0.5 * i / len(cases))
+        report_progress("exact theory", 0.5 * i / len(cases))
         known.append(with_exact_forces(case))
     for i, theory in enumerate(THEORIES_COMPARED):
-        progress(theory.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
+        report_progress(theory.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
         points += [measure_theory(theory, cells, known) for cells in theory.cells]
     channels = {
         "theory": Channel("point", [point.name for point in points], "", "theory, with its choices"),
@@ -302,7 +310,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], pro
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
     with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactOnEllipse)))
-    left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
+    left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, LARGEST_CELL_COUNT)
     return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 
 
@@ -310,19 +318,19 @@ ERROR_TARGETS = (0.05, 0.02, 0.01, 0.005)
 """Target errors of the force, divided by mu N, for which the cheapest theory is listed."""
 
 
-def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
+def cheapest_lines(theory_points: list[TheoryPoint]) -> list[tuple[str, ...]]:
     """Table rows for every target error: the fastest theory whose mean error meets the target, and the fastest whose
     error meets it in 95 of 100 cases.
     """
     errors = attrgetter("mean"), attrgetter("quantile_95")
     return [
-        (f"{100 * target:g} %", *(_point_text(fastest_point(points, target, error), error) for error in errors))
+        (f"{100 * target:g} %", *(_point_text(fastest_point(theory_points, target, error), error) for error in errors))
         for target in ERROR_TARGETS
     ]
 
 
-def _point_text(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
-    if point is None:
+def _point_text(theory_point: TheoryPoint | None, error_of_point: Callable[[TheoryPoint], float]) -> str:
+    if theory_point is None:
         return "none"
-    seconds = cost((point.seconds, *point.range))
-    return f"{point.name}, {point.cells} cells: {seconds} ({100 * error(point):.2g} %)"
+    seconds = cost((theory_point.seconds, *theory_point.range))
+    return f"{theory_point.name}, {theory_point.cells} cells: {seconds} ({100 * error_of_point(theory_point):.2g} %)"

@@ -31,14 +31,14 @@ outer wheel.
 """
 
 
-def assumptions(handling: Handling) -> list[Assumption]:
+def assumptions(handling_model: Handling) -> list[Assumption]:
     """Assumptions of the equations of a manoeuvre, about wheel loads, lean, friction, tyres, steer angle and travel."""
     return [
         Assumption(
             "wheel loads",
             "cornering stiffness grows with a tyre's load",
             "drive more slowly or steer less: no tyre here levels off",
-            lambda run: _watched_by_tyre(run["load"] / _static_loads(handling), handling),
+            lambda run: _watched_by_tyre(run["load"] / _static_loads(handling_model), handling_model),
             "of the load at rest",
             upper_limit=LARGEST_LOAD_RATIO,
         ),
@@ -46,7 +46,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "small lean",
             "springs stay upright on a car that leans little",
             "drive more slowly or steer less: no suspension here has a geometry",
-            lambda run: _lean_angles(run, handling),
+            lambda run: _lean_angles(run, handling_model),
             "rad",
             -LARGEST_LEAN,
             LARGEST_LEAN,
@@ -55,7 +55,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "one friction",
             "friction is the same at any sliding speed, and little of the weight slides fast",
             'brake less, or use system = "braking", whose tyre tables know locked wheels',
-            lambda run: {"all tyres": _sliding_share(run, handling)},
+            lambda run: {"all tyres": _sliding_share(run, handling_model)},
             "of the weight",
             upper_limit=SLIDING_WEIGHT_SHARE,
         ),
@@ -63,7 +63,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "moving tyres",
             "wheels move faster than the speed below which their bristles creep",
             "end the manoeuvre before the car stops: shorten its duration",
-            lambda run: _watched_by_tyre(_contact_speed(run), handling),
+            lambda run: _watched_by_tyre(_contact_speed(run), handling_model),
             "m/s",
             lower_limit=FADING_SPEED,
         ),
@@ -71,7 +71,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "slow steering",
             "tyres build up their forces at once",
             f"steer more slowly, or drive faster: the lag of {RELAXATION_LENGTH:g} m of way is not modelled",
-            lambda run: _watched_by_tyre(_carcass_lag(run), handling),
+            lambda run: _watched_by_tyre(_carcass_lag(run), handling_model),
             "rad",
             -LARGEST_SLIP_LEAD,
             LARGEST_SLIP_LEAD,
@@ -80,19 +80,19 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "steer angle",
             "both front wheels steer by the same angle, and their joints allow it",
             f"steer by at most {LARGEST_STEER:g} rad in manoeuvres.NAME.steer",
-            lambda run: _watched_by_tyre(run["steer"], handling),
+            lambda run: _watched_by_tyre(run["steer"], handling_model),
             "rad",
             -LARGEST_STEER,
             LARGEST_STEER,
         ),
-        *_travel_assumptions(handling),
-        *_stop_assumptions(handling),
+        *_travel_assumptions(handling_model),
+        *_stop_assumptions(handling_model),
     ]
 
 
-def _stop_assumptions(handling: Handling) -> list[Assumption]:
+def _stop_assumptions(handling_model: Handling) -> list[Assumption]:
     """Assumptions that bodies stay between the stops of the vehicle file that are not part of the model."""
-    coordinates = handling.vehicle.coordinates()
+    coordinates = handling_model.vehicle.coordinates()
     return [
         Assumption(
             f"stops {body} {freedom}",
@@ -103,22 +103,22 @@ def _stop_assumptions(handling: Handling) -> list[Assumption]:
             low,
             high,
         )
-        for (body, freedom), low, high in handling.given.ranges
+        for (body, freedom), low, high in handling_model.given.ranges
     ]
 
 
-def _travel_assumptions(handling: Handling) -> list[Assumption]:
+def _travel_assumptions(handling_model: Handling) -> list[Assumption]:
     """Assumptions that the travel of upright wheel springs stays within the spring's force curve, or without a curve
     within the usual stops of a car.
     """
-    carrying = {chassis_of(handling.given).name, *handling.given.towed}
-    bodies = {tyre.body for tyre in handling.given.tyres}
+    carrying = {chassis_of(handling_model.given).name, *handling_model.given.towed}
+    bodies = {tyre.body for tyre in handling_model.given.tyres}
     listed = []
-    for spring in handling.given.springs:
+    for spring in handling_model.given.springs:
         upright = spring.axis[2] > 0.9 and spring.first_body in carrying and spring.second_body in bodies
-        if not upright or (spring.second_body, "z") not in handling.vehicle.coordinates():
+        if not upright or (spring.second_body, "z") not in handling_model.vehicle.coordinates():
             continue
-        column = handling.vehicle.coordinates().index((str(spring.second_body), "z"))
+        column = handling_model.vehicle.coordinates().index((str(spring.second_body), "z"))
         low, high = -LARGEST_TRAVEL, LARGEST_TRAVEL
         remedy = "drive more slowly, or give the spring a travel_force with its stops in the vehicle file"
         if curve := spring.travel_force:
@@ -137,46 +137,50 @@ def _travel_assumptions(handling: Handling) -> list[Assumption]:
     return listed
 
 
-def _watched_coordinate(column: int, name: str, run: Result) -> Watched:
-    return {name: run["positions"][:, column]}
+def _watched_coordinate(coordinate_column: int, coordinate_name: str, run_result: Result) -> Watched:
+    return {coordinate_name: run_result["positions"][:, coordinate_column]}
 
 
-def _watched_by_tyre(values: np.ndarray, handling: Handling) -> Watched:
-    return {tyre.name: column for tyre, column in zip(handling.vehicle.tyres, values.T, strict=True)}
+def _watched_by_tyre(tyre_values: np.ndarray, handling_model: Handling) -> Watched:
+    return {tyre.name: column for tyre, column in zip(handling_model.vehicle.tyres, tyre_values.T, strict=True)}
 
 
-def _static_loads(handling: Handling) -> np.ndarray:
-    return np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
+def _static_loads(handling_model: Handling) -> np.ndarray:
+    return np.array([handling_model.held.tyres[tyre.name] for tyre in handling_model.vehicle.tyres])
 
 
-def _lean_angles(run: Result, handling: Handling) -> Watched:
-    coordinates = handling.vehicle.coordinates()
-    names = {SWAY: "", **{hitch_of(name): f" of {name} beside what tows it" for name in handling.vehicle.towed}}
+def _lean_angles(run_result: Result, handling_model: Handling) -> Watched:
+    coordinates = handling_model.vehicle.coordinates()
+    names = {SWAY: "", **{hitch_of(name): f" of {name} beside what tows it" for name in handling_model.vehicle.towed}}
     turns = [("roll", "rx"), ("pitch", "ry")]
     leans = {f"{angle}{body_suffix}": (body, turn) for body, body_suffix in names.items() for angle, turn in turns}
     return {
-        name: run["positions"][:, coordinates.index(coordinate)]
+        name: run_result["positions"][:, coordinates.index(coordinate)]
         for name, coordinate in leans.items()
         if coordinate in coordinates
     }
 
 
-def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
+def _sliding_share(run_result: Result, handling_model: Handling) -> np.ndarray:
     """Share (m,) of the vehicle's weight on tyres that slide faster than SLIDING_SPEED and faster than
     SLIDING_SPEED_SHARE of the wheel's speed.
     """
-    fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING_SPEED, SLIDING_SPEED_SHARE * _contact_speed(run))
-    weight = GRAVITY * sum(body.mass for body in handling.vehicle.bodies)
-    return np.sum(run["load"] * fast, axis=1) / weight
+    fast = np.hypot(run_result["slip_x"], run_result["slip_y"]) > np.maximum(
+        SLIDING_SPEED, SLIDING_SPEED_SHARE * _contact_speed(run_result)
+    )
+    weight = GRAVITY * sum(body.mass for body in handling_model.vehicle.bodies)
+    return np.sum(run_result["load"] * fast, axis=1) / weight
 
 
-def _contact_speed(run: Result) -> np.ndarray:
+def _contact_speed(run_result: Result) -> np.ndarray:
     """Speed (m/s) of every wheel over the road, from rolling and sliding together, shape (m, w)."""
-    return np.hypot(run["tread"] + run["slip_x"], run["slip_y"])
+    return np.hypot(run_result["tread"] + run_result["slip_x"], run_result["slip_y"])
 
 
-def _carcass_lag(run: Result) -> np.ndarray:
+def _carcass_lag(run_result: Result) -> np.ndarray:
     """Change of the steer angle (rad) while a wheel rolls over the relaxation length of its tyre, shape (m, w)."""
     return (
-        np.gradient(run["steer"], run.times, axis=0) * RELAXATION_LENGTH / np.maximum(_contact_speed(run), FADING_SPEED)
+        np.gradient(run_result["steer"], run_result.times, axis=0)
+        * RELAXATION_LENGTH
+        / np.maximum(_contact_speed(run_result), FADING_SPEED)
     )

@@ -2,7 +2,7 @@
 
 from models.engines.export import Exported, ExportSubject, elements_left_out, export_free_vehicle
 from models.multibody.numbers import Handling
-from models.systems.handling.run import driven_by
+from models.systems.handling.run import driven_model
 from models.systems.handling.scene import HandlingScene
 
 AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
@@ -19,10 +19,10 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
 
 
 def export_handling(
-    engine: str, handling: Handling, export_subject: ExportSubject, further_omissions: list[str]
+    engine: str, handling_model: Handling, export_subject: ExportSubject, further_omissions: list[str]
 ) -> Exported:
     """Export a vehicle as a model file of an engine. ``further_omissions`` lists what the file leaves out besides
     springs, tyres and other forces of the vehicle.
     """
-    left_out = [*elements_left_out(handling.vehicle), *further_omissions]
-    return export_free_vehicle(engine, driven_by(handling), export_subject, left_out)
+    left_out = [*elements_left_out(handling_model.vehicle), *further_omissions]
+    return export_free_vehicle(engine, driven_model(handling_model), export_subject, left_out)

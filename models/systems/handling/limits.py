@@ -15,7 +15,7 @@ from models.vehicles.free_vehicle import SWAY, spinning
 from models.vehicles.spatial import Freedom, hitch_of
 
 if TYPE_CHECKING:
-    from models.systems.handling.run import Drive
+    from models.systems.handling.run import SimulatedDrive
 
 STABILITY_LIMIT = 2.78
 """Stability limit of the classical Runge-Kutta method on the negative real axis: step times decay rate."""
@@ -25,15 +25,15 @@ the road's plane; and yaw (rad) of a towed body relative to its towing vehicle b
 """
 
 
-def check_upright(handling: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
+def check_upright(handling_model: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
     """Raise RunFailed where the car turns over or the train jackknifes, as the model is invalid from then on.
 
     positions (m, n) : coordinates of the vehicle at the times (m,) in s.
     """
-    for body, freedoms, largest_angle, failure in _rotation_bounds(handling):
+    for body, freedoms, largest_angle, failure in _rotation_bounds(handling_model):
         columns = [
             i
-            for i, (name, freedom) in enumerate(handling.vehicle.coordinates())
+            for i, (name, freedom) in enumerate(handling_model.vehicle.coordinates())
             if name == body and freedom in freedoms
         ]
         exceeds = (np.abs(positions[:, columns]) > largest_angle).any(axis=1)
@@ -41,12 +41,12 @@ def check_upright(handling: Handling, times: np.ndarray, positions: np.ndarray, 
             raise RunFailed(engine, f"{failure}; drive more slowly or steer less", float(times[np.argmax(exceeds)]))
 
 
-def _rotation_bounds(handling: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
+def _rotation_bounds(handling_model: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
     """Yields the limits of rotation of the car and of each towed body: name of the body, its rotational freedoms, the
     largest angle (rad), and text on what exceeding it means.
     """
     yield SWAY, ("rx", "ry"), TURNOVER_ANGLE, f"the car turns over: it leans by more than {TURNOVER_ANGLE} rad"
-    for name in handling.vehicle.towed:
+    for name in handling_model.vehicle.towed:
         lean_text = f"by more than {{}} rad beside what tows it: {name!r}"
         yield (
             hitch_of(name),
@@ -62,14 +62,14 @@ def _rotation_bounds(handling: Handling) -> Iterator[tuple[str, tuple[Freedom, .
         )
 
 
-def check_step(drive: "Drive", engine: str) -> None:
+def check_step(simulated_drive: "SimulatedDrive", engine: str) -> None:
     """Raise RunFailed for a time step that is too long for the tyres. Sticking bristles damp a wheel with C / u (C the
     slip stiffness, u the speed of the tread), and steps above the stability limit let the wheel oscillate.
     """
-    h, run_times = drive.handling, drive.run.times
-    step, force = float(run_times[1] - run_times[0]), np.hypot(drive["fx"], drive["fy"])
+    h, run_times = simulated_drive.handling, simulated_drive.run.times
+    step, force = float(run_times[1] - run_times[0]), np.hypot(simulated_drive["fx"], simulated_drive["fy"])
     for i, tyre in enumerate(h.vehicle.tyres):
-        n, load, tread = h.tyre_numbers(i), drive["load"][:, i], drive["tread"][:, i]
+        n, load, tread = h.tyre_numbers(i), simulated_drive["load"][:, i], simulated_drive["tread"][:, i]
         stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
         lightness = 1.0 / h.vehicle.body(tyre.body).mass
         if n[at.ROTOR] >= 0.0:

@@ -57,22 +57,22 @@ def describe(scene: HandlingScene) -> str:
     return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _plan_line("never", never)])
 
 
-def _native_shares(handling: Handling) -> list[tuple[str, str]]:
+def _native_shares(handling_model: Handling) -> list[tuple[str, str]]:
     """Lines (heading, text) on the springs that each engine computes by native elements, and on why other springs are
     computed by compiled forces.
     """
-    divisions = {engine: towed_division(handling, engine) for engine in ENGINES}
+    divisions = {engine: towed_division(handling_model, engine) for engine in ENGINES}
     native = {engine: division.native for engine, division in divisions.items()}
     reasons = [
         ("shared", f"{engine}: {name}: {why}")
         for engine, division in divisions.items()
         for name, why in division.reasons.items()
     ]
-    return [*native_share(handling.vehicle, native), *reasons]
+    return [*native_share(handling_model.vehicle, native), *reasons]
 
 
-def _manoeuvre_text(scene: HandlingScene, name: str) -> str:
-    manoeuvre = scene.manoeuvres[name]
+def _manoeuvre_text(scene: HandlingScene, manoeuvre_name: str) -> str:
+    manoeuvre = scene.manoeuvres[manoeuvre_name]
     if manoeuvre.measured:
         return f"{manoeuvre.duration:g} s along the measured steer angle and speed of {manoeuvre.measured}"
     acts = [control for control in CONTROL_LIMITS if any(value for _, value in getattr(manoeuvre, control))]

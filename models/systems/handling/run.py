@@ -41,7 +41,7 @@ from models.vehicles.spatial_linear import mass
 if TYPE_CHECKING:
     from models.multibody.plain.rolling import PlainRolling
 
-REFERENCE = "reference"
+REFERENCE_ENGINE = "reference"
 """Name of the independent reference: plain equations that share no force with the engines. It takes half a minute for
 every simulated second.
 """
@@ -83,7 +83,7 @@ MOTION_CHANNELS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class SimulatedDrive:
     """A simulated drive. run : times, positions and rates; tyres (m, w, REPORTED) : forces and slips of each tyre;
     ledger (m, LEDGER) : energies and powers; seconds : CPU time of the run.
     """
@@ -94,9 +94,9 @@ class Drive:
     ledger: np.ndarray
     seconds: float = 0.0
 
-    def __getitem__(self, channel: str) -> np.ndarray:
+    def __getitem__(self, tyre_channel: str) -> np.ndarray:
         """Returns a tyre channel (m, w) by its name in TYRE_CHANNELS, with a column for each tyre."""
-        return self.tyres[:, :, TYRE_CHANNELS[channel][0]]
+        return self.tyres[:, :, TYRE_CHANNELS[tyre_channel][0]]
 
     @property
     def path(self) -> np.ndarray:
@@ -135,13 +135,15 @@ class Drive:
         """
         return np.arctan2(-self["slip_y"], np.abs(self["tread"] + self["slip_x"]))
 
-    def grip(self) -> np.ndarray:
+    def largest_tyre_forces(self) -> np.ndarray:
         """Largest horizontal force (m, w) of each tyre in N: friction times load."""
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
         """Utilised friction (m, w): horizontal force of each tyre divided by friction times load, 0 in the air."""
-        return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
+        return np.hypot(self["fx"], self["fy"]) / np.where(
+            self.largest_tyre_forces() > 0.0, self.largest_tyre_forces(), 1.0
+        )
 
     def power(self) -> np.ndarray:
         """Power (m,) in W of all work on the vehicle: dampers, drag and pushes, driver's torques, steering, and
@@ -168,47 +170,59 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     return _with_error(labelled, drive, driven_manoeuvre.speed) if error else labelled
 
 
-def drive_result(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
+def drive_result(scene: HandlingScene, engine: str, manoeuvre_name: str, simulated_drive: SimulatedDrive) -> Result:
     """Returns the result of a simulated manoeuvre, with the assumptions that the drive breaks."""
-    vehicle = drive.handling.vehicle
+    vehicle = simulated_drive.handling.vehicle
     channels = {
-        key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
+        key: Channel(("time", "coordinate"), getattr(simulated_drive.run, key), "m, rad" + per)
         for key, per in (("positions", ""), ("rates", ", per s"))
     }
     channels |= {
-        key: Channel(("time", "tyre"), drive[key], *unit_and_source)
+        key: Channel(("time", "tyre"), simulated_drive[key], *unit_and_source)
         for key, (_, *unit_and_source) in TYRE_CHANNELS.items()
     }
-    channels |= {name: Channel("time", values, *MOTION_CHANNELS[name]) for name, values in drive.motion().items()}
+    channels |= {
+        name: Channel("time", values, *MOTION_CHANNELS[name]) for name, values in simulated_drive.motion().items()
+    }
     axes = {
-        "time": Channel("time", scene.start_time(manoeuvre) + drive.run.times, "s"),
+        "time": Channel("time", scene.start_time(manoeuvre_name) + simulated_drive.run.times, "s"),
         "coordinate": Channel("coordinate", [".".join(coordinate) for coordinate in vehicle.coordinates()]),
         "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
-    counts, seconds = drive.run.counts, drive.seconds
+    counts, seconds = simulated_drive.run.counts, simulated_drive.seconds
     labelled = result(
-        scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=manoeuvre
+        scene,
+        channels,
+        axes,
+        engine=engine,
+        counts=counts,
+        seconds=seconds,
+        detail=simulated_drive,
+        manoeuvre=manoeuvre_name,
     )
-    return with_assumptions(labelled, assumptions(drive.handling))
+    return with_assumptions(labelled, assumptions(simulated_drive.handling))
 
 
-def _with_error(run: Result, drive: Drive, speed: float) -> Result:
+def _with_error(run_result: Result, simulated_drive: SimulatedDrive, start_speed: float) -> Result:
     """Returns the result with stated errors of its motion and tyre forces, estimated by runs in longer time steps and
     with other numbers of cells.
     """
-    rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal_series(drive)
-    still = {"N": STANDSTILL_SHARE * max(drive.handling.held.tyres.values())}
+    rerun, fine = (
+        ManoeuvreRerun(run_result.data.attrs["engine"], simulated_drive, start_speed),
+        principal_series(simulated_drive),
+    )
+    still = {"N": STANDSTILL_SHARE * max(simulated_drive.handling.held.tyres.values())}
     moving = {
         name: values
         for name, values in fine.channels.items()
-        if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
+        if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * start_speed)
     }
     by_step, method_text = step_errors(Series(fine.times, moving), rerun, STEP_ERROR_ORDER, rerun.step)
     by_net = rerun.by_cells(list(moving))
     estimates = {
         name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
     }
-    return with_stated_errors(run, estimates, f"{method_text}, and other nets of the patch")
+    return with_stated_errors(run_result, estimates, f"{method_text}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +232,7 @@ class ManoeuvreRerun:
     """
 
     engine: str
-    drive: Drive
+    drive: SimulatedDrive
     speed: float
 
     @property
@@ -231,30 +245,30 @@ class ManoeuvreRerun:
         """Time series of the manoeuvre in twice the time step; raises RunFailed."""
         return self._series_on_cells(self.drive.handling.tyres.cells, 2.0)
 
-    def _series_on_cells(self, cells: int, factor: float) -> Series:
-        handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
-        changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
-        step = factor * self.step
+    def _series_on_cells(self, cell_count: int, step_factor: float) -> Series:
+        handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / step_factor)
+        changed = handling.changed(tyres=replace(handling.tyres, cells=cell_count))
+        step = step_factor * self.step
         if steps < 1:
             raise RunFailed(self.engine, f"a step of {step:g} s outlasts the manoeuvre")
         return principal_series(drive_run(self.engine, changed, self.speed, steps * step, step))
 
-    def __call__(self, factor: float, share: float) -> Series:
+    def __call__(self, step_factor: float, run_share: float) -> Series:
         """Repeat the manoeuvre in twice the time step, or a share of it in half the step; returns its time series (see
         ``models.core.discretisation.Rerun``)."""
-        if factor > 2.0:
+        if step_factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
-        if factor > 1.0:
+        if step_factor > 1.0:
             return self.in_double_step
-        run, handling, step = self.drive.run, self.drive.handling, factor * self.step
-        first = round(min(REPEATED_PART_START, 1.0 - share) * (len(run.times) - 1))
-        count = max(2, round(share * (len(run.times) - 1) / factor))
+        run, handling, step = self.drive.run, self.drive.handling, step_factor * self.step
+        first = round(min(REPEATED_PART_START, 1.0 - run_share) * (len(run.times) - 1))
+        count = max(2, round(run_share * (len(run.times) - 1) / step_factor))
         later = _manoeuvre_from(handling, run.times[first])
-        model = build(self.engine, later, Settings("RK4", step, count * step))
+        model = build_in_engine(self.engine, later, Settings("RK4", step, count * step))
         path = model.run(run.positions[first], run.rates[first])
         return principal_series(drive_of_fixed_steps(later, path, self.engine), run.times[first])
 
-    def by_cells(self, names: list[str]) -> dict[str, Estimate]:
+    def by_cells(self, channel_names: list[str]) -> dict[str, Estimate]:
         """Estimate the errors that the cells of the tyre patches cause in channels, by a run with a third of the cells.
 
         The error does not fall evenly with the number of cells. The ratio of the error to the difference of both runs
@@ -274,17 +288,17 @@ class ManoeuvreRerun:
             np.linalg.norm(creep_forces - forces_on_more) / (1.0 - 0.5**CELL_ERROR_ORDER),
         )
         share, estimates = error / force_difference if force_difference > 0.0 else 0.0, dict[str, Estimate]()
-        for name in names:
+        for name in channel_names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
             net = grid_error(gap, reference_size(values), UNIT_OF_CHANNEL[name], cells, CELL_ERROR_ORDER, MOST_CELLS)
             estimates[name] = replace(net, of=CELLS_KEY)
         return estimates
 
-    def _creep_forces(self, cells: int) -> np.ndarray:
+    def _creep_forces(self, cell_count: int) -> np.ndarray:
         """Creep forces (m, w, 2) in N at every n-th state of the drive, computed with another number of cells."""
         run, handling = self.drive.run, self.drive.handling
-        numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
+        numbers = handling.changed(tyres=replace(handling.tyres, cells=cell_count)).numbers
         sampled_times, positions, rates = (
             np.ascontiguousarray(run_array[::ROW_STRIDE_OF_CELL_ERROR])
             for run_array in (run.times, run.positions, run.rates)
@@ -294,82 +308,97 @@ class ManoeuvreRerun:
         return report[:, :, [at.FX, at.FY]]
 
 
-def principal_series(drive: Drive, start_time: float = 0.0) -> Series:
+def principal_series(simulated_drive: SimulatedDrive, start_time: float = 0.0) -> Series:
     """Time series of the channels whose error is estimated, for a drive that begins at ``start_time`` (s)."""
-    motion = dict(zip(UNIT_OF_CHANNEL, drive.velocity().T, strict=False))
+    motion = dict(zip(UNIT_OF_CHANNEL, simulated_drive.velocity().T, strict=False))
     return Series(
-        start_time + drive.run.times, motion | {name: drive[name] for name in UNIT_OF_CHANNEL if name in TYRE_CHANNELS}
+        start_time + simulated_drive.run.times,
+        motion | {name: simulated_drive[name] for name in UNIT_OF_CHANNEL if name in TYRE_CHANNELS},
     )
 
 
-def _manoeuvre_from(handling: Handling, start_time: float) -> Handling:
+def _manoeuvre_from(handling_model: Handling, start_time: float) -> Handling:
     """Returns the manoeuvre with its controls and external forces shifted, so that time 0 is ``start_time`` (s)."""
 
     def shifted_control(control: Control) -> Control:
         return tuple((time - start_time, value) for time, value in control)
 
-    controls_then = handling.controls
+    controls_then = handling_model.controls
     controls = replace(
         controls_then,
         steer=shifted_control(controls_then.steer),
         brake=shifted_control(controls_then.brake),
         drive=shifted_control(controls_then.drive),
     )
-    return handling.changed(
-        controls=controls, pushes=tuple(replace(push, size=shifted_control(push.size)) for push in handling.pushes)
+    return handling_model.changed(
+        controls=controls,
+        pushes=tuple(replace(push, size=shifted_control(push.size)) for push in handling_model.pushes),
     )
 
 
-def build(engine: str, handling: Handling, settings: Settings | None = None) -> FreeModel:
-    """Build the vehicle in "exudyn" or "mujoco", or as the plain equations of "reference". settings : integrator, step
-    and duration, needed for runs only.
+def build_in_engine(engine: str, handling_model: Handling, solver_settings: Settings | None = None) -> FreeModel:
+    """Build the vehicle in "exudyn" or "mujoco", or as the plain equations of "reference". solver_settings :
+    integrator, step and duration, needed for runs only.
     """
-    if engine == REFERENCE:
-        return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    division, full_forces = towed_division(handling, engine), driven_by(handling)
+    if engine == REFERENCE_ENGINE:
+        return Plain(
+            engine,
+            _plain_equations(handling_model).acceleration,
+            len(handling_model.vehicle.coordinates()),
+            solver_settings,
+        )
+    division, full_forces = towed_division(handling_model, engine), driven_model(handling_model)
     parts = (*full_forces.parts, *division.native)
-    return free_model(engine, replace(full_forces, numbers=shared_numbers(handling, division), parts=parts), settings)
+    return free_model(
+        engine, replace(full_forces, numbers=shared_numbers(handling_model, division), parts=parts), solver_settings
+    )
 
 
-def _plain_equations(handling: Handling) -> "PlainRolling":
+def _plain_equations(handling_model: Handling) -> "PlainRolling":
     from models.multibody.plain.rolling import PlainRolling
 
-    return PlainRolling(handling)
+    return PlainRolling(handling_model)
 
 
-def driven_by(handling: Handling) -> Driven:
+def driven_model(handling_model: Handling) -> Driven:
     """Returns what an engine builds of the car: bodies, elements along joint coordinates, and all compiled forces with
     their parameters.
     """
-    parts = joint_parts(handling.vehicle)
-    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
+    parts = joint_parts(handling_model.vehicle)
+    return Driven(
+        handling_model.vehicle, handling_model.gravity, handling_model.numbers, at.forces, at.set_forces, parts
+    )
 
 
-def drive_run(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
+def drive_run(
+    engine: str, handling_model: Handling, start_speed: float, duration: float, time_step: float = 1e-3
+) -> SimulatedDrive:
     """Simulate a manoeuvre from straight rolling at a speed (m/s) for a duration (s). Raises RunFailed where the
     vehicle turns over, the step (s) is too long or the motion is not finite.
     """
-    model = build(engine, handling, Settings("RK4", step, duration))
+    model = build_in_engine(engine, handling_model, Settings("RK4", time_step, duration))
     start_time = time.process_time()
-    with _failing_as_turnover(handling, engine):
-        path = model.run(*handling.straight(speed))
-    return drive_of_fixed_steps(handling, path, engine, time.process_time() - start_time)
+    with _failing_as_turnover(handling_model, engine):
+        path = model.run(*handling_model.straight(start_speed))
+    return drive_of_fixed_steps(handling_model, path, engine, time.process_time() - start_time)
 
 
-def drive_run_adaptive(engine: str, handling: Handling, speed: float, settings: Settings) -> Drive:
+def drive_run_adaptive(
+    engine: str, handling_model: Handling, start_speed: float, solver_settings: Settings
+) -> SimulatedDrive:
     """Simulate a manoeuvre as ``drive_run`` does, by an integrator of "exudyn" or "reference" that chooses its own time
     steps.
     """
     from models.engines.free_vehicle_adaptive import march_adaptively
 
-    model, start_time = build(engine, handling), time.process_time()
-    with _failing_as_turnover(handling, engine):
-        path = march_adaptively(model, *handling.straight(speed), settings)
-    return drive_with_reports(handling, path, engine, time.process_time() - start_time)
+    model, start_time = build_in_engine(engine, handling_model), time.process_time()
+    with _failing_as_turnover(handling_model, engine):
+        path = march_adaptively(model, *handling_model.straight(start_speed), solver_settings)
+    return drive_with_reports(handling_model, path, engine, time.process_time() - start_time)
 
 
 @contextmanager
-def _failing_as_turnover(handling: Handling, engine: str) -> Iterator[None]:
+def _failing_as_turnover(handling_model: Handling, engine: str) -> Iterator[None]:
     """Context in which a failed run says that the car turned over, where that is the reason: engines cannot integrate
     the motion that follows.
     """
@@ -377,50 +406,54 @@ def _failing_as_turnover(handling: Handling, engine: str) -> Iterator[None]:
         yield
     except RunFailed as error:
         if error.state is not None:
-            check_upright(handling, np.array([error.time]), error.state[None], engine)
+            check_upright(handling_model, np.array([error.time]), error.state[None], engine)
         raise
 
 
-def drive_of_fixed_steps(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
+def drive_of_fixed_steps(
+    handling_model: Handling, trajectory: Trajectory, engine: str = "", run_seconds: float = 0.0
+) -> SimulatedDrive:
     """Returns the drive of a run in fixed steps, with the tyres' forces and slips. Raises RunFailed where the steps are
     too long for the tyres or the motion.
     """
-    drive = drive_with_reports(handling, run, engine, seconds)
+    drive = drive_with_reports(handling_model, trajectory, engine, run_seconds)
     check_step(drive, engine)
-    check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
+    check_resolved(engine, trajectory.times, trajectory.positions, trajectory.rates, mass(handling_model.vehicle))
     return drive
 
 
-def drive_with_reports(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
+def drive_with_reports(
+    handling_model: Handling, trajectory: Trajectory, engine: str = "", run_seconds: float = 0.0
+) -> SimulatedDrive:
     """Returns the drive of a run, with the tyres' forces and slips. Raises RunFailed where a tyre's force is not
     finite, or the car turns over.
     """
-    report, ledger = _reports_of_run(handling, run, engine)
+    report, ledger = _reports_of_run(handling_model, trajectory, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
-    check_upright(handling, run.times, run.positions, engine)
-    return Drive(handling, run, report, ledger, seconds)
+    check_upright(handling_model, trajectory.times, trajectory.positions, engine)
+    return SimulatedDrive(handling_model, trajectory, report, ledger, run_seconds)
 
 
-def _reports_of_run(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
+def _reports_of_run(handling_model: Handling, trajectory: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
     """Forces and slips of the tyres (m, w, REPORTED), and energies and powers (m, LEDGER) of a run; in the reference
     from its own equations.
     """
-    if engine == REFERENCE:
-        return _plain_equations(handling).report(run.times, run.positions, run.rates)
-    count, tyres = len(run.times), len(handling.vehicle.tyres)
+    if engine == REFERENCE_ENGINE:
+        return _plain_equations(handling_model).report(trajectory.times, trajectory.positions, trajectory.rates)
+    count, tyres = len(trajectory.times), len(handling_model.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
-    states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
-    at.reports(handling.numbers, run.times, *states, report, ledger)
-    for element in handling.vehicle.joint_elements:
-        travel, rate = (joint_travel(handling, element, values) for values in states)
+    states = np.ascontiguousarray(trajectory.positions), np.ascontiguousarray(trajectory.rates)
+    at.reports(handling_model.numbers, trajectory.times, *states, report, ledger)
+    for element in handling_model.vehicle.joint_elements:
+        travel, rate = (joint_travel(handling_model, element, values) for values in states)
         ledger[:, at.POTENTIAL] += (element.preload + 0.5 * element.stiffness * travel) * travel
         ledger[:, at.DISSIPATED] -= element.damping * rate**2
     return report, ledger
 
 
-def joint_travel(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
+def joint_travel(handling_model: Handling, joint_element: JointElement, coordinate_values: np.ndarray) -> np.ndarray:
     """Displacement d (m,) of a joint element from positions (m, n), or its rate from rates."""
-    coordinates = handling.vehicle.coordinates()
-    columns = [coordinates.index(coordinate) for coordinate in element.coordinates]
-    return np.asarray(values[..., columns] @ np.array(element.factors))
+    coordinates = handling_model.vehicle.coordinates()
+    columns = [coordinates.index(coordinate) for coordinate in joint_element.coordinates]
+    return np.asarray(coordinate_values[..., columns] @ np.array(joint_element.factors))

@@ -31,7 +31,7 @@ CONTROL_LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "driv
 """Smallest and largest value of each of the driver's controls, with its unit."""
 
 
-class HandlingVehicle(Strict):
+class HandlingVehicleTable(Strict):
     """[vehicle]: file of a vehicle whose chassis has six degrees of freedom, with a cornering stiffness for every tyre;
     it may tow trailers.
     """
@@ -42,7 +42,7 @@ class HandlingVehicle(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class TyreTable(Strict):
+class HandlingTyreTable(Strict):
     """[tyres]: parameters of wheels and tyres that are not in the vehicle file."""
 
     friction: float = quantity("", "coefficient between tyre and road", default=0.9)
@@ -61,7 +61,7 @@ class TyreTable(Strict):
     )
 
 
-class RoadTable(Strict):
+class HandlingRoadTable(Strict):
     """[road]: the rough road surface, the same for all manoeuvres that run on a rough road."""
 
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="A", description="class, its mean level")
@@ -69,7 +69,7 @@ class RoadTable(Strict):
     seed: int = Field(default=1, ge=0, le=2**62, description="of the waves")
 
 
-class RunTable(Strict):
+class HandlingRunTable(Strict):
     """[run]: time step, and which spring forces the engines compute by native elements."""
 
     step: float = quantity(
@@ -114,36 +114,38 @@ class HandlingScene(SceneFile):
 
     system: str = Field(default="handling", pattern="^handling$")
     study: str = Field(default="handling", description="the study that runs the scene")
-    vehicle: HandlingVehicle = HandlingVehicle()
-    tyres: TyreTable = TyreTable()
-    road: RoadTable = RoadTable()
-    run: RunTable = RunTable()
+    vehicle: HandlingVehicleTable = HandlingVehicleTable()
+    tyres: HandlingTyreTable = HandlingTyreTable()
+    road: HandlingRoadTable = HandlingRoadTable()
+    run: HandlingRunTable = HandlingRunTable()
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
     _measured_controls: dict[str, Controls] = PrivateAttr(default_factory=dict)
     """Controls that were computed for measured drives, by manoeuvre."""
 
-    def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
+    def adaptive(self, engine: str, manoeuvre_name: str) -> Settings | None:
         """Returns the settings of an engine that chooses its own time steps in a manoeuvre; None for Runge-Kutta 4."""
         adaptive = self.engines.get(engine)
-        duration = self.manoeuvres[manoeuvre].duration
+        duration = self.manoeuvres[manoeuvre_name].duration
         return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
-    def handling(self, name: str) -> Handling:
+    def handling(self, manoeuvre_name: str) -> Handling:
         """Returns vehicle, tyres, road and controls of a manoeuvre. Torques of a measured drive are computed once."""
-        car = self.car(name)
-        if not self.manoeuvres[name].measured:
+        car = self.car(manoeuvre_name)
+        if not self.manoeuvres[manoeuvre_name].measured:
             return car
-        if name not in self._measured_controls:
-            from models.systems.handling.following import controls_along
+        if manoeuvre_name not in self._measured_controls:
+            from models.systems.handling.following import controls_following_drive
 
-            self._measured_controls[name] = controls_along(car, self.drive(name), self.run.step, self.file)
-        return car.changed(controls=self._measured_controls[name])
+            self._measured_controls[manoeuvre_name] = controls_following_drive(
+                car, self.drive(manoeuvre_name), self.run.step, self.file
+            )
+        return car.changed(controls=self._measured_controls[manoeuvre_name])
 
-    def car(self, name: str) -> Handling:
+    def car(self, manoeuvre_name: str) -> Handling:
         """Returns vehicle, tyres, road and scene controls of a manoeuvre, without the controls of a measured drive."""
-        manoeuvre, road = self.manoeuvres[name], self.road
+        manoeuvre, road = self.manoeuvres[manoeuvre_name], self.road
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
@@ -152,23 +154,23 @@ class HandlingScene(SceneFile):
             Handling(self.file_vehicle(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self
         )
 
-    def drive(self, name: str) -> "MeasuredDrive":
+    def drive(self, manoeuvre_name: str) -> "MeasuredDrive":
         """Reads the measured drive of a manoeuvre, cut to the manoeuvre's duration. Raises InputError for a file
         without a drive.
         """
         from models.measured.drive import read_drive
 
-        manoeuvre = self.manoeuvres[name]
-        path = self.path(manoeuvre.measured, f"manoeuvres.{name}.measured")
+        manoeuvre = self.manoeuvres[manoeuvre_name]
+        path = self.path(manoeuvre.measured, f"manoeuvres.{manoeuvre_name}.measured")
         read, table = read_drive(path, tuple(manoeuvre.stretch)), manoeuvre.model_fields_set
         if "duration" not in table:
             return read
         count = round(manoeuvre.duration / float(read.times[1] - read.times[0])) + 1
         return replace(read, **{key: getattr(read, key)[:count] for key in ("times", "steer", "speed")})
 
-    def start_time(self, name: str) -> float:
+    def start_time(self, manoeuvre_name: str) -> float:
         """Start time (s) of a manoeuvre's results: that of its measured drive, or else 0."""
-        return float(self.drive(name).times[0]) if self.manoeuvres[name].measured else 0.0
+        return float(self.drive(manoeuvre_name).times[0]) if self.manoeuvres[manoeuvre_name].measured else 0.0
 
     def file_vehicle(self) -> SpatialVehicle:
         """Returns the vehicle of the vehicle file with its trailers, and with cornering stiffnesses scaled as in
@@ -188,11 +190,11 @@ class HandlingScene(SceneFile):
         return replace(vehicle, side_forces=tuple(forces))
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> HandlingScene:
     """Build a checked handling scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(HandlingScene, table, file, folder)
+    scene = checked(HandlingScene, scene_tables, scene_path, scene_folder)
     scene = _with_measured_drives(scene)
     for name, manoeuvre in scene.manoeuvres.items():
         key_path = f"manoeuvres.{name}"
@@ -218,11 +220,11 @@ def _with_measured_drives(scene: HandlingScene) -> HandlingScene:
     return scene.model_copy(update={"manoeuvres": filled})
 
 
-def _measured_manoeuvre(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
+def _measured_manoeuvre(scene: HandlingScene, manoeuvre_name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
     """Returns a manoeuvre with the speed and duration of its measured drive. Raises InputError for keys that contradict
     the measured file.
     """
-    file, key_path, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
+    file, key_path, drive = scene.file, f"manoeuvres.{manoeuvre_name}", scene.drive(manoeuvre_name)
     for control in CONTROL_LIMITS:
         if getattr(manoeuvre, control) != NO_CONTROL:
             raise InputError(file, f"{key_path}.{control}", None, "cannot go with a measured drive, which has its own")
@@ -250,7 +252,7 @@ def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> N
 
 
 def _check_knots(
-    scene: HandlingScene, key_path: str, knots: list[TimeValuePair], low: float, high: float, unit: str
+    scene: HandlingScene, key_path: str, knots: list[TimeValuePair], lower_limit: float, upper_limit: float, unit: str
 ) -> None:
     """Raise InputError for knots of a control whose times do not rise, whose values exceed the limits, or whose
     value changes within less than a time step.
@@ -258,8 +260,10 @@ def _check_knots(
     (knot_times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(knot_times).all() or (np.diff(knot_times) <= 0.0).any():
         raise InputError(file, key_path, knot_times.tolist(), "times must be finite and rise from knot to knot, in s")
-    if not ((values >= low) & (values <= high)).all():
-        raise InputError(file, key_path, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
+    if not ((values >= lower_limit) & (values <= upper_limit)).all():
+        raise InputError(
+            file, key_path, values.tolist(), f"values must be from {lower_limit:g} to {upper_limit:g} {unit}"
+        )
     shortest = float(np.diff(knot_times)[np.diff(values) != 0.0].min(initial=np.inf))
     if shortest < step * (1.0 - 1e-9):
         allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"

@@ -21,7 +21,7 @@ from models.vehicles.spatial import SpatialVehicle, hitch_of
 
 
 @dataclass(frozen=True)
-class SteadyTurn:
+class SteadyTurnGains:
     """Steady turn per rad of steer angle: yaw rate (rad/s) and lateral velocity (m/s) at the common centre of mass.
 
     ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
@@ -35,9 +35,9 @@ class SteadyTurn:
     towed_headings: tuple[float, ...] = ()
 
 
-def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
+def steady_turn_gains(handling_model: Handling, speed: float) -> SteadyTurnGains:
     """Solve the steady turn of the linear single-track model at a speed (m/s), with the static wheel loads."""
-    vehicle = handling.vehicle
+    vehicle = handling_model.vehicle
     mass = sum(body.mass for body in vehicle.bodies)
     centre = sum(body.mass * body.position[0] for body in vehicle.bodies) / mass
     size = 2 + len(vehicle.towed)
@@ -46,7 +46,7 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
         by_force, _ = _force_balances(vehicle, body.name, body.position[0], centre)
         matrix[:, 1] -= body.mass * speed * by_force
     for i, tyre in enumerate(vehicle.tyres):
-        n = handling.tyre_numbers(i)
+        n = handling_model.tyre_numbers(i)
         a = np.sqrt(n[RADIUS] * n[STATIC] / n[VERTICAL])
         c = 8.0 / 3.0 * a**2 * n[HALF_WIDTH] * n[BRISTLES]
         trail, turning = 3.0 * np.pi / 32.0 * a, n[HALF_WIDTH] ** 2 / 5.0
@@ -59,17 +59,19 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
     side, yaw, *headings = np.linalg.solve(matrix, steered).tolist()
     coordinates = [tyre.point[0] for tyre in vehicle.tyres if vehicle.towed_under(tyre.body) is None]
     wheelbase = max(coordinates) - min(coordinates)
-    return SteadyTurn(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
+    return SteadyTurnGains(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
 
 
-def _force_balances(vehicle: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
+def _force_balances(
+    vehicle: SpatialVehicle, body_name: str, force_x: float, centre_x: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients with which a side force on a body at x (m), and a moment about the vertical, enter the equilibrium
     equations; two arrays (2 + towed,).
 
-    The equations are those of side forces, of moments about the centre of mass at ``centre`` (m), and of moments about
-    the hitch of each towed body.
+    The equations are those of side forces, of moments about the centre of mass at ``centre_x`` (m), and of moments
+    about the hitch of each towed body.
     """
-    chain = vehicle.chain(body)
+    chain = vehicle.chain(body_name)
     behind = np.array([float(name in chain) for name in vehicle.towed])
     hitches = np.array([vehicle.body(hitch_of(name)).position[0] for name in vehicle.towed])
-    return np.array([1.0, x - centre, *(behind * (x - hitches))]), np.array([0.0, 1.0, *behind])
+    return np.array([1.0, force_x - centre_x, *(behind * (force_x - hitches))]), np.array([0.0, 1.0, *behind])

@@ -8,8 +8,8 @@ from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import Angles, element_travels
-from models.systems.hub_forces.scene import HubScene, Road
+from models.systems.hub_forces.measurement import MeasuredAngles, element_travels
+from models.systems.hub_forces.scene import HubScene, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 
 _SMOOTHER_ROAD_ADVICE = (
@@ -42,13 +42,17 @@ LARGEST_IMBALANCE, ROUGH_ROAD_SPEED_CHANGE = 0.05, 0.5
 the change of vertical speed (m/s) that a rough road may cause between the ends of a run."""
 
 
-def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
-    """Assumptions of a run with a stabiliser (``method``), or of the run on tyres over the road (ON_TYRES).
+def assumptions(
+    scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: MeasuredAngles | None = None
+) -> list[Assumption]:
+    """Assumptions of a run with a stabiliser (``stabiliser_method``), or of the run on tyres over the road (ON_TYRES).
 
-    angles : measured angles with which the run is compared; None if the assumptions are only listed.
+    measured_angles : measured angles with which the run is compared; None if the assumptions are only listed.
     """
     listed = (
-        _assumptions_on_tyres(vehicle) if method == ON_TYRES else _assumptions_on_forces(scene, vehicle, method, angles)
+        _assumptions_on_tyres(vehicle)
+        if stabiliser_method == ON_TYRES
+        else _assumptions_on_forces(scene, vehicle, stabiliser_method, measured_angles)
     )
     return [
         *listed,
@@ -56,9 +60,11 @@ def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angle
     ]
 
 
-def usual_travel_assumptions(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
-    """Assumptions that springs, mounts and bars without stops stay within usual travels. ``travel`` returns the travels
-    (m, rad) of a result by name; a travel_force counts as a stop.
+def usual_travel_assumptions(
+    vehicle: CutVehicle, travels_of_result: Callable[[Result], Watched], remedy: str
+) -> list[Assumption]:
+    """Assumptions that springs, mounts and bars without stops stay within usual travels. ``travels_of_result`` returns
+    the travels (m, rad) of a result by name; a travel_force counts as a stop.
     """
     kinds = (("springs", "N", "m", LARGEST_TRAVEL), ("bars", "N m", "rad", LARGEST_JOINT_TURN))
     listed = []
@@ -67,8 +73,8 @@ def usual_travel_assumptions(vehicle: CutVehicle, travel: Callable[[Result], Wat
             element.name for element in vehicle.elements if element.unit == unit_of_kind and not element.travel_force
         }
 
-        def watched(run: Result, names: set[str] = names) -> Watched:
-            return {name: values for name, values in travel(run).items() if name in names}
+        def watched(run_result: Result, element_names: set[str] = names) -> Watched:
+            return {name: values for name, values in travels_of_result(run_result).items() if name in element_names}
 
         says = f"linear {kind} do not meet their stops"
         listed += (
@@ -108,21 +114,23 @@ def _assumptions_on_tyres(vehicle: CutVehicle) -> list[Assumption]:
     ]
 
 
-def _pressing_assumptions(vehicle: CutVehicle, pull: float) -> list[Assumption]:
-    """Assumption that linear tyres never pull at the road by more than ``pull`` (N); empty for tyres that only push."""
+def _pressing_assumptions(vehicle: CutVehicle, largest_pull: float) -> list[Assumption]:
+    """Assumption that linear tyres never pull at the road by more than ``largest_pull`` (N); empty for tyres that only
+    push.
+    """
     lifting = Assumption(
         "tyres press",
         "the linear tyres of the measurement stay on the road",
         "name the effect lift_off, whose tyres only push",
         lambda run: _forces_at_hubs(run, vehicle, 2),
         "N",
-        lower_limit=-pull,
+        lower_limit=-largest_pull,
     )
     return [] if vehicle.uncut.lifts else [lifting]
 
 
 def _assumptions_on_forces(
-    scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None
+    scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: MeasuredAngles | None
 ) -> list[Assumption]:
     """Assumptions of a vehicle driven by measured hub forces: it stays upright, forces are balanced and sampled fast
     enough.
@@ -138,19 +146,19 @@ def _assumptions_on_forces(
             TUMBLED_PITCH,
         )
     ]
-    if method == "none" and scene.forces.frame == "inertial":
+    if stabiliser_method == "none" and scene.forces.frame == "inertial":
         listed.append(
             Assumption(
                 "same attitude",
                 "forces that keep their directions meet a vehicle that lies as the measured one",
                 "name the effect kalman_filter or prescribed_angles",
-                lambda run: _angle_differences(run, angles),
+                lambda run: _angle_differences(run, measured_angles),
                 "rad",
                 -TURNED_FORCE_ANGLE,
                 TURNED_FORCE_ANGLE,
             )
         )
-    if method == "kalman":
+    if stabiliser_method == "kalman":
         listed.append(
             Assumption(
                 "small tilt",
@@ -185,15 +193,15 @@ def _balance_assumption(vehicle: CutVehicle) -> Assumption:
     )
 
 
-def carried_weight_share(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
+def carried_weight_share(vertical_forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
     """Mean of the vertical forces (n,) in N divided by the weight, shape (1,). A deviation from 1 is reduced by the
     part that a change of the vertical speed could explain.
     """
-    excess = forces.mean() / vehicle.loads.sum() - 1.0
+    excess = vertical_forces.mean() / vehicle.loads.sum() - 1.0
     return np.array([1.0 + np.sign(excess) * max(abs(excess) - ROUGH_ROAD_SPEED_CHANGE / (GRAVITY * duration), 0.0)])
 
 
-def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
+def _sampling_assumption(scene: HubScene, road: TwoTrackRoadTable) -> Assumption:
     """Assumption that a virtual measurement samples fast enough to resolve the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
@@ -208,16 +216,16 @@ def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
     )
 
 
-def _angle_differences(run: Result, angles: Angles | None) -> Watched:
+def _angle_differences(run_result: Result, measured_angles: MeasuredAngles | None) -> Watched:
     """Roll and pitch (rad) of a run minus the measured angles, by name."""
-    assert angles is not None
-    angle_times = angles.period * np.arange(len(angles.samples))
+    assert measured_angles is not None
+    angle_times = measured_angles.period * np.arange(len(measured_angles.samples))
     return {
-        name: run[name] - np.interp(run.times, angle_times, angles.samples[:, i])
+        name: run_result[name] - np.interp(run_result.times, angle_times, measured_angles.samples[:, i])
         for i, name in enumerate(("roll", "pitch"))
     }
 
 
-def _forces_at_hubs(run: Result, vehicle: CutVehicle, axis: int) -> dict[str, np.ndarray]:
+def _forces_at_hubs(run_result: Result, vehicle: CutVehicle, axis_index: int) -> dict[str, np.ndarray]:
     """Applied hub forces (n,) in N along an axis (0 x, 1 y, 2 z), by hub name."""
-    return {hub: run.detail.wrenches[:, i, axis] for i, hub in enumerate(vehicle.hubs)}
+    return {hub: run_result.detail.wrenches[:, i, axis_index] for i, hub in enumerate(vehicle.hubs)}

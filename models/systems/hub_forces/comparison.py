@@ -10,25 +10,25 @@ from models.core.discretisation import with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.fatigue.damage import damage_ratio
-from models.systems.hub_forces.run import MOTION_CHANNELS, Measurement, labelled_result, measure
+from models.systems.hub_forces.run import MOTION_CHANNELS, HubMeasurement, labelled_result, measure
 from models.systems.hub_forces.run import run as run_scene
-from models.systems.hub_forces.scene import HubScene, Method
+from models.systems.hub_forces.scene import HubScene, StabiliserMethod
 
 Progress = Callable[[str, float], None]
 FREE_RUN, FILTERED_RUN, PRESCRIBED_RUN = "free", "filter", "prescribed"
-METHOD_OF_RUN: dict[str, Method] = {FREE_RUN: "none", FILTERED_RUN: "kalman", PRESCRIBED_RUN: "prescribed"}
+METHOD_OF_RUN: dict[str, StabiliserMethod] = {FREE_RUN: "none", FILTERED_RUN: "kalman", PRESCRIBED_RUN: "prescribed"}
 """Compared runs by name, with the stabiliser of each."""
 DRIFT_OFF_ANGLE = 0.05
 """Error of roll or pitch (rad) beyond which a run has drifted off, as in the study of the pitch plane."""
 
 
 @dataclass(frozen=True)
-class Comparison:
+class StabiliserComparison:
     """Compared runs of a measurement. runs : results by name; failed : reasons of failed runs by name; truth : the true
     run, None where it is not known.
     """
 
-    measurement: Measurement
+    measurement: HubMeasurement
     runs: dict[str, Result]
     failed: dict[str, str]
     truth: Result | None
@@ -43,31 +43,31 @@ class Comparison:
         """All results by name: the true run, if it is known, and the compared runs."""
         return {**({"true": self.truth} if self.truth else {}), **self.runs}
 
-    def errors(self, run: Result) -> np.ndarray:
+    def errors(self, run_result: Result) -> np.ndarray:
         """Errors (m, 6) of a run relative to the true run: roll, pitch, heading (rad), x, y, z (m).
 
         Without a true run, errors of roll and pitch are relative to the filter's estimate, and the others NaN.
         """
         if self.truth is not None:
-            return np.column_stack([run[name] - self.truth[name] for name in MOTION_CHANNELS])
-        tilt, errors_of_motion = self.measurement.tilt, np.full((len(run.times), len(MOTION_CHANNELS)), np.nan)
+            return np.column_stack([run_result[name] - self.truth[name] for name in MOTION_CHANNELS])
+        tilt, errors_of_motion = self.measurement.tilt, np.full((len(run_result.times), len(MOTION_CHANNELS)), np.nan)
         angle_times = self.measurement.angles.period * np.arange(len(tilt.states))
         for i, name in enumerate(("roll", "pitch")):
-            errors_of_motion[:, i] = run[name] - np.interp(run.times, angle_times, tilt.states[:, i])
+            errors_of_motion[:, i] = run_result[name] - np.interp(run_result.times, angle_times, tilt.states[:, i])
         return errors_of_motion
 
-    def damages(self, forces: np.ndarray) -> dict[str, float]:
+    def relative_damages(self, section_forces: np.ndarray) -> dict[str, float]:
         """Fatigue damage of every element under section forces (m, e), divided by its damage in the true run, or in the
         run with the Kalman filter where no true run is known.
         """
         true = (self.truth or self.runs[FILTERED_RUN])["section_force"]
         names = (element.name for element in self.measurement.vehicle.elements)
-        return {name: damage_ratio(forces[:, i], true[:, i]) for i, name in enumerate(names)}
+        return {name: damage_ratio(section_forces[:, i], true[:, i]) for i, name in enumerate(names)}
 
-    def drift_off(self, run: Result) -> float:
+    def drift_off_time(self, run_result: Result) -> float:
         """First time (s) at which a run's error of roll or pitch exceeds DRIFT_OFF_ANGLE; infinite if it never does."""
-        has_drifted = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
-        return float(run.times[np.argmax(has_drifted)]) if has_drifted.any() else float("inf")
+        has_drifted = np.abs(self.errors(run_result)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
+        return float(run_result.times[np.argmax(has_drifted)]) if has_drifted.any() else float("inf")
 
     def figures(self) -> dict[str, Any]:
         """Numbers of each run for a JSON file: largest errors, rms of the stabiliser's moments (N m), relative damage
@@ -79,7 +79,7 @@ class Comparison:
             figures[name] = {
                 **dict(zip(MOTION_CHANNELS, map(float, np.abs(self.errors(run)).max(axis=0)), strict=True)),
                 "moments": np.sqrt(np.mean(run["holding_moment"] ** 2, axis=0)).tolist(),
-                "damage": self.damages(run["section_force"]),
+                "damage": self.relative_damages(run["section_force"]),
             }
         return figures
 
@@ -90,33 +90,35 @@ class Comparison:
         kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHOD_OF_RUN]
         comparable = max(kinds, key=len)
         first, common_times = comparable[0].detail.states, comparable[0].times
-        rows = int(min(min(map(self.drift_off, comparable)), common_times[-1]) / common_times[1]) + 1
+        rows = int(min(min(map(self.drift_off_time, comparable)), common_times[-1]) / common_times[1]) + 1
         return max(float(np.abs(run.detail.states[:rows] - first[:rows]).max()) for run in comparable)
 
 
-def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Comparison:
+def compare_stabilisers(
+    scene: HubScene, engines: tuple[str, ...], report_progress: Progress = lambda text, part: None
+) -> StabiliserComparison:
     """Run the scene's stabiliser in every engine, and the other stabilisers in the last engine, which is the fastest.
 
     Raises RunFailed where even the run with the Kalman filter fails, or where the step is too long for the springs.
     """
     last_engine, planned = engines[-1], planned_runs(scene, engines)
-    progress("virtual measurement", 0.05)
+    report_progress("virtual measurement", 0.05)
     measurement = measure(scene, last_engine, scene.error)
-    progress("Kalman filter", 0.2)
+    report_progress("Kalman filter", 0.2)
     measurement.tilt  # noqa: B018
     runs, failed = dict[str, Result](), dict[str, str]()
     for i, (name, (method, engine)) in enumerate(planned.items()):
-        progress(name, 0.3 + 0.6 * i / len(planned))
+        report_progress(name, 0.3 + 0.6 * i / len(planned))
         try:
             runs[name] = run_scene(scene, engine, method, measurement, scene.error)
         except RunFailed as error:
             if name == FILTERED_RUN:  # what the others are compared with
                 raise
             failed[name] = str(error)
-    return Comparison(measurement, runs, failed, _true_run(measurement, last_engine))
+    return StabiliserComparison(measurement, runs, failed, _true_run(measurement, last_engine))
 
 
-def _true_run(measurement: Measurement, engine: str) -> Result | None:
+def _true_run(measurement: HubMeasurement, engine: str) -> Result | None:
     """Returns the true run of a virtual measurement as a result with its stated errors; None for measured files."""
     if measurement.truth is None:
         return None
@@ -124,7 +126,7 @@ def _true_run(measurement: Measurement, engine: str) -> Result | None:
     return with_stated_errors(run, measurement.errors, "runs in longer steps") if measurement.errors else run
 
 
-def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
+def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[StabiliserMethod, str]]:
     """Returns stabiliser and engine of every run by the run's name. Runs with a stabiliser in the last engine have a
     name without the engine.
     """

@@ -15,7 +15,7 @@ from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES as FREE_ENGINES
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
-from models.systems.hub_forces.scene import Frame, HubScene
+from models.systems.hub_forces.scene import ForceFrame, HubScene
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 from models.vehicles.plausible import plausible
 
@@ -102,10 +102,10 @@ def filter_objections(scene: HubScene) -> tuple[str, ...]:
     """
     if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING_STUDY):
         return ()
-    from models.systems.hub_forces.run import Measurement
+    from models.systems.hub_forces.run import HubMeasurement
 
     vehicle = scene.cut_vehicle()
-    return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.objections
+    return HubMeasurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.objections
 
 
 def _frames_text(vehicle: CutVehicle) -> str:
@@ -170,10 +170,10 @@ def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, .
     return tuple(finding for finding in findings if finding.weight == "doubt")
 
 
-def _finding_text(text: str) -> str:
+def _finding_text(finding_text: str) -> str:
     """Text of a finding without its advice on a channel map, which plain files do not have."""
-    text_before, colon, _ = text.partition("; give sign")
-    return text_before + "." if colon else text.replace(" in the channel map", "")
+    text_before, colon, _ = finding_text.partition("; give sign")
+    return text_before + "." if colon else finding_text.replace(" in the channel map", "")
 
 
 def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
@@ -181,9 +181,9 @@ def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 
-    def signal(location: str, quantity: Quantity, axis: str, file: str | None, frame: Frame) -> Signal:
+    def signal(location: str, quantity: Quantity, axis: str, file_name: str | None, frame: ForceFrame) -> Signal:
         name = f"{location} {quantity} {axis}"
-        return Signal(name, str(file), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0)
+        return Signal(name, str(file_name), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0)
 
     (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
     signals = (

@@ -21,12 +21,12 @@ from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED_STEP_METHOD, ForceRoute
 from models.engines.error_control import Adaptive, check_engines
 from models.own_model.scene_vehicle import scene_vehicle
-from models.systems.hub_forces.measurement import Angles, HubForces
+from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
 from models.vehicles.cut_vehicle import CutVehicle, cut
 
-Frame = Literal["hub", "body", "inertial"]
+ForceFrame = Literal["hub", "body", "inertial"]
 Noise = Literal["white", "none"]
-Method = Literal["none", "kalman", "prescribed"]
+StabiliserMethod = Literal["none", "kalman", "prescribed"]
 FACTOR_TO_NEWTON_METRES = {"N m": 1.0, "kN m": 1e3}
 """Units of moments that files may have, with their factors to N m."""
 COLUMNS_OF_HUB = {
@@ -49,7 +49,7 @@ nose down are positive, as rotations about x and y are.
 """
 
 
-class Vehicle(Strict):
+class HubVehicleTable(Strict):
     """[vehicle]: a vehicle file, and the name of its chassis."""
 
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
@@ -57,7 +57,7 @@ class Vehicle(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class Run(Strict):
+class HubRunTable(Strict):
     """[run]: duration, time step, and which spring forces the engines compute by native elements."""
 
     duration: float = quantity("s", "of the measurement and of every run", default=15.0)
@@ -69,7 +69,7 @@ class Run(Strict):
     )
 
 
-class Road(Strict):
+class TwoTrackRoadTable(Strict):
     """[road]: random road of two tracks, over which the virtual measurement is made."""
 
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="C", description="class, its mean")
@@ -77,13 +77,15 @@ class Road(Strict):
     speed: float = quantity("m/s", "of travel", default=20.0)
 
 
-class Forces(Strict):
+class HubForceTable(Strict):
     """[forces]: hub forces from a file or from a virtual measurement, their frame, and the
     deviations of their noise.
     """
 
     file: str | None = Field(default=None, description="CSV: time [s], then HUB_fx [N] ... HUB_mz [N m] of every hub")
-    frame: Frame = Field(default="hub", description="axes of what carries the wheel, of the chassis, or of the space")
+    frame: ForceFrame = Field(
+        default="hub", description="axes of what carries the wheel, of the chassis, or of the space"
+    )
     interpolation: Interpolation = Field(default="linear", description="held, linear or smooth between the samples")
     accept: list[str] = Field(default=[], description="findings of the checks of a file, by name, that are meant so")
     sampling_rate: float = quantity("Hz", "of the virtual measurement", default=500.0)
@@ -92,7 +94,7 @@ class Forces(Strict):
     moment_deviation: float = quantity("N m", "white noise of every moment sample", default=1.0)
 
 
-class MeasuredAngles(Strict):
+class MeasuredAngleTable(Strict):
     """[angles]: measured roll and pitch with their rates, and the deviations of their noise."""
 
     file: str | None = Field(default=None, description="CSV: time [s], roll, pitch [rad]; roll_rate, pitch_rate")
@@ -106,10 +108,10 @@ class MeasuredAngles(Strict):
         return self.angle_deviation, self.rate_deviation
 
 
-class Stabiliser(Strict):
+class HubStabiliserTable(Strict):
     """[stabilise]: method by which roll and pitch are kept from drifting off, and its settings."""
 
-    method: Method = Field(default="none", description="what holds roll and pitch")
+    method: StabiliserMethod = Field(default="none", description="what holds roll and pitch")
     bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
     model: float = quantity(
         "rad/s^2",
@@ -124,12 +126,12 @@ class HubScene(SceneFile):
 
     system: Literal["hub-forces"] = "hub-forces"
     study: str = Field(default="hub_forces", description="the study that runs the scene")
-    vehicle: Vehicle
-    run: Run = Run()
-    road: Road | None = Field(default=None, description="of the virtual measurement")
-    forces: Forces = Forces()
-    angles: MeasuredAngles = MeasuredAngles()
-    stabilise: Stabiliser = Stabiliser()
+    vehicle: HubVehicleTable
+    run: HubRunTable = HubRunTable()
+    road: TwoTrackRoadTable | None = Field(default=None, description="of the virtual measurement")
+    forces: HubForceTable = HubForceTable()
+    angles: MeasuredAngleTable = MeasuredAngleTable()
+    stabilise: HubStabiliserTable = HubStabiliserTable()
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
@@ -146,11 +148,11 @@ class HubScene(SceneFile):
             return Settings(FIXED_STEP_METHOD, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
-    def spring_force_route(self, method: Method) -> ForceRoute:
+    def spring_force_route(self, stabiliser_method: StabiliserMethod) -> ForceRoute:
         """How a run computes spring forces ("native" or "compiled") with a stabiliser. Enforced roll and pitch need
         compiled forces, whatever the scene says.
         """
-        return "compiled" if method == "prescribed" else self.run.forces
+        return "compiled" if stabiliser_method == "prescribed" else self.run.forces
 
     def cut_vehicle(self) -> CutVehicle:
         """Returns the vehicle without its tyres, cut at the hubs, with the scene's effects; raises InputError."""
@@ -161,7 +163,7 @@ class HubScene(SceneFile):
         """Standard deviations (6 h,) of the noise of each hub force (N) and moment (N m), hub by hub."""
         return np.tile(np.repeat([self.forces.force_deviation, self.forces.moment_deviation], 3), len(vehicle.hubs))
 
-    def measured(self, vehicle: CutVehicle) -> tuple[HubForces, Angles]:
+    def measured(self, vehicle: CutVehicle) -> tuple[HubForces, MeasuredAngles]:
         """Reads hub forces and angles from the scene's files; raises InputError."""
         assert self.forces.file is not None and self.angles.file is not None
         columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COLUMNS_OF_HUB.items()}
@@ -190,45 +192,47 @@ class HubScene(SceneFile):
             allowed = f"must divide the period of {period:g} s over which samples are held"
             raise InputError(self.file, "run.step", self.run.step, allowed)
         count = round(self.run.duration / period) + 1
-        return HubForces(forces[:count], period, self.forces.frame), Angles(angles[:count], period)
+        return HubForces(forces[:count], period, self.forces.frame), MeasuredAngles(angles[:count], period)
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HubScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> HubScene:
     """Build a checked scene of hub forces from the nested tables of a scene file. Raises InputError for unknown keys
     and for values outside their ranges.
     """
-    scene = checked(HubScene, table, file, folder)
+    scene = checked(HubScene, scene_tables, scene_path, scene_folder)
     if (scene.forces.file is None) == (scene.road is None):
-        raise InputError(file, "road", None, "give either the table road, for a virtual measurement, or forces.file")
+        raise InputError(
+            scene_path, "road", None, "give either the table road, for a virtual measurement, or forces.file"
+        )
     if (scene.forces.file is None) != (scene.angles.file is None):
         missing = "angles.file" if scene.angles.file is None else "forces.file"
-        raise InputError(file, missing, None, "is missing: forces and angles are measured together")
+        raise InputError(scene_path, missing, None, "is missing: forces and angles are measured together")
     if scene.forces.file is not None:
-        _check_file_only(file, scene)
+        _check_file_only(scene_path, scene)
     elif scene.forces.accept:
-        raise InputError(file, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
+        raise InputError(scene_path, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
     if "forces" in scene.run.model_fields_set and scene.run.forces != scene.spring_force_route(scene.stabilise.method):
         allowed = "an enforced tilt needs all forces in one place: drop it, or choose another stabilise.method"
-        raise InputError(file, "run.forces", scene.run.forces, allowed)
-    _check_steps(file, scene)
-    check_engines(file, scene.engines)
+        raise InputError(scene_path, "run.forces", scene.run.forces, allowed)
+    _check_steps(scene_path, scene)
+    check_engines(scene_path, scene.engines)
     return with_effect_tables(scene)
 
 
-def _check_file_only(file: str, scene: HubScene) -> None:
+def _check_file_only(scene_path: str, scene: HubScene) -> None:
     """Raise InputError for keys that only a virtual measurement can have, in a scene with measured files."""
     for table, name in (("forces", "sampling_rate"), ("forces", "noise"), ("angles", "noise")):
         entries = getattr(scene, table)
         if name in entries.model_fields_set:
-            raise InputError(file, f"{table}.{name}", getattr(entries, name), f"is that of {table}.file: drop it")
+            raise InputError(scene_path, f"{table}.{name}", getattr(entries, name), f"is that of {table}.file: drop it")
 
 
-def _check_steps(file: str, scene: HubScene) -> None:
+def _check_steps(scene_path: str, scene: HubScene) -> None:
     step, duration = scene.run.step, scene.run.duration
     if not divides(step, duration):
         allowed = f"must divide run.duration = {duration:g} s, as {dividing_step(step, duration)} s does"
-        raise InputError(file, "run.step", step, allowed)
+        raise InputError(scene_path, "run.step", step, allowed)
     period = 1.0 / scene.forces.sampling_rate
     if scene.road is not None and not (divides(step, period) and divides(period, duration)):
         allowed = f"its period must be a multiple of run.step = {step:g} s and divide run.duration = {duration:g} s"
-        raise InputError(file, "forces.sampling_rate", scene.forces.sampling_rate, allowed)
+        raise InputError(scene_path, "forces.sampling_rate", scene.forces.sampling_rate, allowed)

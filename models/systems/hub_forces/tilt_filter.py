@@ -16,9 +16,9 @@ from models.core.errors import InputError
 from models.core.signals import Sampled
 from models.drift.score import DOUBTFUL_INNOVATION_LIMIT
 from models.multibody.cut_table import HubInputs
-from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.scene import Frame
-from models.systems.hub_forces.tilt_march import Noise, march
+from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
+from models.systems.hub_forces.scene import ForceFrame
+from models.systems.hub_forces.tilt_march import TiltNoise, march
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 
 INNOVATION_LIMIT = 4.0
@@ -45,7 +45,7 @@ SIGNAL_REMEDY = "check signs, units, order of the hubs and frame, or state large
 
 
 @dataclass(frozen=True)
-class Tilt:
+class TiltEstimate:
     """Output of the tilt filter. states (m, 4) : estimated roll, pitch (rad) and their rates (rad/s); deviations :
     their standard deviations; period : between samples (s); normalised_innovation : mean of the normalised innovation
     squared per measured value, 1 where the stated deviations are right; objections : to the measurement, as text.
@@ -59,7 +59,7 @@ class Tilt:
 
 
 @dataclass
-class FilterState:
+class TiltFilterState:
     """State of the tilt filter after a sample. x (4,) : estimate; p (4, 4) : its covariance; squared_innovations : sum
     and number of the normalised innovations squared; rate_variances (2, 2) : sums of the variances of the unexplained
     and of the measured rates of roll and pitch; sums (5, 4) : of innovations, as in ``tilt_march.march``.
@@ -73,7 +73,7 @@ class FilterState:
 
 
 @dataclass(frozen=True)
-class Deviations:
+class StatedDeviations:
     """Stated standard deviations of a measurement. forces (6 h,) : of each force (N) and moment (N m); angles : of the
     angles (rad) and of their rates (rad/s); model : of the acceleration that a rigid vehicle does not have (rad/s^2).
     """
@@ -89,35 +89,44 @@ class TiltFilter:
     """
 
     def __init__(
-        self, vehicle: CutVehicle, frame: str, sample_period: float, deviations: Deviations, file: str = ""
+        self,
+        vehicle: CutVehicle,
+        force_frame: str,
+        sample_period: float,
+        stated_deviations: StatedDeviations,
+        named_file: str = "",
     ) -> None:
-        _check_measurement(frame, sample_period, deviations)
-        self.rigid, self.frame, self.period, self.file = rigid_vehicle(vehicle), frame, sample_period, file
-        self.forces_noise = self.rigid.turning(deviations.forces)[:2, :2]
+        _check_measurement(force_frame, sample_period, stated_deviations)
+        self.rigid, self.frame, self.period, self.file = rigid_vehicle(vehicle), force_frame, sample_period, named_file
+        self.forces_noise = self.rigid.turning(stated_deviations.forces)[:2, :2]
         push = np.vstack([np.eye(2) * sample_period**2 / 2, np.eye(2) * sample_period])
-        process = push @ (self.forces_noise + deviations.model**2 * np.eye(2)) @ push.T
-        self.noise = Noise(sample_period, process, np.repeat(deviations.angles, 2) ** 2)
+        process = push @ (self.forces_noise + stated_deviations.model**2 * np.eye(2)) @ push.T
+        self.noise = TiltNoise(sample_period, process, np.repeat(stated_deviations.angles, 2) ** 2)
         self.inverse = np.linalg.inv(self.rigid.inertia)[:2]
-        self.state = FilterState()
+        self.state = TiltFilterState()
 
-    def advance(self, wrenches: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def advance(self, hub_wrenches: np.ndarray, measured_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Filter a block of hub forces (n, 6 h) and angles (n, 4), NaN where not measured. Returns estimates (n, 4) and
         their standard deviations.
 
         The first sample is the last sample of the previous block. Raises InputError where angles and forces contradict
         one another, or are infinite.
         """
-        _check_numbers(wrenches, angles, self.file)
-        state, count = self.state, len(angles)
+        _check_numbers(hub_wrenches, measured_angles, self.file)
+        state, count = self.state, len(measured_angles)
         if np.isnan(state.x[0]):
             state.x, state.p = (
-                np.nan_to_num(angles[0]),
-                np.diag(np.where(np.isnan(angles[0]), UNKNOWN_VARIANCE, self.noise.variances)),
+                np.nan_to_num(measured_angles[0]),
+                np.diag(np.where(np.isnan(measured_angles[0]), UNKNOWN_VARIANCE, self.noise.variances)),
             )
-        tilted = _wrenches_in_tilted_axes(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
+        tilted = (
+            _wrenches_in_tilted_axes(hub_wrenches, np.nan_to_num(measured_angles))
+            if self.frame == "inertial"
+            else hub_wrenches
+        )
         turning, filtered = self.rigid.moments(tilted) @ self.inverse.T, np.empty((2, count, 4))
-        self._check_balance(turning, angles[:, 2:])
-        state.squared_innovations += march(state.x, state.p, turning, angles, self.noise, state.sums, filtered)
+        self._check_balance(turning, measured_angles[:, 2:])
+        state.squared_innovations += march(state.x, state.p, turning, measured_angles, self.noise, state.sums, filtered)
         if not self.normalised_innovation <= INNOVATION_LIMIT:
             raise InputError(
                 self.file,
@@ -165,18 +174,21 @@ class TiltFilter:
         ]
         return (*([large] if self.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
 
-    def _check_balance(self, turning_acceleration: np.ndarray, rates: np.ndarray) -> None:
+    def _check_balance(self, turning_acceleration: np.ndarray, angular_rates: np.ndarray) -> None:
         """Raise InputError for hub forces whose moments, integrated over time, do not give the measured rates of roll
         and pitch.
 
         A constant offset of a transducer, which the filter treats as noise, gives a linear trend in the difference. The
         trend is not counted, or 30 N at one wheel would be as much as a smooth road.
 
-        turning_acceleration : (n, 2), rad/s^2; rates : (n, 2), rad/s.
+        turning_acceleration : (n, 2), rad/s^2; angular_rates : (n, 2), rad/s.
         """
         dt, length = self.period, round(BALANCE_WINDOW / self.period)
-        for first in range(0, len(rates) - 1, length):
-            turning_part, measured = turning_acceleration[first : first + length + 1], rates[first : first + length + 1]
+        for first in range(0, len(angular_rates) - 1, length):
+            turning_part, measured = (
+                turning_acceleration[first : first + length + 1],
+                angular_rates[first : first + length + 1],
+            )
             if not np.isfinite(measured).all():
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(turning_part[1:] + turning_part[:-1], axis=0) * dt / 2))
@@ -194,67 +206,87 @@ class TiltFilter:
                 raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {contradiction}")
 
 
-def _check_measurement(frame: str, sample_period: float, deviations: Deviations) -> None:
+def _check_measurement(force_frame: str, sample_period: float, stated_deviations: StatedDeviations) -> None:
     """Raise InputError for an unknown frame, and for a sampling period or deviations that are not
     above 0 and finite.
     """
-    if frame not in get_args(Frame):
-        raise InputError("", "frame", frame, "is none", get_args(Frame))
-    named_values = {"period": (sample_period,), "angle_deviations": deviations.angles, "model": (deviations.model,)}
+    if force_frame not in get_args(ForceFrame):
+        raise InputError("", "frame", force_frame, "is none", get_args(ForceFrame))
+    named_values = {
+        "period": (sample_period,),
+        "angle_deviations": stated_deviations.angles,
+        "model": (stated_deviations.model,),
+    }
     for name, value in ((name, value) for name, values in named_values.items() for value in sorted(values)):
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
 
 
-def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
+def _check_numbers(hub_wrenches: np.ndarray, measured_angles: np.ndarray, named_file: str) -> None:
     """Raise InputError for forces that are not finite, and for infinite angles. NaN marks an angle that was not
     measured.
     """
-    for name, wrong in (("forces", ~np.isfinite(wrenches)), ("angles", np.isinf(angles))):
+    for name, wrong in (("forces", ~np.isfinite(hub_wrenches)), ("angles", np.isinf(measured_angles))):
         if wrong.any():
             row = int(np.flatnonzero(wrong.any(axis=1))[0])
-            raise InputError(file, name, None, f"hold what is no number in sample {row} of this stretch")
+            raise InputError(named_file, name, None, f"hold what is no number in sample {row} of this stretch")
 
 
-def _without_slope(values: np.ndarray) -> np.ndarray:
+def _without_slope(value_columns: np.ndarray) -> np.ndarray:
     """Remove the linear trend from each column of values (n, k); the means stay."""
-    line = np.linspace(-1.0, 1.0, len(values))
-    return values - np.outer(line, line @ values / (line @ line))
+    line = np.linspace(-1.0, 1.0, len(value_columns))
+    return value_columns - np.outer(line, line @ value_columns / (line @ line))
 
 
-def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations: Deviations, file: str = "") -> Tilt:
+def estimate_tilt(
+    vehicle: CutVehicle,
+    hub_forces: HubForces,
+    measured_angles: MeasuredAngles,
+    stated_deviations: StatedDeviations,
+    named_file: str = "",
+) -> TiltEstimate:
     """Estimate roll and pitch from measured angles and hub forces by ``TiltFilter``. Raises InputError also where no
     angle was measured.
     """
-    if len(forces.samples) != len(angles.samples):
+    if len(hub_forces.samples) != len(measured_angles.samples):
         raise InputError(
-            file, "angles", len(angles.samples), f"must be as many samples as the forces', {len(forces.samples)}"
+            named_file,
+            "angles",
+            len(measured_angles.samples),
+            f"must be as many samples as the forces', {len(hub_forces.samples)}",
         )
-    if np.isnan(angles.samples).all():
-        raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
-    tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, deviations, file)
-    states, spread = tilt_filter.advance(forces.samples, angles.samples)
-    return Tilt(states, spread, forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
+    if np.isnan(measured_angles.samples).all():
+        raise InputError(named_file, "angles", None, "hold no number: there is nothing to follow")
+    tilt_filter = TiltFilter(vehicle, hub_forces.frame, hub_forces.period, stated_deviations, named_file)
+    states, spread = tilt_filter.advance(hub_forces.samples, measured_angles.samples)
+    return TiltEstimate(states, spread, hub_forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
 
 
-def _wrenches_in_tilted_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def _wrenches_in_tilted_axes(hub_wrenches: np.ndarray, tilt_angles: np.ndarray) -> np.ndarray:
     """Transform wrenches (m, 6 h) from axes fixed in space into axes turned by roll and pitch; angles (m, 2 or more) in
     rad.
     """
-    (sr, sp), (cr, cp), zero = np.sin(angles[:, :2]).T, np.cos(angles[:, :2]).T, np.zeros(len(angles))
+    (sr, sp), (cr, cp), zero = np.sin(tilt_angles[:, :2]).T, np.cos(tilt_angles[:, :2]).T, np.zeros(len(tilt_angles))
     rotation = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
-    return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), rotation).reshape(wrenches.shape)
+    return np.einsum("mhi,ijm->mhj", hub_wrenches.reshape(len(hub_wrenches), -1, 3), rotation).reshape(
+        hub_wrenches.shape
+    )
 
 
 def inputs_with_moments(
-    hub_inputs: HubInputs, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7
+    hub_inputs: HubInputs,
+    vehicle: CutVehicle,
+    tilt_estimate: TiltEstimate,
+    time_step: float,
+    pull_bandwidth: float,
+    damping_ratio: float = 0.7,
 ) -> HubInputs:
     """Returns hub inputs with moments that pull roll and pitch towards the filter's estimate. They act as spring and
-    damper: natural angular frequency 2 pi times ``bandwidth`` (Hz), damping ratio ``ratio``, inertia of the rigid
-    vehicle.
+    damper: natural angular frequency 2 pi times ``pull_bandwidth`` (Hz), damping ratio ``damping_ratio``, inertia of
+    the rigid vehicle.
     """
-    rows, corner = len(hub_inputs.hubs), 2 * math.pi * bandwidth
-    wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)
+    rows, corner = len(hub_inputs.hubs), 2 * math.pi * pull_bandwidth
+    wanted = Sampled(tilt_estimate.states, tilt_estimate.period, held=False).sample(0.0, time_step / 2, rows)
     roll, pitch, _ = np.diag(rigid_vehicle(vehicle).inertia)
-    pull = (roll * corner**2, 2 * ratio * roll * corner, pitch * corner**2, 2 * ratio * pitch * corner)
+    pull = (roll * corner**2, 2 * damping_ratio * roll * corner, pitch * corner**2, 2 * damping_ratio * pitch * corner)
     return replace(hub_inputs, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)

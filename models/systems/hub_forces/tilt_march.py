@@ -7,7 +7,7 @@ import numpy as np
 from models.machine.compiled import njit
 
 
-class Noise(NamedTuple):
+class TiltNoise(NamedTuple):
     """Noise settings of the tilt filter. dt : step (s); process (4, 4) : covariance that is added in every step;
     variances (4,) : of measured roll, pitch and their rates.
     """
@@ -18,24 +18,24 @@ class Noise(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def march(x, p, turning_acceleration, measured, noise, innovation_sums, filtered):
-    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0. Both arrays are
-    overwritten by the values at the last sample.
+def march(state, covariance, turning_acceleration, measured_values, filter_noise, innovation_sums, filtered_states):
+    """Filter samples 1, 2, ... from state ``state`` (4,) and covariance ``covariance`` (4, 4) at sample 0. Both arrays
+    are overwritten by the values at the last sample.
 
     turning_acceleration (n, 2) : of roll and pitch (rad/s^2), constant from each sample to the next; measured (n, 4) :
     NaN where not measured. Adds to ``innovation_sums`` (5, 4), which hold for every measured value: number of
     normalised innovations, their sum, the sum of their squares, the sum of products of successive innovations, and the
-    last innovation. Writes states (n, 4) and their standard deviations into ``filtered`` (2, n, 4). Returns the sum of
-    the normalised innovations squared and their number.
+    last innovation. Writes states (n, 4) and their standard deviations into ``filtered_states`` (2, n, 4). Returns the
+    sum of the normalised innovations squared and their number.
     """
-    gain, surprise, used, variances = np.empty(4), 0.0, 0, noise.variances
-    for i in range(len(measured)):
+    gain, surprise, used, variances = np.empty(4), 0.0, 0, filter_noise.variances
+    for i in range(len(measured_values)):
         if i:
-            _predict_step(x, p, turning_acceleration[i - 1], noise)
+            _predict_step(state, covariance, turning_acceleration[i - 1], filter_noise)
             for j in range(4):
-                if np.isnan(measured[i, j]):
+                if np.isnan(measured_values[i, j]):
                     continue
-                s, innovation = p[j, j] + variances[j], measured[i, j] - x[j]
+                s, innovation = covariance[j, j] + variances[j], measured_values[i, j] - state[j]
                 white = innovation / np.sqrt(s)
                 innovation_sums[0, j] += 1.0
                 innovation_sums[1, j] += white
@@ -45,55 +45,55 @@ def march(x, p, turning_acceleration, measured, noise, innovation_sums, filtered
                 surprise += innovation * innovation / s
                 used += 1
                 for k in range(4):
-                    gain[k] = p[k, j] / s
+                    gain[k] = covariance[k, j] / s
                 for k in range(4):
-                    x[k] += gain[k] * innovation
-                _update_with_value(p, gain, j, variances[j], variances[j] / s)
+                    state[k] += gain[k] * innovation
+                _update_with_value(covariance, gain, j, variances[j], variances[j] / s)
         for k in range(4):
-            filtered[0, i, k], filtered[1, i, k] = x[k], np.sqrt(p[k, k])
+            filtered_states[0, i, k], filtered_states[1, i, k] = state[k], np.sqrt(covariance[k, k])
     return surprise, used
 
 
 @njit(cache=True, error_model="numpy")
-def _update_with_value(p, gain, j, variance, remaining_share):
-    """Update the covariance ``p`` with measured value j in Joseph's form, which no rounding makes negative.
+def _update_with_value(covariance, kalman_gain, value_index, noise_variance, remaining_share):
+    """Update the covariance ``covariance`` with measured value j in Joseph's form, which no rounding makes negative.
 
     remaining_share : ratio of the value's variance to the innovation's variance, which is 1 - gain[j] computed without
     cancellation. The variance gain^2 variance that the value's error causes in another state is the least that remains
     there, even where rounding is larger.
     """
     for m in range(4):
-        element = p[j, m]
+        element = covariance[value_index, m]
         for k in range(4):
-            p[k, m] -= gain[k] * element
-        p[j, m] = remaining_share * element
+            covariance[k, m] -= kalman_gain[k] * element
+        covariance[value_index, m] = remaining_share * element
     for k in range(4):
-        element = p[k, j]
+        element = covariance[k, value_index]
         for m in range(4):
-            p[k, m] -= gain[m] * element
-        p[k, j] = remaining_share * element
+            covariance[k, m] -= kalman_gain[m] * element
+        covariance[k, value_index] = remaining_share * element
         for m in range(4):
-            p[k, m] += gain[k] * variance * gain[m]
+            covariance[k, m] += kalman_gain[k] * noise_variance * kalman_gain[m]
     for k in range(4):
         for m in range(k):
-            p[k, m] = p[m, k] = 0.5 * (p[k, m] + p[m, k])
-        p[k, k] = max(p[k, k], gain[k] * gain[k] * variance)
+            covariance[k, m] = covariance[m, k] = 0.5 * (covariance[k, m] + covariance[m, k])
+        covariance[k, k] = max(covariance[k, k], kalman_gain[k] * kalman_gain[k] * noise_variance)
 
 
 @njit(cache=True, error_model="numpy")
-def _predict_step(x, p, turning_acceleration, noise):
-    """Predict state ``x`` and covariance ``p`` one step ahead: angles change by their rates, rates by an
+def _predict_step(state, covariance, turning_acceleration, filter_noise):
+    """Predict state ``state`` and covariance ``covariance`` one step ahead: angles change by their rates, rates by an
     acceleration.
     """
-    dt = noise.dt
+    dt = filter_noise.dt
     for k in range(2):
-        x[k] += dt * (x[2 + k] + 0.5 * dt * turning_acceleration[k])
-        x[2 + k] += dt * turning_acceleration[k]
+        state[k] += dt * (state[2 + k] + 0.5 * dt * turning_acceleration[k])
+        state[2 + k] += dt * turning_acceleration[k]
         for m in range(4):
-            p[k, m] += dt * p[2 + k, m]
+            covariance[k, m] += dt * covariance[2 + k, m]
     for m in range(2):
         for k in range(4):
-            p[k, m] += dt * p[k, 2 + m]
+            covariance[k, m] += dt * covariance[k, 2 + m]
     for k in range(4):
         for m in range(4):
-            p[k, m] += noise.process[k, m]
+            covariance[k, m] += filter_noise.process[k, m]

@@ -18,7 +18,7 @@ from models.systems.measured.scene import MeasuredScene
 from models.vehicles.cut_vehicle import CutVehicle
 
 if TYPE_CHECKING:
-    from models.systems.measured.run import Examination
+    from models.systems.measured.run import RecordingAnalysis
 
 LARGEST_PULL_SHARE = 0.2
 """Largest downward force at a hub divided by the load at rest: weight and inertia of rim and tyre in the air. A larger
@@ -27,27 +27,29 @@ pull is not caused by the road.
 
 
 def assumptions(
-    scene: MeasuredScene, vehicle: CutVehicle | None, examination: "Examination | None" = None
+    scene: MeasuredScene, vehicle: CutVehicle | None, recording_analysis: "RecordingAnalysis | None" = None
 ) -> list[Assumption]:
-    """Assumptions of the run whose section forces are written to files; examination : of this run, None to list the
-    assumptions only.
+    """Assumptions of the run whose section forces are written to files; recording_analysis : of this run, None to list
+    the assumptions only.
 
     The pitch plane (vehicle None) has further assumptions, which the system pitch_plane lists.
     """
     return [
-        _transducer_range_assumption(examination),
-        *([] if vehicle is None else _cut_vehicle_assumptions(scene, vehicle, examination)),
+        _transducer_range_assumption(recording_analysis),
+        *([] if vehicle is None else _cut_vehicle_assumptions(scene, vehicle, recording_analysis)),
     ]
 
 
-def _transducer_range_assumption(examination: "Examination | None") -> Assumption:
+def _transducer_range_assumption(recording_analysis: "RecordingAnalysis | None") -> Assumption:
     """Assumption that transducers stay within their ranges, so that no samples pile up at an extreme value."""
 
     def clipped() -> Watched:
         """Share of the samples that pile up at an extreme value, for every signal that drives the run."""
-        assert examination is not None
+        assert recording_analysis is not None
         values = {
-            s.name: examination.recording.samples(s) for s in examination.recording.signals if examination.is_input(s)
+            s.name: recording_analysis.recording.samples(s)
+            for s in recording_analysis.recording.signals
+            if recording_analysis.is_input(s)
         }
         return {name: np.array([np.isin(each, clipping_extremes(each)).mean()]) for name, each in values.items()}
 
@@ -62,13 +64,13 @@ def _transducer_range_assumption(examination: "Examination | None") -> Assumptio
 
 
 def _cut_vehicle_assumptions(
-    scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None"
+    scene: MeasuredScene, vehicle: CutVehicle, recording_analysis: "RecordingAnalysis | None"
 ) -> list[Assumption]:
     """Assumptions of a spatial vehicle driven by hub forces, checked on the channels of its run."""
 
     def read(name: str) -> np.ndarray:
-        assert examination is not None and examination.outcome is not None
-        return examination.outcome.samples(name)
+        assert recording_analysis is not None and recording_analysis.outcome is not None
+        return recording_analysis.outcome.samples(name)
 
     def tilt() -> Watched:
         return {name: read(f"{vehicle.chassis} {name}") for name in ("roll", "pitch")}
@@ -77,10 +79,10 @@ def _cut_vehicle_assumptions(
         return {hub: read(f"{hub} hub Fz") for hub in vehicle.hubs}
 
     def balance() -> Watched:
-        assert examination is not None
+        assert recording_analysis is not None
         return {
             "all hubs": carried_weight_share(
-                sum(vertical().values(), np.zeros(1)), vehicle, examination.recording.duration
+                sum(vertical().values(), np.zeros(1)), vehicle, recording_analysis.recording.duration
             )
         }
 
@@ -119,29 +121,33 @@ def _cut_vehicle_assumptions(
             "leave these times out by [clock]: no stop is in the cut vehicle's linear springs",
         ),
     ]
-    return [*listed, *_same_attitude_assumption(scene, vehicle, examination)]
+    return [*listed, *_same_attitude_assumption(scene, vehicle, recording_analysis)]
 
 
 def _same_attitude_assumption(
-    scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None"
+    scene: MeasuredScene, vehicle: CutVehicle, recording_analysis: "RecordingAnalysis | None"
 ) -> list[Assumption]:
     """Assumption that a free run has the measured roll and pitch, for forces that keep their directions in space; empty
     where neither angle was measured.
     """
-    if scene.stabilise.method != "none" or examination is None:
+    if scene.stabilise.method != "none" or recording_analysis is None:
         return []
-    frames = {s.frame for s in examination.recording.signals if s.at in vehicle.hubs and examination.is_input(s)}
-    angles = [s for s in examination.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")]
+    frames = {
+        s.frame for s in recording_analysis.recording.signals if s.at in vehicle.hubs and recording_analysis.is_input(s)
+    }
+    angles = [
+        s for s in recording_analysis.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")
+    ]
     if frames != {"inertial"} or not angles:
         return []
 
     def beside() -> Watched:
-        assert examination.outcome is not None
-        skip = round(examination.outcome.period / examination.recording.period)
-        done = examination.outcome.done
+        assert recording_analysis.outcome is not None
+        skip = round(recording_analysis.outcome.period / recording_analysis.recording.period)
+        done = recording_analysis.outcome.done
         return {
-            s.component: examination.outcome.samples(f"{vehicle.chassis} {s.component}")
-            - examination.recording.samples(s)[::skip][:done]
+            s.component: recording_analysis.outcome.samples(f"{vehicle.chassis} {s.component}")
+            - recording_analysis.recording.samples(s)[::skip][:done]
             for s in angles
         }
 

@@ -18,21 +18,24 @@ COMPONENTS_OF_QUANTITY: dict[Quantity, tuple[str, ...]] = {
 """Components that each quantity can have; none for quantities along a connector, which has a direction itself."""
 
 
-def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
-    """Returns the signals of all mapped channels, in the order of the scene; ``sources`` : the scene's opened files.
+def mapped_signals(
+    scene: MeasuredScene, measurement_files: Sequence[Source], transducer_places: Places
+) -> tuple[Signal, ...]:
+    """Returns the signals of all mapped channels, in the order of the scene; ``measurement_files`` : the scene's opened
+    files.
 
     Measurements at connectors, and strains, are only compared with the run. Raises InputError at the first channel that
     is not in its file, is there or in the map twice, or whose unit, place, component or frame makes no sense.
     """
     rows = [
         (f"files, {file.file}, {row.channel!r}", row, source)
-        for file, source in zip(scene.files, sources, strict=True)
+        for file, source in zip(scene.files, measurement_files, strict=True)
         for row in file.channels
     ]
     names, mapped = [row.channel for _, row, _ in rows], list[Signal]()
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
-        signal = _signal_of_entry(scene.file, place, row, source, places, name)
+        signal = _signal_of_entry(scene.file, place, row, source, transducer_places, name)
         for earlier in mapped:
             if earlier.name == signal.name:
                 raise InputError(scene.file, place, row.channel, "is mapped twice: each channel is one signal")
@@ -45,83 +48,116 @@ def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Plac
                 text = f"measures the same as {earlier.channel!r}: say check = true of one of them"
                 raise InputError(scene.file, place, row.channel, text)
         mapped.append(signal)
-    frames = {signal.frame: signal for signal in mapped if signal.at in places.hubs and not signal.check}
+    frames = {signal.frame: signal for signal in mapped if signal.at in transducer_places.hubs and not signal.check}
     if len(frames) > 1:
         examples = ", ".join(f"{signal.channel!r} is in {signal.frame!r}" for signal in [*frames.values()][:2])
         raise InputError(scene.file, "files", None, f"hub forces must all be in one frame: {examples}")
     return tuple(mapped)
 
 
-def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
-    channel, at_hub = find(source, row.channel, file, place), row.at in places.hubs
-    unit, unit_place = row.unit, (file, f"{place}, unit")
+def _signal_of_entry(
+    file_name: str,
+    key_path: str,
+    mapped_channel: MappedChannel,
+    measurement_file: Source,
+    transducer_places: Places,
+    key_of_place: str,
+) -> Signal:
+    channel, at_hub = (
+        find_channel(measurement_file, mapped_channel.channel, file_name, key_path),
+        mapped_channel.at in transducer_places.hubs,
+    )
+    unit, unit_place = mapped_channel.unit, (file_name, f"{key_path}, unit")
     if unit is None:
-        unit, unit_place = channel.unit.strip(), (source.path.name, f"unit of {row.channel!r}")
-        if not unit and row.quantity != "strain":
-            missing = f"is missing: {source.path.name} names none of {row.channel!r}"
-            raise InputError(file, f"{place}, unit", None, missing)
-    factor = factor_to_si(unit, row.quantity, *unit_place)
-    _check_place(file, place, row, places)
-    usual: Frame = "hub" if at_hub else "inertial" if row.quantity == "angle" else "body"
-    frame, frames = row.frame or usual, ("hub", "body", "inertial") if at_hub else ("body", "inertial", "sensor")
+        unit, unit_place = channel.unit.strip(), (measurement_file.path.name, f"unit of {mapped_channel.channel!r}")
+        if not unit and mapped_channel.quantity != "strain":
+            missing = f"is missing: {measurement_file.path.name} names none of {mapped_channel.channel!r}"
+            raise InputError(file_name, f"{key_path}, unit", None, missing)
+    factor = factor_to_si(unit, mapped_channel.quantity, *unit_place)
+    _check_place(file_name, key_path, mapped_channel, transducer_places)
+    usual: Frame = "hub" if at_hub else "inertial" if mapped_channel.quantity == "angle" else "body"
+    frame, frames = (
+        mapped_channel.frame or usual,
+        ("hub", "body", "inertial") if at_hub else ("body", "inertial", "sensor"),
+    )
     if frame not in frames:
-        raise InputError(file, f"{place}, frame", frame, f"is no frame of {row.quantity} at {row.at!r}", frames)
-    check = row.check or row.quantity == "strain" or row.at in places.connectors
-    location = row.channel, row.quantity, row.at, row.component
+        raise InputError(
+            file_name,
+            f"{key_path}, frame",
+            frame,
+            f"is no frame of {mapped_channel.quantity} at {mapped_channel.at!r}",
+            frames,
+        )
+    check = (
+        mapped_channel.check or mapped_channel.quantity == "strain" or mapped_channel.at in transducer_places.connectors
+    )
+    location = mapped_channel.channel, mapped_channel.quantity, mapped_channel.at, mapped_channel.component
     return Signal(
-        name,
-        source.path.name,
+        key_of_place,
+        measurement_file.path.name,
         *location,
         frame,
-        row.sign,
+        mapped_channel.sign,
         unit,
         factor,
-        zero=row.zero,
-        gravity=row.gravity,
+        zero=mapped_channel.zero,
+        gravity=mapped_channel.gravity,
         check=check,
     )
 
 
-def find(source: Source, name: str, file: str, place: str) -> Channel:
+def find_channel(measurement_file: Source, channel_name: str, file_name: str, key_path: str) -> Channel:
     """Returns the channel of a file by its name. Raises InputError, with the most similar names, if there is not
     exactly one.
     """
-    alike = [channel for channel in source.channels if channel.name == name]
+    alike = [channel for channel in measurement_file.channels if channel.name == channel_name]
     if len(alike) == 1:
         return alike[0]
-    numbered = [repr(c.name) for c in source.channels if re.fullmatch(re.escape(name) + r" \(\d+\)", c.name)]
+    numbered = [
+        repr(c.name) for c in measurement_file.channels if re.fullmatch(re.escape(channel_name) + r" \(\d+\)", c.name)
+    ]
     if alike or numbered:
         remedy = f"name one of {', '.join(numbered)}" if not alike else "rename all but one"
-        text = f"is there {len(alike or numbered)} times in {source.path.name}: {remedy}"
-        raise InputError(file, place, name, text)
-    raise InputError(file, place, name, f"no such channel in {source.path.name}{_similar_channels(name, source)}")
+        text = f"is there {len(alike or numbered)} times in {measurement_file.path.name}: {remedy}"
+        raise InputError(file_name, key_path, channel_name, text)
+    raise InputError(
+        file_name,
+        key_path,
+        channel_name,
+        f"no such channel in {measurement_file.path.name}{_similar_channels(channel_name, measurement_file)}",
+    )
 
 
-def _similar_channels(name: str, source: Source) -> str:
-    """Text with the channels of a file whose names are most similar to ``name``, or else with the first channels."""
-    plain = {channel.name.casefold(): channel.name for channel in source.channels}
-    close = [plain[each] for each in get_close_matches(name.casefold(), plain, n=3, cutoff=0.6)]
+def _similar_channels(channel_name: str, measurement_file: Source) -> str:
+    """Text with the channels of a file whose names are most similar to ``channel_name``, or else with the first
+    channels.
+    """
+    plain = {channel.name.casefold(): channel.name for channel in measurement_file.channels}
+    close = [plain[each] for each in get_close_matches(channel_name.casefold(), plain, n=3, cutoff=0.6)]
     if close:
         return f"; did you mean {' or '.join(map(repr, close))}?"
-    first = ", ".join(channel.name for channel in source.channels[:8])
-    return f", which has {len(source.channels)}: {first}{', ...' if len(source.channels) > 8 else ''}"
+    first = ", ".join(channel.name for channel in measurement_file.channels[:8])
+    return (
+        f", which has {len(measurement_file.channels)}: {first}{', ...' if len(measurement_file.channels) > 8 else ''}"
+    )
 
 
-def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> None:
+def _check_place(file_name: str, key_path: str, mapped_channel: MappedChannel, transducer_places: Places) -> None:
     """Raise InputError for a place where the mapped quantity cannot be measured, and for a component that it does not
     have there.
     """
-    names_by_kind = places.of(row.quantity)
+    names_by_kind = transducer_places.of(mapped_channel.quantity)
     all_names = tuple(name for names in names_by_kind.values() for name in names)
-    if names_by_kind and row.at not in all_names:
+    if names_by_kind and mapped_channel.at not in all_names:
         known = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in names_by_kind.items() if names)
-        text = f"the vehicle has no such place for {row.quantity} ({known}){suggestion_phrase(row.at, all_names)}"
-        raise InputError(file, f"{place}, at", row.at, text)
-    along = row.at in places.connectors and row.quantity in ("force", "moment")
-    axes = () if along else COMPONENTS_OF_QUANTITY[row.quantity]
-    if row.component not in (axes or ("",)):
+        suggestion = suggestion_phrase(mapped_channel.at, all_names)
+        text = f"the vehicle has no such place for {mapped_channel.quantity} ({known}){suggestion}"
+        raise InputError(file_name, f"{key_path}, at", mapped_channel.at, text)
+    along = mapped_channel.at in transducer_places.connectors and mapped_channel.quantity in ("force", "moment")
+    axes = () if along else COMPONENTS_OF_QUANTITY[mapped_channel.quantity]
+    if mapped_channel.component not in (axes or ("",)):
         allowed = "has a direction of its own: leave component out"
         if axes:
             allowed = f"must be {', '.join(axes[:-1])} or {axes[-1]}"
-        text = f"{allowed} ({row.quantity} at {row.at!r})"
-        raise InputError(file, f"{place}, component", row.component or None, text)
+        text = f"{allowed} ({mapped_channel.quantity} at {mapped_channel.at!r})"
+        raise InputError(file_name, f"{key_path}, component", mapped_channel.component or None, text)

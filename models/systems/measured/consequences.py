@@ -3,8 +3,8 @@ finding is corrected.
 
 A finding with a size can be corrected: a late channel is shifted, a wrong factor divided out, a spike removed. The lost
 samples of a gap are unknown; instead the gap's bridge is changed by its standard deviation. The difference of both runs
-is the effect of the finding on every section force, as rms and as damage. Of a long recording ``LONGEST_RERUN`` s are
-run, about the time where the finding is worst.
+is the effect of the finding on every section force, as rms and as damage. Of a long recording
+``LONGEST_RERUN_DURATION`` s are run, about the time where the finding is worst.
 """
 
 import shutil
@@ -26,7 +26,7 @@ from models.measured.signal import Signal
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
-LONGEST_RERUN = 30.0
+LONGEST_RERUN_DURATION = 30.0
 """Longest part (s) of a recording that is run for a finding."""
 FORCE_LIMITS, DAMAGE_LIMITS = (0.05, 0.15), (0.05, 0.25)
 """Limits of the change of a section force: rms of the change divided by the rms of the force without its mean, and
@@ -36,8 +36,8 @@ NEGLIGIBLE_FORCE_SHARE = 0.02
 """Rms of a section force divided by the largest rms in the same unit, below which the force is not compared."""
 SETTLING_DURATION = 1.0
 """Time (s) at the beginning of a run that is not compared, in which the run settles."""
-Samples = dict[Signal, np.ndarray]
-Run = Callable[[Recording, Path], SectionOutcome]
+SamplesBySignal = dict[Signal, np.ndarray]
+RunRecording = Callable[[Recording, Path], SectionOutcome]
 
 
 @dataclass(frozen=True)
@@ -74,15 +74,19 @@ class Consequence:
 
 
 def consequences(
-    findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[SectionChannel], folder: Path
+    findings: Iterable[Finding],
+    recording: Recording,
+    run_recording: RunRecording,
+    force_channels: Sequence[SectionChannel],
+    work_folder: Path,
 ) -> tuple[Consequence, ...]:
-    """Compute the consequence of every doubt. run : function that simulates a recording in a folder; answers : channels
-    of the section forces that are compared.
+    """Compute the consequence of every doubt. run_recording : function that simulates a recording in a folder;
+    force_channels : channels of the section forces that are compared.
     """
-    shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(work_folder, ignore_errors=True)
     outcome_of_start = dict[int, SectionOutcome]()
 
-    def consequence(number: int, finding: Finding) -> Consequence:
+    def consequence(finding_number: int, finding: Finding) -> Consequence:
         signals = [s for s in recording.signals if s.name in finding.signals]
         correction = CORRECTION_OF_CHECK.get(finding.check)
         if correction is None or not signals:
@@ -90,15 +94,17 @@ def consequences(
         first, count = _window_of_finding(finding, recording)
         samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
         corrected = samples | correction(finding, signals, samples, recording.period)
-        start_folder, corrected_folder = folder / f"from {first}", folder / str(number)
+        start_folder, corrected_folder = work_folder / f"from {first}", work_folder / str(finding_number)
         try:
             if first not in outcome_of_start:
-                outcome_of_start[first] = run(samples_as_recording(recording, samples, start_folder), start_folder)
+                outcome_of_start[first] = run_recording(
+                    samples_as_recording(recording, samples, start_folder), start_folder
+                )
             corrected_recording = samples_as_recording(recording, corrected, corrected_folder)
-            corrected_outcome = run(corrected_recording, corrected_folder)
+            corrected_outcome = run_recording(corrected_recording, corrected_folder)
         except (InputError, RunFailed):
             return Consequence(finding)
-        return _consequence_of_most_changed_force(finding, outcome_of_start[first], corrected_outcome, answers)
+        return _consequence_of_most_changed_force(finding, outcome_of_start[first], corrected_outcome, force_channels)
 
     return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
@@ -139,27 +145,30 @@ def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
 
 def _window_of_finding(finding: Finding, recording: Recording) -> tuple[int, int]:
     """First sample and number of samples of the part of a recording that is run for a finding."""
-    count = min(recording.count, round(LONGEST_RERUN / recording.period) + 1)
+    count = min(recording.count, round(LONGEST_RERUN_DURATION / recording.period) + 1)
     middle = finding.times[0] if finding.times else 0.0
-    first = min(max(round((middle - LONGEST_RERUN / 2) / recording.period), 0), recording.count - count)
+    first = min(max(round((middle - LONGEST_RERUN_DURATION / 2) / recording.period), 0), recording.count - count)
     return first, count
 
 
-def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -> Recording:
-    """Write samples of signals into columns in ``folder``, and return them as a recording."""
-    folder.mkdir(parents=True, exist_ok=True)
-    count = len(next(iter(samples.values())))
-    columns = Columns(folder / "samples.columns", tuple(s.name for s in recording.signals), count)
-    columns.write(0, np.column_stack([samples[s] for s in recording.signals]))
+def samples_as_recording(recording: Recording, samples_by_signal: SamplesBySignal, columns_folder: Path) -> Recording:
+    """Write samples of signals into columns in ``columns_folder``, and return them as a recording."""
+    columns_folder.mkdir(parents=True, exist_ok=True)
+    count = len(next(iter(samples_by_signal.values())))
+    columns = Columns(columns_folder / "samples.columns", tuple(s.name for s in recording.signals), count)
+    columns.write(0, np.column_stack([samples_by_signal[s] for s in recording.signals]))
     return Recording(recording.signals, columns, recording.period)
 
 
 def _consequence_of_most_changed_force(
-    finding: Finding, recorded: SectionOutcome, corrected: SectionOutcome, answers: Sequence[SectionChannel]
+    finding: Finding,
+    recorded_outcome: SectionOutcome,
+    corrected_outcome: SectionOutcome,
+    force_channels: Sequence[SectionChannel],
 ) -> Consequence:
     """Returns the consequence of a finding for the section force that changes most, without negligibly small forces."""
-    first = min(round(SETTLING_DURATION / corrected.period), corrected.done // 4)
-    pairs = {a: (recorded.samples(a)[first:], corrected.samples(a)[first:]) for a in answers}
+    first = min(round(SETTLING_DURATION / corrected_outcome.period), corrected_outcome.done // 4)
+    pairs = {a: (recorded_outcome.samples(a)[first:], corrected_outcome.samples(a)[first:]) for a in force_channels}
     size = {a: root_mean_square(measured - measured.mean()) for a, (_, measured) in pairs.items()}
     most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
     every = [
@@ -175,76 +184,90 @@ def _consequence_of_most_changed_force(
     return max(every, key=lambda computed: (computed.grade, abs(computed.force)), default=Consequence(finding))
 
 
-def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _read_later(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     """Samples of signals corrected for a constant delay, or for a clock's drift, which grows from the start on."""
-    size, count = finding.size or 0.0, len(next(iter(samples.values())))
-    later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
-    return {s: _read_at(samples[s], later) for s in signals}
+    size, count = finding.size or 0.0, len(next(iter(samples_by_signal.values())))
+    later = size * np.arange(count) if finding.check == "drift" else size / sample_period * np.ones(count)
+    return {s: _read_at(samples_by_signal[s], later) for s in signals}
 
 
-def _read_at(values: np.ndarray, samples_later: np.ndarray) -> np.ndarray:
+def _read_at(sampled_values: np.ndarray, samples_later: np.ndarray) -> np.ndarray:
     """Values (n,) read ``samples_later`` (n,) samples later by a cubic spline; NaN next to an unknown value."""
     from scipy.interpolate import make_interp_spline
 
-    known, places = np.isfinite(values), np.arange(len(values))
+    known, places = np.isfinite(sampled_values), np.arange(len(sampled_values))
     if np.count_nonzero(known) < 4:
-        return values
-    at = np.clip(places + samples_later, 0, len(values) - 1)
-    spline = make_interp_spline(places[known], values[known], k=3)
+        return sampled_values
+    at = np.clip(places + samples_later, 0, len(sampled_values) - 1)
+    spline = make_interp_spline(places[known], sampled_values[known], k=3)
     lost = np.interp(at, places, (~known).astype(float)) > 0
     return np.where(lost, np.nan, spline(np.clip(at, *places[known][[0, -1]])))
 
 
-def _divided_by_factor(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _divided_by_factor(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
-    return {s: samples[s] / factor for s in signals}
+    return {s: samples_by_signal[s] / factor for s in signals}
 
 
-def _offset_removed(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    return {s: samples[s] - (finding.size or 0.0) for s in signals}
+def _offset_removed(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
+    return {s: samples_by_signal[s] - (finding.size or 0.0) for s in signals}
 
 
-def _moments_corrected(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    force = {(s.at, s.component): s for s in samples if s.quantity == "force" and not s.check}
+def _moments_corrected(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
+    force = {(s.at, s.component): s for s in samples_by_signal if s.quantity == "force" and not s.check}
     across = {"x": ("y", -1.0), "y": ("x", 1.0)}
     return {
-        s: samples[s] + sign * (finding.size or 0.0) * samples[force[s.at, axis]]
+        s: samples_by_signal[s] + sign * (finding.size or 0.0) * samples_by_signal[force[s.at, axis]]
         for s, (axis, sign) in ((s, across[s.component]) for s in signals)
         if (s.at, axis) in force
     }
 
 
-def _channels_exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _channels_exchanged(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     first, second = signals
-    return {first: samples[second], second: samples[first]}
+    return {first: samples_by_signal[second], second: samples_by_signal[first]}
 
 
-def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _without_spikes(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     """Samples of signals with spikes of one or two samples replaced by interpolation."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
-        at, values = spike_positions(samples[s])[0], samples[s].copy()
+        at, values = spike_positions(samples_by_signal[s])[0], samples_by_signal[s].copy()
         values[np.minimum(np.concatenate((at, at + 1)), len(values) - 1)] = np.nan
-        out[s] = filled_samples(values, period, LONGEST_BRIDGED_GAP)[0]
+        out[s] = filled_samples(values, sample_period, LONGEST_BRIDGED_GAP)[0]
     return out
 
 
-def _bridge_varied(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _bridge_varied(
+    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+) -> SamplesBySignal:
     """Samples of signals with gaps bridged as for the run, plus or minus the bridge's standard deviation, with the sign
     alternating from gap to gap.
     """
     out = dict[Signal, np.ndarray]()
     for s in signals:
         if s.quantity in ("force", "moment"):
-            values, gaps = filled_samples(samples[s], period, LONGEST_BRIDGED_GAP)
+            values, gaps = filled_samples(samples_by_signal[s], sample_period, LONGEST_BRIDGED_GAP)
             out[s] = values.copy()
             for number, gap in enumerate(gaps):
                 out[s][gap.first : gap.end] += (-1.0) ** number * np.nan_to_num(gap.largest_deviation)
     return out
 
 
-CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
+CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], SamplesBySignal, float], SamplesBySignal]] = {
     "shift": _read_later,
     "drift": _read_later,
     "gain": _divided_by_factor,

@@ -13,7 +13,7 @@ import numpy as np
 from models.core.discretisation import Estimate, estimate, estimate_rescaled, reference_size, summed_error
 from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, STEP_ERROR_ORDER
 from models.systems.measured.consequences import samples_as_recording
-from models.systems.measured.section_run import SectionOutcome, SectionRun
+from models.systems.measured.section_run import SectionOutcome, SectionRunSettings
 from models.systems.measured.section_run import run as march
 
 REPEATED_SHARE, LONGEST_REPEAT = 0.2, 30.0
@@ -23,7 +23,10 @@ longest duration (s).
 
 
 def errors_of_steps(
-    job: SectionRun, outcome: SectionOutcome, earlier_errors: dict[str, Estimate], folder: Path
+    run_settings: SectionRunSettings,
+    run_outcome: SectionOutcome,
+    earlier_errors: dict[str, Estimate],
+    work_folder: Path,
 ) -> dict[str, Estimate]:
     """Estimate the errors that the time steps cause in forces of springs, mounts and bars, and in roll and pitch;
     returned by channel name.
@@ -31,41 +34,43 @@ def errors_of_steps(
     earlier_errors : errors of the virtual measurement by element name, which are added. Raises RunFailed where the
     repeated part, which begins at rest in the middle of the recording, fails.
     """
-    grid, recording = job.grid, job.recording
+    grid, recording = run_settings.grid, run_settings.recording
     count = round(min(REPEATED_SHARE * recording.duration, LONGEST_REPEAT) / recording.period) + 1
     first = (recording.count - count) // 2
     samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
-    shutil.rmtree(folder, ignore_errors=True)
-    middle_job = replace(job, recording=samples_as_recording(recording, samples, folder))
-    coarse = march(middle_job, folder / "own")
-    fine = march(replace(middle_job, step=0.5 * grid.step), folder / "half")
+    shutil.rmtree(work_folder, ignore_errors=True)
+    middle_job = replace(run_settings, recording=samples_as_recording(recording, samples, work_folder))
+    coarse = march(middle_job, work_folder / "own")
+    fine = march(replace(middle_job, step=0.5 * grid.step), work_folder / "half")
     stride, errors = round(coarse.period / fine.period), dict[str, Estimate]()
-    for name, element in _principal_channels(job, outcome, bool(earlier_errors)).items():
+    for name, element in _principal_channels(run_settings, run_outcome, bool(earlier_errors)).items():
         error = estimate(fine.samples(name)[::stride][: coarse.done], coarse.samples(name), STEP_ERROR_ORDER, grid.step)
         scaled = replace(
-            error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(job, element)
+            error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(run_settings, element)
         )
-        errors[name] = estimate_rescaled(scaled, reference_size(outcome.samples(name)), grid.step)
+        errors[name] = estimate_rescaled(scaled, reference_size(run_outcome.samples(name)), grid.step)
         if element in earlier_errors:
             errors[name] = summed_error(errors[name], earlier_errors[element])
-    shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(work_folder, ignore_errors=True)
     return errors
 
 
-def _principal_channels(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
+def _principal_channels(
+    run_settings: SectionRunSettings, run_outcome: SectionOutcome, is_virtual: bool
+) -> dict[str, str]:
     """Names of the channels whose error is estimated, each with its element ("" for an angle), without channels that
     hardly move.
 
     After a virtual measurement roll and pitch are left out: errors of measured moments accumulate in them.
     """
-    elements = {element.name: element.unit for element in job.vehicle.elements}
-    names = {a.name: a.section for a in outcome.answers if a.section in elements and a.unit == elements[a.section]}
-    names |= {} if virtual else {f"{job.vehicle.chassis} {angle}": "" for angle in ("roll", "pitch")}
-    change = {name: float(np.std(outcome.samples(name))) for name in names}
+    elements = {element.name: element.unit for element in run_settings.vehicle.elements}
+    names = {a.name: a.section for a in run_outcome.answers if a.section in elements and a.unit == elements[a.section]}
+    names |= {} if is_virtual else {f"{run_settings.vehicle.chassis} {angle}": "" for angle in ("roll", "pitch")}
+    change = {name: float(np.std(run_outcome.samples(name))) for name in names}
     kinds = {name: elements.get(element, "rad") for name, element in names.items()}
     most = {kind: max(change[name] for name in names if kinds[name] == kind) for kind in kinds.values()}
     return {name: element for name, element in names.items() if change[name] > LEAST_CHANGE_SHARE * most[kinds[name]]}
 
 
-def _unit(job: SectionRun, element: str) -> str:
-    return next(candidate.unit for candidate in job.vehicle.elements if candidate.name == element)
+def _unit(run_settings: SectionRunSettings, element_name: str) -> str:
+    return next(candidate.unit for candidate in run_settings.vehicle.elements if candidate.name == element_name)

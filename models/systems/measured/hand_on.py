@@ -23,72 +23,76 @@ COUNTED_FIGURES = {"least": "smallest_load", "greatest": "largest_load", "mean":
 """Channels of the result over the section forces, with the attribute of ``CountedLoad`` for each."""
 
 
-def hand_on(
-    outcome: SectionOutcome,
-    folder: Path,
-    formats: Iterable[str],
-    answers: Sequence[SectionChannel] | None = None,
-    start: datetime | None = None,
-    comment: str = "",
+def write_section_forces(
+    run_outcome: SectionOutcome,
+    output_folder: Path,
+    file_formats: Iterable[str],
+    section_channels: Sequence[SectionChannel] | None = None,
+    start_date: datetime | None = None,
+    file_comment: str = "",
 ) -> list[Path]:
-    """Write section forces and moments of a run, or only the channels ``answers``, to a file ``section_forces.EXT`` for
-    every format.
+    """Write section forces and moments of a run, or only the channels ``section_channels``, to a file
+    ``section_forces.EXT`` for every format.
 
     The files also have names, units and comments (axes and signs). Returns the paths; raises InputError where a file
     exists or a format has no room for a name.
     """
-    answers = forces(outcome.answers) if answers is None else answers
-    names, units, comments = (tuple(getattr(a, key) for a in answers) for key in ("name", "unit", "comment"))
+    section_channels = section_force_channels(run_outcome.answers) if section_channels is None else section_channels
+    names, units, comments = (tuple(getattr(a, key) for a in section_channels) for key in ("name", "unit", "comment"))
 
     def blocks() -> Iterator[np.ndarray]:
-        for first in range(0, outcome.done, SAMPLES_PER_BLOCK):
-            yield outcome.columns.block(names, first, min(SAMPLES_PER_BLOCK, outcome.done - first))
+        for first in range(0, run_outcome.done, SAMPLES_PER_BLOCK):
+            yield run_outcome.columns.block(names, first, min(SAMPLES_PER_BLOCK, run_outcome.done - first))
 
     return [
         write(
-            folder / f"{FILE_STEM}.{form}",
-            [ChannelGroup(names, units, comments, outcome.period, outcome.done, blocks())],
-            start,
-            comment,
+            output_folder / f"{FILE_STEM}.{form}",
+            [ChannelGroup(names, units, comments, run_outcome.period, run_outcome.done, blocks())],
+            start_date,
+            file_comment,
         )
-        for form in formats
+        for form in file_formats
     ]
 
 
-def forces(answers: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
+def section_force_channels(output_channels: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
     """Returns those channels that are section forces and moments."""
-    return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
+    return tuple(answer for answer in output_channels if answer.section and answer.unit in ("N", "N m"))
 
 
 def labelled_result(
-    scene: Any, outcome: SectionOutcome | None, counted: Mapping[SectionChannel, CountedLoad], folder: Path, **more: Any
+    scene: Any,
+    run_outcome: SectionOutcome | None,
+    counted_loads: Mapping[SectionChannel, CountedLoad],
+    output_folder: Path,
+    **further_fields: Any,
 ) -> Result:
-    """Returns the result of a run whose samples lie in ``folder``. Without an outcome it has attributes only.
+    """Returns the result of a run whose samples lie in ``output_folder``. Without an outcome it has attributes only.
 
     It has all channels over time, where they are no longer than a block, and statistics and pseudo-damage of the
-    counted section forces; ``more`` : further arguments of ``models.core.result.result``.
+    counted section forces; ``further_fields`` : further arguments of ``models.core.result.result``.
     """
     channels, axes = dict[str, Channel](), dict[str, Channel]()
-    if outcome is not None:
-        more["columns"] = str(outcome.columns.path.relative_to(folder))
-        more["columns_of"] = json.dumps([answer.name for answer in outcome.answers])
-        if outcome.done <= SAMPLES_PER_BLOCK:
-            axes["time"] = Channel("time", outcome.period * np.arange(outcome.done), "s", "time")
-            for answer in outcome.answers:
+    if run_outcome is not None:
+        further_fields["columns"] = str(run_outcome.columns.path.relative_to(output_folder))
+        further_fields["columns_of"] = json.dumps([answer.name for answer in run_outcome.answers])
+        if run_outcome.done <= SAMPLES_PER_BLOCK:
+            axes["time"] = Channel("time", run_outcome.period * np.arange(run_outcome.done), "s", "time")
+            for answer in run_outcome.answers:
                 name = answer.name.replace("/", "|")  # which would be a group of the file
-                channels[name] = Channel("time", outcome.samples(answer), answer.unit, answer.comment)
-    if outcome is not None and counted:
-        unit, damage = "that of the section force", [list(counts.damage.values()) for counts in counted.values()]
-        slopes = list(next(iter(counted.values())).damage)
-        axes["section_force"] = Channel("section_force", [answer.name for answer in counted])
+                channels[name] = Channel("time", run_outcome.samples(answer), answer.unit, answer.comment)
+    if run_outcome is not None and counted_loads:
+        unit, damage = "that of the section force", [list(counts.damage.values()) for counts in counted_loads.values()]
+        slopes = list(next(iter(counted_loads.values())).damage)
+        axes["section_force"] = Channel("section_force", [answer.name for answer in counted_loads])
         axes["slope"] = Channel("slope", slopes, "1", "Woehler exponent")
         figures = {
-            name: [getattr(counts, attribute) for counts in counted.values()]
+            name: [getattr(counts, attribute) for counts in counted_loads.values()]
             for name, attribute in COUNTED_FIGURES.items()
         }
-        figures["rms"] = [root_mean_square(outcome.samples(answer)) for answer in counted]
+        figures["rms"] = [root_mean_square(run_outcome.samples(answer)) for answer in counted_loads]
         channels |= {name: Channel("section_force", values, "", unit) for name, values in figures.items()}
-        channels["unit"] = Channel("section_force", [answer.unit for answer in counted])
+        channels["unit"] = Channel("section_force", [answer.unit for answer in counted_loads])
         meaning = f"pseudo-damage: {unit}, to the slope"
         channels["damage"] = Channel(("section_force", "slope"), np.array(damage), "", meaning)
-    return result(scene, channels, axes, counts=outcome.counts if outcome else {}, **more)
+    return result(scene, channels, axes, counts=run_outcome.counts if run_outcome else {}, **further_fields)

@@ -6,7 +6,7 @@ import numpy as np
 from models.measured.checks.spectra import white_noise
 from models.measured.recording import Recording
 from models.measured.signal import Quantity
-from models.systems.measured.scene import Deviations, MeasuredScene
+from models.systems.measured.scene import MeasuredScene, NoiseTable
 from models.systems.measured.section_run import AttitudeHold
 
 FREE_RUN = "free"
@@ -24,7 +24,7 @@ def stabilisers_of_runs(scene: MeasuredScene, recording: Recording) -> dict[str,
     """Returns the stabiliser settings of each run by name: of the free run, and of the run with the
     scene's stabiliser.
     """
-    settings, deviations = scene.stabilise, noise_of(scene.noise, recording)
+    settings, deviations = scene.stabilise, noise_deviations(scene.noise, recording)
     stabilised_hold = {
         settings.method: AttitudeHold(
             settings.method, settings.bandwidth, settings.model, settings.smoothing, **deviations
@@ -33,7 +33,7 @@ def stabilisers_of_runs(scene: MeasuredScene, recording: Recording) -> dict[str,
     return {FREE_RUN: AttitudeHold("none", **deviations)} | ({} if settings.method == "none" else stabilised_hold)
 
 
-def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
+def noise_deviations(stated_deviations: NoiseTable, recording: Recording) -> dict[str, float]:
     """Standard deviations of the measured noise in SI, by key of [noise]: as stated, else estimated from the recording,
     but at least those of usual transducers, since filters hide noise.
     """
@@ -42,5 +42,7 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
         sizes = np.array([white_noise(recording, s) for s in recording.find(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(AttitudeHold, key))
-        deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
+        deviations[key] = getattr(stated_deviations, key) or max(
+            least, float(np.median(known)) if len(known) else least
+        )
     return deviations

@@ -57,42 +57,42 @@ class StepGrid:
         """Number of samples of the recording between output samples."""
         return max(round(self.step / self.period), 1)
 
-    def check(self, file: str = "") -> None:
+    def check(self, named_file: str = "") -> None:
         """Raise InputError unless the time step is a multiple of the sampling period, or the period of the step."""
         ratio = max(self.step / self.period, self.period / self.step)
         if abs(ratio - round(ratio)) > 1e-9 * ratio:
             fitting = f"must be a part or a multiple of the recording's period of {self.period:g} s"
-            raise InputError(file, "run.step", self.step, fitting)
+            raise InputError(named_file, "run.step", self.step, fitting)
 
-    def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
-        """Interpolates ``samples`` (n, columns) linearly at half steps 0 .. count - 1 after the first sample."""
-        return interpolate(samples, *self._samples_before(count))
+    def rows(self, sample_rows: np.ndarray, half_step_count: int) -> np.ndarray:
+        """Interpolates ``sample_rows`` (n, columns) linearly at half steps 0 .. count - 1 after the first sample."""
+        return interpolate(sample_rows, *self._samples_before(half_step_count))
 
-    def cubic_rows(self, samples: np.ndarray, count: int) -> np.ndarray:
-        """Interpolates ``samples`` (n, columns) at half steps 0 .. count - 1 after the second sample, by the cubic
+    def cubic_rows(self, sample_rows: np.ndarray, half_step_count: int) -> np.ndarray:
+        """Interpolates ``sample_rows`` (n, columns) at half steps 0 .. count - 1 after the second sample, by the cubic
         through the two samples before and the two after each half step."""
-        at, u = self._samples_before(count)
+        at, u = self._samples_before(half_step_count)
         weights = (
             -u * (u - 1) * (u - 2) / 6,
             (u + 1) * (u - 1) * (u - 2) / 2,
             -(u + 1) * u * (u - 2) / 2,
             (u + 1) * u * (u - 1) / 6,
         )
-        return np.asarray(sum(weight[:, None] * samples[at + i] for i, weight in enumerate(weights)))
+        return np.asarray(sum(weight[:, None] * sample_rows[at + i] for i, weight in enumerate(weights)))
 
-    def _samples_before(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def _samples_before(self, half_step_count: int) -> tuple[np.ndarray, np.ndarray]:
         """Index of the last sample at or before each half step, and the fraction of the sampling period since then."""
         numerator, denominator = self.half_step_ratio.numerator, self.half_step_ratio.denominator
-        place = np.arange(count) * numerator
+        place = np.arange(half_step_count) * numerator
         return place // denominator, (place % denominator) / denominator
 
 
-class Inputs:
+class RecordingInputs:
     """Hub forces and angles of a recording that drive a run; check signals are left out."""
 
-    def __init__(self, recording: Recording, vehicle: CutVehicle, enforced: bool = False) -> None:
-        """Read a recording; ``enforced`` : whether gaps in the angles are bridged as well. Raises InputError for
-        missing forces, or forces with long gaps.
+    def __init__(self, recording: Recording, vehicle: CutVehicle, angles_are_enforced: bool = False) -> None:
+        """Read a recording; ``angles_are_enforced`` : whether gaps in the angles are bridged as well. Raises InputError
+        for missing forces, or forces with long gaps.
         """
         self.recording, self.vehicle, self.findings = recording, vehicle, list[Finding]()
         used: dict[tuple[str, str, str], Signal] = {
@@ -103,7 +103,7 @@ class Inputs:
         self.yaw = used.get(("angular rate", "yaw", vehicle.chassis))
         self._check()
         self._bridges = dict[Signal, tuple[np.ndarray, np.ndarray]]()
-        for signal in (*self.hubs, *(self.angles[:2] if enforced else [])):
+        for signal in (*self.hubs, *(self.angles[:2] if angles_are_enforced else [])):
             if signal is not None:
                 values, gaps, findings = bridged_signals(recording, signal)
                 self.findings += findings
@@ -121,44 +121,46 @@ class Inputs:
         """Signals of hub forces, angles and rates that the run uses."""
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
-    def wrenches(self, first: int, count: int) -> np.ndarray:
-        """Hub forces and moments (count, 6 h) in N and N m at samples from ``first`` on; components that were not
-        measured are 0.
+    def wrenches(self, first_sample: int, sample_count: int) -> np.ndarray:
+        """Hub forces and moments (count, 6 h) in N and N m at samples from ``first_sample`` on; components that were
+        not measured are 0.
         """
-        return self._signal_block(self.hubs, first, count, 0.0)
+        return self._signal_block(self.hubs, first_sample, sample_count, 0.0)
 
-    def wrenches_with_neighbours(self, first: int, count: int) -> np.ndarray:
+    def wrenches_with_neighbours(self, first_sample: int, sample_count: int) -> np.ndarray:
         """Hub forces as from ``wrenches``, with one more sample before and two after; beyond its ends the recording is
         mirrored in its end point.
         """
-        before, after = max(1 - first, 0), max(first + count + 2 - self.recording.count, 0)
-        known = self.wrenches(first - 1 + before, count + 3 - before)
+        before, after = max(1 - first_sample, 0), max(first_sample + sample_count + 2 - self.recording.count, 0)
+        known = self.wrenches(first_sample - 1 + before, sample_count + 3 - before)
         return np.pad(known, ((before, after), (0, 0)), mode="reflect", reflect_type="odd")
 
-    def tilt(self, first: int, count: int) -> np.ndarray:
+    def tilt(self, first_sample: int, sample_count: int) -> np.ndarray:
         """Measured roll, pitch (rad) and their rates (rad/s), shape (n, 4), NaN where not measured. Gyro rates are
         converted to rates of the angles.
         """
-        tilt = self._signal_block(self.angles, first, count, np.nan)
+        tilt = self._signal_block(self.angles, first_sample, sample_count, np.nan)
         if any(signal is not None and signal.frame != "inertial" for signal in self.angles[2:]):
             known = np.isfinite(tilt[:, 2:])
             roll, pitch, p, q = np.nan_to_num(tilt).T
-            r = np.nan_to_num(self._signal_block([self.yaw], first, count, 0.0)[:, 0])
+            r = np.nan_to_num(self._signal_block([self.yaw], first_sample, sample_count, 0.0)[:, 0])
             rates = np.column_stack(
                 [p + (q * np.sin(roll) + r * np.cos(roll)) * np.tan(pitch), q * np.cos(roll) - r * np.sin(roll)]
             )
             tilt[:, 2:] = np.where(known, rates, np.nan)
         return tilt
 
-    def _signal_block(self, signals: list[Signal | None], first: int, count: int, missing: float) -> np.ndarray:
-        out = np.full((min(count, self.recording.count - first), len(signals)), missing)
+    def _signal_block(
+        self, signals: list[Signal | None], first_sample: int, sample_count: int, missing_value: float
+    ) -> np.ndarray:
+        out = np.full((min(sample_count, self.recording.count - first_sample), len(signals)), missing_value)
         for i, signal in enumerate(signals):
             if signal is not None:
-                out[:, i] = self.recording.columns.read(signal.name, first, count)
+                out[:, i] = self.recording.columns.read(signal.name, first_sample, sample_count)
                 if signal in self._bridges:
                     lost, values = self._bridges[signal]
-                    inside = (lost >= first) & (lost < first + len(out))
-                    out[lost[inside] - first, i] = values[inside]
+                    inside = (lost >= first_sample) & (lost < first_sample + len(out))
+                    out[lost[inside] - first_sample, i] = values[inside]
         return out
 
     def _check(self) -> None:
@@ -180,25 +182,35 @@ class PrescribedAngles:
     windows of samples.
     """
 
-    def __init__(self, inputs: Inputs, grid: StepGrid, bandwidth: float, file: str = "") -> None:
-        """Smooth the angles by a low-pass of ``bandwidth`` (Hz) over the recording. Raises InputError where an angle is
-        missing.
+    def __init__(
+        self, recording_inputs: RecordingInputs, step_grid: StepGrid, smoothing_bandwidth: float, named_file: str = ""
+    ) -> None:
+        """Smooth the angles by a low-pass of ``smoothing_bandwidth`` (Hz) over the recording. Raises InputError where
+        an angle is missing.
         """
-        angles = inputs.tilt(0, inputs.recording.count)[:, :2]
+        angles = recording_inputs.tilt(0, recording_inputs.recording.count)[:, :2]
         if not np.isfinite(angles).all():
-            raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
-        self.angles, self.grid = low_passed(angles, grid.period, bandwidth, file, "stabilise.smoothing"), grid
-        self._window_length = SPLINE_WINDOW * grid.samples_per_output
-        self._rows_per_window = int(self._window_length / grid.half_step_ratio)
+            raise InputError(named_file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
+        self.angles, self.grid = (
+            low_passed(angles, step_grid.period, smoothing_bandwidth, named_file, "stabilise.smoothing"),
+            step_grid,
+        )
+        self._window_length = SPLINE_WINDOW * step_grid.samples_per_output
+        self._rows_per_window = int(self._window_length / step_grid.half_step_ratio)
 
-    def rows(self, first: int, count: int) -> np.ndarray:
+    def rows(self, first_sample: int, half_step_count: int) -> np.ndarray:
         """Roll, pitch, their rates and accelerations (count, 6) in rad, rad/s, rad/s^2 at half steps after sample
-        ``first``.
+        ``first_sample``.
         """
-        first_row, out, done, period = int(first / self.grid.half_step_ratio), np.empty((count, 6)), 0, self.grid.period
-        while done < count:
+        first_row, out, done, period = (
+            int(first_sample / self.grid.half_step_ratio),
+            np.empty((half_step_count, 6)),
+            0,
+            self.grid.period,
+        )
+        while done < half_step_count:
             window, offset = divmod(first_row + done, self._rows_per_window)
-            row_count = min(self._rows_per_window - offset, count - done)
+            row_count = min(self._rows_per_window - offset, half_step_count - done)
             window_start = window * self._window_length
             start = max(window_start - SPLINE_OVERLAP, 0)
             samples = self.angles[start : window_start + self._window_length + SPLINE_OVERLAP + 1]

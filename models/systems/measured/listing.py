@@ -126,31 +126,31 @@ def guess_channel(channel: Channel) -> ChannelGuess | None:
     return ChannelGuess(channel.name, what, at, component, unit, " ".join(doubts), left_out)
 
 
-def _words_of_name(name: str) -> str:
+def _words_of_name(channel_name: str) -> str:
     """Words of a channel's name in lower case, separated by spaces."""
-    return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
+    return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", channel_name).lower()))
 
 
-def _suspension_words(*texts: str) -> str:
+def _suspension_words(*searched_texts: str) -> str:
     """First word in texts that names a part of a suspension; empty if there is none."""
-    matches = (re.search(rf"[^ ]*({SUSPENSION_PART_PATTERN})[^ ]*", text) for text in texts)
+    matches = (re.search(rf"[^ ]*({SUSPENSION_PART_PATTERN})[^ ]*", text) for text in searched_texts)
     return next((match.group() for match in matches if match), "")
 
 
-def _unexpected_word(words: str) -> str:
+def _unexpected_word(name_words: str) -> str:
     """First word of a force channel's name that is no known word for a corner, a force or a wheel, and no filler
     word.
     """
     for known in (*HUB_PATTERNS.values(), QUANTITY_PATTERNS["force"], WHEEL_PATTERN, UNSPECIFIC_PATTERN):
-        words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
-    return next((word for word in words.split() if len(word) > 1), "")
+        name_words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", name_words)
+    return next((word for word in name_words.split() if len(word) > 1), "")
 
 
-def _has_words(names: str, words: str) -> bool:
-    return re.search(rf"(?:^| )(?:{names})(?: |$)", words) is not None
+def _has_words(word_pattern: str, name_words: str) -> bool:
+    return re.search(rf"(?:^| )(?:{word_pattern})(?: |$)", name_words) is not None
 
 
-def describe(path: Path) -> str:
+def describe(measured_path: Path) -> str:
     """Text on a measurement file: its channels with unit, rate, samples, times and range, findings of the reader, and a
     scene with a guessed channel map.
 
@@ -158,9 +158,9 @@ def describe(path: Path) -> str:
 
     Raises InputError for a file that is no measurement.
     """
-    source = open_source(path)
+    source = open_source(measured_path)
     began = f", began {source.start.isoformat(sep=' ')}" if source.start else ", which does not say when it began"
-    lines = [f"{path.name}: {len(source.channels)} channels{began}"]
+    lines = [f"{measured_path.name}: {len(source.channels)} channels{began}"]
     lines += [f"  {line}" for line in source.comment.splitlines()[:10]]
     width = max([len(channel.name) for channel in source.channels], default=0)
     lines += [
@@ -178,9 +178,9 @@ def describe(path: Path) -> str:
     return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
 
 
-def _range_texts(source: Source, names: list[str]) -> dict[str, str]:
+def _range_texts(measurement_file: Source, channel_names: list[str]) -> dict[str, str]:
     """Text for each channel of a group: rate, number of samples, first and last time, least and largest value."""
-    count = next(channel.count for channel in source.channels if channel.name == names[0])
+    count = next(channel.count for channel in measurement_file.channels if channel.name == channel_names[0])
     firsts = (
         sorted(
             {*range(0, count, max(SAMPLES_PER_BLOCK, -(-count // MOST_BLOCKS_READ))), max(count - SAMPLES_PER_BLOCK, 0)}
@@ -188,9 +188,9 @@ def _range_texts(source: Source, names: list[str]) -> dict[str, str]:
         if count
         else []
     )
-    blocks = [next(source.blocks(names, SAMPLES_PER_BLOCK, first)) for first in firsts]
+    blocks = [next(measurement_file.blocks(channel_names, SAMPLES_PER_BLOCK, first)) for first in firsts]
     if not blocks:
-        return dict.fromkeys(names, f"{'':>10} {0:>10}")
+        return dict.fromkeys(channel_names, f"{'':>10} {0:>10}")
     steps = np.concatenate([np.diff(block.times) for block in blocks])
     step, mean = (float(fun(steps)) if len(steps) else 0.0 for fun in (np.median, np.mean))  # rounded times repeat
     rate = f"{1.0 / step:.6g}" if step > 0 else f"~{1.0 / mean:.4g}" if mean > 0 else "none"
@@ -199,33 +199,35 @@ def _range_texts(source: Source, names: list[str]) -> dict[str, str]:
         for fun, start in ((np.min, np.inf), (np.max, -np.inf))
     )
     head = f"{rate:>10} {count:>10} {blocks[0].times[0]:>9.6g} {blocks[-1].times[-1]:>9.6g}"
-    return {name: f"{head} {a:>11.5g} {b:>11.5g}" for name, a, b in zip(names, low, high, strict=True)}
+    return {name: f"{head} {a:>11.5g} {b:>11.5g}" for name, a, b in zip(channel_names, low, high, strict=True)}
 
 
-def scene_text(source: Source) -> str:
+def scene_text(measurement_file: Source) -> str:
     """Returns a draft scene for a measurement file as TOML: entries for guessed channels, comments for the others."""
-    rows = [_map_entry(channel.name, guess_channel(channel)) for channel in source.channels]
-    return "\n".join([SCENE_TEMPLATE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
+    rows = [_map_entry(channel.name, guess_channel(channel)) for channel in measurement_file.channels]
+    return "\n".join(
+        [SCENE_TEMPLATE.format(title=measurement_file.path.stem, file=measurement_file.path.name), *rows, "]", ""]
+    )
 
 
-def _map_entry(name: str, guess: ChannelGuess | None) -> str:
+def _map_entry(channel_name: str, channel_guess: ChannelGuess | None) -> str:
     """Returns an entry of the channel map as TOML, as a comment where anything is missing or uncertain."""
-    if guess is None:
-        return f"  # {{ channel = {_toml_string(name)} }},  # not known"
-    free = guess.quantity in ("travel", "strain") or bool(guess.left_out and not guess.at)
+    if channel_guess is None:
+        return f"  # {{ channel = {_toml_string(channel_name)} }},  # not known"
+    free = channel_guess.quantity in ("travel", "strain") or bool(channel_guess.left_out and not channel_guess.at)
     entries = {
-        "channel": name,
-        "quantity": guess.quantity,
-        "at": guess.at or "?",
-        "component": guess.component or ("" if free else "?"),
-        "unit": guess.unit,
+        "channel": channel_name,
+        "quantity": channel_guess.quantity,
+        "at": channel_guess.at or "?",
+        "component": channel_guess.component or ("" if free else "?"),
+        "unit": channel_guess.unit,
     }
     text = ", ".join(f"{key} = {_toml_string(value)}" for key, value in entries.items() if value)
-    told = " ".join(word for word in (guess.doubt, guess.left_out) if word)
-    unsure = guess.left_out or "?" in entries.values()
+    told = " ".join(word for word in (channel_guess.doubt, channel_guess.left_out) if word)
+    unsure = channel_guess.left_out or "?" in entries.values()
     return f"  {'# ' if unsure else ''}{{ {text} }},{f'  # {told}' if told else ''}"
 
 
-def _toml_string(text: str) -> str:
+def _toml_string(plain_text: str) -> str:
     """Returns a text as a quoted TOML string."""
-    return json.dumps(text, ensure_ascii=False)
+    return json.dumps(plain_text, ensure_ascii=False)

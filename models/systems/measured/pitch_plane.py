@@ -31,7 +31,7 @@ from models.systems.measured.sections import SectionChannel
 from models.systems.pitch_plane import trust as drift_trust
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
-from models.systems.pitch_plane.trust import Trust
+from models.systems.pitch_plane.trust import TrustPrediction
 
 CHASSIS_NAME = "chassis"
 LONGEST_STEP = 1e-3
@@ -47,7 +47,7 @@ SPRING_NAMES = {"f3": "front spring", "f4": "rear spring"}
 
 
 @dataclass(frozen=True)
-class PlaneJob:
+class PlaneRunSettings:
     """Settings of a recording's run in the pitch plane. parameters : name of a parameter set, or of a TOML file; hold :
     stabiliser of the pitch; step : time step (s).
     """
@@ -70,149 +70,164 @@ class PlaneRun:
     """A run in the pitch plane: its result, the predicted time of trust, the verdict, and the section forces."""
 
     result: Result
-    trust: Trust | None
+    trust: TrustPrediction | None
     verdict: Verdict
     outcome: SectionOutcome
 
 
-def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool = False) -> PlaneRun:
+def run(
+    run_settings: PlaneRunSettings,
+    scene_folder: Path,
+    verdict_limits: Limits | None = None,
+    estimate_error: bool = False,
+) -> PlaneRun:
     """Run a recording on the pitch-plane vehicle; files of its scene are written into a new folder. Raises InputError,
     Refused or RunFailed.
 
-    error : whether the error of the time steps is estimated, by further runs.
+    estimate_error : whether the error of the time steps is estimated, by further runs.
     """
-    folder.mkdir(parents=True)
-    scene, said = scene_of(job, folder)
-    result = simulate(scene, job.engine, error=error)
-    limited = trusted_time(scene, job.hold.force)
-    if limited and job.recording.find("angle", CHASSIS_NAME, "pitch"):
+    scene_folder.mkdir(parents=True)
+    scene, said = scene_of(run_settings, scene_folder)
+    result = simulate(scene, run_settings.engine, error=estimate_error)
+    limited = trusted_time(scene, run_settings.hold.force)
+    if limited and run_settings.recording.find("angle", CHASSIS_NAME, "pitch"):
         limited = replace(limited, unchecked_text="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
-    effects = [job.effect] if job.effect else []
+    effects = [run_settings.effect] if run_settings.effect else []
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
     verdict = score.blind_verdict(
-        figures, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
+        figures, effects, result.times[-1], verdict_limits or Limits(), until, uncertainty=score.uncertainty(result)
     )
-    if job.effect is None and verdict.word == "accepted":
-        verdict = _verdict_with_measured_pitch(job, result, limits or Limits(), verdict)
-    return PlaneRun(result, limited, verdict, _section_outcome(result, said, folder))
+    if run_settings.effect is None and verdict.word == "accepted":
+        verdict = _verdict_with_measured_pitch(run_settings, result, verdict_limits or Limits(), verdict)
+    return PlaneRun(result, limited, verdict, _section_outcome(result, said, scene_folder))
 
 
-def _verdict_with_measured_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
+def _verdict_with_measured_pitch(
+    run_settings: PlaneRunSettings, pitch_plane_result: Result, verdict_limits: Limits, verdict: Verdict
+) -> Verdict:
     """Returns the verdict on an accepted free run after its pitch is compared with the measured pitch.
 
     Where forces turn with the vehicle no error grows, but offsets and forces in another frame still make it drift, and
     its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
-    angles = job.recording.find("angle", CHASSIS_NAME, "pitch")
+    angles = run_settings.recording.find("angle", CHASSIS_NAME, "pitch")
     if not angles:
-        return Verdict("stabilise", UNCHECKED_TEXT) if _force_frames(job) != {"inertial"} else verdict
-    measured = job.recording.samples(angles[0])
+        return Verdict("stabilise", UNCHECKED_TEXT) if _force_frames(run_settings) != {"inertial"} else verdict
+    measured = run_settings.recording.samples(angles[0])
     known = np.flatnonzero(np.isfinite(measured))
-    beside = np.interp(result.times, job.recording.period * known, measured[known])
-    off = float(np.abs(score.low_pass(result["pitch"] + beside, float(result.times[1]))).max())
-    if off <= limits.pitch_error:
+    beside = np.interp(pitch_plane_result.times, run_settings.recording.period * known, measured[known])
+    off = float(np.abs(score.low_pass(pitch_plane_result["pitch"] + beside, float(pitch_plane_result.times[1]))).max())
+    if off <= verdict_limits.pitch_error:
         return verdict
-    limit = f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets"
+    limit = f"(at most {verdict_limits.pitch_error:g}): check the frame of the forces and their offsets"
     return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
 
 
-def _force_frames(job: PlaneJob) -> set[str]:
+def _force_frames(run_settings: PlaneRunSettings) -> set[str]:
     """Frames ("inertial", "body" or "hub") of the vertical forces at both axles."""
-    return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(job.recording, axle)}
+    return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(run_settings.recording, axle)}
 
 
-def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
+def scene_of(run_settings: PlaneRunSettings, scene_folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     """Returns a pitch-plane scene of a recording, whose files are written into the folder, and findings on bridged
     gaps.
     """
-    period, said, frames = job.recording.period, list[Finding](), _force_frames(job)
-    forces = {axle: ("N", _axle_force(job, axle, said)) for axle in FORCE_PLACES}
-    write_time_series(folder / "wheel_forces.csv", forces, period)
+    period, said, frames = run_settings.recording.period, list[Finding](), _force_frames(run_settings)
+    forces = {axle: ("N", _axle_force(run_settings, axle, said)) for axle in FORCE_PLACES}
+    write_time_series(scene_folder / "wheel_forces.csv", forces, period)
     if "inertial" in frames and len(frames) > 1:
         text = "vertical forces must all keep their direction in space, or all turn with the vehicle"
-        raise InputError(job.file, "files.channels", None, text)
-    fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
+        raise InputError(run_settings.file, "files.channels", None, text)
+    fixed = (
+        frames == {"inertial"} or run_settings.hold.method == "prescribed"
+    )  # an enforced pitch does not feel the frame
     driving = {"file": "wheel_forces.csv", "interpolation": "smooth", "accept": list(axle_forces.FINDING_NAMES)}
     effects: dict[str, Any] = {"wheel_forces": driving | {"frame": "inertial" if fixed else "body"}}
-    if job.effect:
-        effects[job.effect] = _prescribed_pitch(job, folder, said)
-    step = job.step or period / math.ceil(period / LONGEST_STEP * (1 - 1e-9))
+    if run_settings.effect:
+        effects[run_settings.effect] = _prescribed_pitch(run_settings, scene_folder, said)
+    step = run_settings.step or period / math.ceil(period / LONGEST_STEP * (1 - 1e-9))
     table = {
         "title": "recording",
-        "vehicle": {"parameters": job.parameters},
+        "vehicle": {"parameters": run_settings.parameters},
         "effects": effects,
-        "run": {"duration": job.recording.duration, "step": step},
+        "run": {"duration": run_settings.recording.duration, "step": step},
     }
-    scene = build(table, job.file, folder)
-    recorded = axle_forces_of(job.recording, scene.vehicle_parameters())
+    scene = build(table, run_settings.file, scene_folder)
+    recorded = axle_forces_of(run_settings.recording, scene.vehicle_parameters())
     errors = (
         [each.text for each in axle_forces.check_axle_forces(recorded) if each.weight == "error"] if recorded else []
     )
     if errors:  # doubts are told by the checks of the recording
-        raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
+        raise InputError(run_settings.file, "vehicle.parameters", run_settings.parameters, " ".join(errors))
     return scene, tuple(said)
 
 
-def trusted_time(scene: Scene, deviation: float) -> Trust | None:
-    """Predict how long a pitch-plane scene's run can be trusted, under force noise of standard deviation ``deviation``
-    (N); None where the pitch is stabilised.
+def trusted_time(scene: Scene, force_deviation: float) -> TrustPrediction | None:
+    """Predict how long a pitch-plane scene's run can be trusted, under force noise of standard deviation
+    ``force_deviation`` (N); None where the pitch is stabilised.
     """
     assembly = assembly_of_scene(scene)
     bounds = drift_trust.predict_trust(assembly)
-    if bounds is None or deviation <= 0:
+    if bounds is None or force_deviation <= 0:
         return bounds
-    noise = drift_trust.noise_error_curve(assembly, deviation).passing_time(bounds.angle)
-    return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
+    noise = drift_trust.noise_error_curve(assembly, force_deviation).passing_time(bounds.angle)
+    return replace(bounds, times={**bounds.times, f"noise of {force_deviation:g} N": noise})
 
 
-def _axle_force(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
+def _axle_force(run_settings: PlaneRunSettings, axle_name: str, findings: list[Finding]) -> np.ndarray:
     """Vertical force (n,) of an axle in N with short gaps bridged. Raises InputError for a long gap
     or a missing wheel.
     """
-    signals = axle_signals(job.recording, axle)
-    if len(signals) != (1 if signals and signals[0].at == axle else 2):
-        axle_place, left, right = map(repr, FORCE_PLACES[axle])
+    signals = axle_signals(run_settings.recording, axle_name)
+    if len(signals) != (1 if signals and signals[0].at == axle_name else 2):
+        axle_place, left, right = map(repr, FORCE_PLACES[axle_name])
         text = f"the vertical force is needed at {axle_place}, or at both {left} and {right}"
-        raise InputError(job.file, "files.channels", None, text)
-    return np.asarray(sum(_samples_without_gaps(job, signal, findings) for signal in signals))
+        raise InputError(run_settings.file, "files.channels", None, text)
+    return np.asarray(sum(_samples_without_gaps(run_settings, signal, findings) for signal in signals))
 
 
-def _samples_without_gaps(job: PlaneJob, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
-    values, _, findings = bridged_signals(job.recording, signal)
+def _samples_without_gaps(run_settings: PlaneRunSettings, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
+    values, _, findings = bridged_signals(run_settings.recording, signal)
     all_findings += findings
     return values
 
 
-def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any]:
+def _prescribed_pitch(run_settings: PlaneRunSettings, scene_folder: Path, findings: list[Finding]) -> dict[str, Any]:
     """Returns the scene table of the effect that stabilises the pitch, and writes the measured pitch and rate, nose up,
     to a file.
     """
-    hold, filtered = job.hold, job.hold.method == "kalman"
+    hold, filtered = run_settings.hold, run_settings.hold.method == "kalman"
     columns, deviations = dict[str, tuple[str, np.ndarray]](), dict[str, float]()
     known = (
         ("angle", "pitch", "rad", "pitch_deviation", hold.angle),
         ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
     )
     for quantity, name, unit, key, deviation in known if filtered else known[:1]:
-        for signal in [s for s in job.recording.find(quantity, CHASSIS_NAME, "pitch") if not s.check][:1]:
-            values = job.recording.samples(signal) if filtered else _samples_without_gaps(job, signal, findings)
+        for signal in [s for s in run_settings.recording.find(quantity, CHASSIS_NAME, "pitch") if not s.check][:1]:
+            values = (
+                run_settings.recording.samples(signal)
+                if filtered
+                else _samples_without_gaps(run_settings, signal, findings)
+            )
             columns[name], deviations[key] = (unit, -values), deviation
     if "pitch" not in columns:
-        raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS_NAME!r}")
-    write_time_series(folder / "pitch.csv", columns, job.recording.period)
+        raise InputError(
+            run_settings.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS_NAME!r}"
+        )
+    write_time_series(scene_folder / "pitch.csv", columns, run_settings.recording.period)
     if not filtered:
         return {"file": "pitch.csv", "bandwidth": hold.smoothing}
-    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in FORCE_PLACES))
+    noise = hold.force * math.sqrt(max(len(axle_signals(run_settings.recording, axle)) for axle in FORCE_PLACES))
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
-def _section_outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> SectionOutcome:
+def _section_outcome(pitch_plane_result: Result, findings: tuple[Finding, ...], columns_folder: Path) -> SectionOutcome:
     """Returns section forces in body axes (x forward, z up) and pitch (positive nose down) of a pitch-plane result as a
     ``SectionOutcome``.
     """
-    forces = section_forces(result["f3"], result["f4"], result["pitch"])
+    forces = section_forces(pitch_plane_result["f3"], pitch_plane_result["f4"], pitch_plane_result["pitch"])
     channels = dict[SectionChannel, np.ndarray]()
     for name, spring in SPRING_NAMES.items():
         for axis, direction in (("x", "forward"), ("z", "upward")):
@@ -228,9 +243,17 @@ def _section_outcome(result: Result, findings: tuple[Finding, ...], folder: Path
         answer = SectionChannel(
             f"{CHASSIS_NAME} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS_NAME, "pitch"
         )
-        channels[answer] = -result[name]
-    columns = Columns(folder / "run.f64", tuple(answer.name for answer in channels), len(result.times))
+        channels[answer] = -pitch_plane_result[name]
+    columns = Columns(
+        columns_folder / "run.f64", tuple(answer.name for answer in channels), len(pitch_plane_result.times)
+    )
     columns.write(0, np.column_stack(list(channels.values())))
-    surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan
-    period, count = float(result.times[1]), len(result.times)
-    return SectionOutcome(columns, tuple(channels), period, count, float(surprise), findings, counts=result.counts())
+    surprise = (
+        pitch_plane_result["kalman_surprise"][-1] / pitch_plane_result["kalman_used"][-1]
+        if "kalman_used" in pitch_plane_result.data
+        else math.nan
+    )
+    period, count = float(pitch_plane_result.times[1]), len(pitch_plane_result.times)
+    return SectionOutcome(
+        columns, tuple(channels), period, count, float(surprise), findings, counts=pitch_plane_result.counts()
+    )

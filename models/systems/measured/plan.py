@@ -12,8 +12,8 @@ from models.measured.formats import open_source
 from models.measured.signal import Signal
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.channel_map import mapped_signals
-from models.systems.measured.scene import MeasuredScene, Rig
-from models.systems.measured.virtual import check as check_virtual
+from models.systems.measured.scene import MeasuredRig, MeasuredScene
+from models.systems.measured.virtual import checked_signals as check_virtual
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
 
@@ -39,34 +39,36 @@ def opened_files(scene: MeasuredScene) -> tuple[Source, ...]:
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 
-def signals_of_files(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
+def signals_of_files(
+    scene: MeasuredScene, measurement_files: Sequence[Source], measured_rig: MeasuredRig
+) -> tuple[Signal, ...]:
     """Returns the signals of all mapped channels. Raises InputError also where a wheel has no vertical force, or the
     stabiliser no angles.
     """
-    signals, method = mapped_signals(scene, sources, rig.places), scene.stabilise.method
+    signals, method = mapped_signals(scene, measurement_files, measured_rig.places), scene.stabilise.method
     driving = {(s.quantity, s.at, s.component) for s in signals if not s.check}
-    for hub in rig.hubs if rig.vehicle else ():
+    for hub in measured_rig.hubs if measured_rig.vehicle else ():
         if ("force", hub, "z") not in driving:
             raise InputError(scene.file, "files", None, MISSING_FORCE_TEXT.format(repr(hub)))
     needed_quantities = {"none": (), "prescribed": ("angle",), "kalman": ("angle", "angular rate")}[method]
     for quantity in needed_quantities:
-        for axis in rig.angles:
-            if (quantity, rig.chassis, axis) not in driving:
-                needed = f"needs the {quantity} {axis!r} of {rig.chassis!r}, which no channel is mapped to"
+        for axis in measured_rig.angles:
+            if (quantity, measured_rig.chassis, axis) not in driving:
+                needed = f"needs the {quantity} {axis!r} of {measured_rig.chassis!r}, which no channel is mapped to"
                 raise InputError(scene.file, "stabilise.method", method, f"{needed}: map it, or say 'none'")
     return signals
 
 
-def _check_names(scene: MeasuredScene, rig: Rig) -> None:
-    bodies = rig.places.bodies
+def _check_names(scene: MeasuredScene, measured_rig: MeasuredRig) -> None:
+    bodies = measured_rig.places.bodies
     named_in_scene = [
         *(
             (f"sensors.{name}.body", sensor.body, "the vehicle has no such body", bodies)
             for name, sensor in scene.sensors.items()
         ),
-        *(("levers", name, "the vehicle has no such hub", rig.hubs) for name in scene.levers),
+        *(("levers", name, "the vehicle has no such hub", measured_rig.hubs) for name in scene.levers),
         *(
-            ("hand_on.sections", name, "the vehicle has no such section", rig.sections)
+            ("hand_on.sections", name, "the vehicle has no such section", measured_rig.sections)
             for name in scene.hand_on.sections or ()
         ),
     ]
@@ -119,10 +121,10 @@ def describe(scene: MeasuredScene) -> str:
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])
 
 
-def _file_lines(scene: MeasuredScene, rig: Rig) -> list[str]:
+def _file_lines(scene: MeasuredScene, measured_rig: MeasuredRig) -> list[str]:
     """Lines of text on every measurement file and its mapped channels: quantity, place, axes, factor to SI."""
     sources, lines = opened_files(scene), list[str]()
-    signals = signals_of_files(scene, sources, rig)
+    signals = signals_of_files(scene, sources, measured_rig)
     for source in sources:
         began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
         lines.append(_plan_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))

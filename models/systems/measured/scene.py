@@ -27,7 +27,7 @@ Engine = Literal["reference", "exudyn", "mujoco"]
 
 
 @dataclass(frozen=True)
-class Rig:
+class MeasuredRig:
     """The vehicle that a recording drives, with the places of its sensors and sections.
 
     name : of the vehicle or the parameter set; chassis : body whose angles are measured; sections : names of sections
@@ -48,7 +48,7 @@ class Rig:
         return self.places.hubs
 
 
-class Vehicle(Strict):
+class MeasuredVehicleTable(Strict):
     """[vehicle]: a vehicle file and the name of its chassis, or a parameter set of the pitch-plane vehicle."""
 
     file: str | None = Field(
@@ -83,14 +83,14 @@ class MeasuredFile(Strict):
     channels: list[MappedChannel] = Field(min_length=1, description="what its channels measure")
 
 
-class Sensor(Strict):
+class SensorPlace(Strict):
     """[sensors.NAME]: body and position of an accelerometer or gyro."""
 
     body: str = Field(description="that carries it")
     position: list[float] = Field(min_length=3, max_length=3, description="x, y, z in m, in the vehicle's design axes")
 
 
-class Clock(Strict):
+class RecordingClock(Strict):
     """[clock]: sampling rate, start and duration of the recording; by default those of the wheel forces."""
 
     rate: float | None = quantity("Hz", "samples per second of the recording", default=None)
@@ -98,7 +98,7 @@ class Clock(Strict):
     duration: float | None = quantity("s", "length of the recording that is used; without it, all of it", default=None)
 
 
-class Deviations(Strict):
+class NoiseTable(Strict):
     """[noise]: standard deviations of the white noise on each sample; estimated from the recording where not given."""
 
     force: float | None = quantity("N", "of every force sample", default=None)
@@ -107,7 +107,7 @@ class Deviations(Strict):
     rate: float | None = quantity("rad/s", "of every angular rate", default=None)
 
 
-class Stabiliser(Strict):
+class MeasuredStabiliserTable(Strict):
     """[stabilise]: method by which roll and pitch are kept from drifting off, and its settings."""
 
     method: Literal["kalman", "prescribed", "none"] = Field(default="kalman", description="what holds roll and pitch")
@@ -116,14 +116,14 @@ class Stabiliser(Strict):
     smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
 
 
-class Run(Strict):
+class MeasuredRunTable(Strict):
     """[run]: engine and time step of the runs."""
 
     engine: Engine = Field(default="mujoco", description="that computes it; --engine names another")
     step: float | None = quantity("s", "of Runge-Kutta 4; else the clock's period, or a part of it", default=None)
 
 
-class HandOn(Strict):
+class HandOnTable(Strict):
     """[hand_on]: sections, file formats and Woehler exponents of the section forces that are written to files."""
 
     sections: list[str] | None = Field(default=None, description="springs, mounts, bars, joints; all if not named")
@@ -136,7 +136,7 @@ class MeasuredScene(SceneFile):
 
     system: Literal["measured"] = "measured"
     study: str = Field(default="recording", description="the study that runs the scene")
-    vehicle: Vehicle
+    vehicle: MeasuredVehicleTable
     files: list[MeasuredFile] = Field(default=[], description="what was measured")
     virtual: VirtualTable | None = Field(default=None, description="a virtual measurement in place of files")
     levers: dict[str, float] = Field(
@@ -144,16 +144,16 @@ class MeasuredScene(SceneFile):
         description="hub -> m by which the point that its moments are about "
         "lies above it; of the contact patch minus the radius",
     )
-    sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
-    clock: Clock = Clock()
-    noise: Deviations = Deviations()
-    stabilise: Stabiliser = Stabiliser()
-    run: Run = Run()
+    sensors: dict[str, SensorPlace] = Field(default={}, description="where accelerometers sit")
+    clock: RecordingClock = RecordingClock()
+    noise: NoiseTable = NoiseTable()
+    stabilise: MeasuredStabiliserTable = MeasuredStabiliserTable()
+    run: MeasuredRunTable = MeasuredRunTable()
     limits: Limits = Field(default=RUN_LIMITS, description="of the verdict")
-    hand_on: HandOn = HandOn()
+    hand_on: HandOnTable = HandOnTable()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
-    def rig(self) -> Rig:
+    def rig(self) -> MeasuredRig:
         """Returns the vehicle that the recording drives, with its places. The pitch plane is driven at its axles or at
         the wheels of each axle. Raises InputError.
         """
@@ -161,11 +161,13 @@ class MeasuredScene(SceneFile):
         if given_vehicle.file is None:
             hubs, springs = tuple(hub for axle in FORCE_PLACES.values() for hub in axle), tuple(SPRING_NAMES.values())
             places = Places(hubs, (CHASSIS_NAME,), springs)
-            return Rig(str(given_vehicle.parameters), CHASSIS_NAME, places, springs, ("pitch",), None)
+            return MeasuredRig(str(given_vehicle.parameters), CHASSIS_NAME, places, springs, ("pitch",), None)
         vehicle = cut(scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
         bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.uncut.bodies, vehicle.elements))
         places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
-        return Rig(vehicle.tree.name, vehicle.chassis, places, section_names(vehicle), ("roll", "pitch"), vehicle)
+        return MeasuredRig(
+            vehicle.tree.name, vehicle.chassis, places, section_names(vehicle), ("roll", "pitch"), vehicle
+        )
 
     @property
     def places(self) -> dict[str, TransducerPlace]:
@@ -181,22 +183,24 @@ class MeasuredScene(SceneFile):
         return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> MeasuredScene:
     """Build a checked scene of a recording from the nested tables of a scene file. Raises InputError for unknown keys
     and for values outside their ranges.
     """
-    scene = checked(MeasuredScene, table, file, folder)
+    scene = checked(MeasuredScene, scene_tables, scene_path, scene_folder)
     vehicle, names = scene.vehicle, [each.file for each in scene.files]
     if (vehicle.file is None) == (vehicle.parameters is None):
         what = "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle"
-        raise InputError(file, "vehicle", None, what)
+        raise InputError(scene_path, "vehicle", None, what)
     if vehicle.parameters is not None and "chassis" in vehicle.model_fields_set:
-        raise InputError(file, "vehicle.chassis", vehicle.chassis, "belongs to a vehicle file: drop it")
+        raise InputError(scene_path, "vehicle.chassis", vehicle.chassis, "belongs to a vehicle file: drop it")
     if vehicle.parameters is not None and scene.virtual is not None:
-        raise InputError(file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
+        raise InputError(scene_path, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
     if bool(names) == (scene.virtual is not None):
-        raise InputError(file, "files", None, "give either [[files]] that were measured, or a table [virtual]")
+        raise InputError(scene_path, "files", None, "give either [[files]] that were measured, or a table [virtual]")
     for i, name in enumerate(names):
         if name in names[:i]:
-            raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
+            raise InputError(
+                scene_path, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]"
+            )
     return with_effect_tables(scene)

@@ -25,7 +25,7 @@ from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
-from models.systems.measured.inputs import Inputs, PrescribedAngles, StepGrid
+from models.systems.measured.inputs import PrescribedAngles, RecordingInputs, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid_vehicle
 
@@ -62,7 +62,7 @@ class AttitudeHold:
 
 
 @dataclass(frozen=True)
-class SectionRun:
+class SectionRunSettings:
     """Settings of a recording's run on a vehicle without tyres. hold : stabiliser; step : time step (s), the
     recording's sampling period if None; file : the scene that messages name.
     """
@@ -138,17 +138,17 @@ class Checkpoint:
             raise InputError(self.path, "", None, f"{reason}: choose another folder, or remove this one")
         return arrays
 
-    def save(self, **arrays: np.ndarray) -> None:
+    def save(self, **arrays_by_name: np.ndarray) -> None:
         """Save arrays by name in place of the earlier arrays."""
         buffer = BytesIO()
-        np.savez(buffer, of=np.array(json.dumps(self.input_checksums)), **arrays)  # type: ignore[arg-type]
+        np.savez(buffer, of=np.array(json.dumps(self.input_checksums)), **arrays_by_name)  # type: ignore[arg-type]
         write_whole(self.path, buffer.getvalue())
 
 
-def digest_of(*parts: object) -> str:
+def checksum_of(*digested_objects: object) -> str:
     """Checksum of objects: of the bytes of arrays, and of the ``repr`` of other objects."""
     total = hashlib.blake2b(digest_size=16)
-    for part in parts:
+    for part in digested_objects:
         if isinstance(part, np.ndarray):
             total.update(f"{part.dtype} {part.shape}".encode())
             total.update(np.ascontiguousarray(part).data)
@@ -157,53 +157,72 @@ def digest_of(*parts: object) -> str:
     return total.hexdigest()
 
 
-def check(job: SectionRun) -> None:
+def check_settings(run_settings: SectionRunSettings) -> None:
     """Raise InputError for settings with which a run is impossible or inaccurate, before any run is made."""
-    grid, hold = job.grid, job.hold
-    grid.check(job.file)
-    if job.count < 2:
-        raise InputError(job.file, "files", None, f"the recording has {job.recording.count} samples: nothing to run")
-    check_step(job.engine, job.vehicle, grid.step, grid.step * grid.steps_per_output)
+    grid, hold = run_settings.grid, run_settings.hold
+    grid.check(run_settings.file)
+    if run_settings.count < 2:
+        raise InputError(
+            run_settings.file,
+            "files",
+            None,
+            f"the recording has {run_settings.recording.count} samples: nothing to run",
+        )
+    check_step(run_settings.engine, run_settings.vehicle, grid.step, grid.step * grid.steps_per_output)
     if hold.method == "kalman" and hold.bandwidth * grid.step > STIFFEST_PULL:
         limit = f"must be at most {STIFFEST_PULL:g} of the rate of the run's steps, {STIFFEST_PULL / grid.step:g} Hz"
-        raise InputError(job.file, "stabilise.bandwidth", hold.bandwidth, limit)
-    used = [signal for signal in job.recording.signals if not signal.check and signal.at == job.vehicle.chassis]
+        raise InputError(run_settings.file, "stabilise.bandwidth", hold.bandwidth, limit)
+    used = [
+        signal
+        for signal in run_settings.recording.signals
+        if not signal.check and signal.at == run_settings.vehicle.chassis
+    ]
     if hold.method != "none" and not any(signal.quantity in ("angle", "angular rate") for signal in used):
-        needed = f"needs roll and pitch or their rates at the body {job.vehicle.chassis!r}; 'none' runs without"
-        raise InputError(job.file, "stabilise.method", hold.method, needed)
+        needed = (
+            f"needs roll and pitch or their rates at the body {run_settings.vehicle.chassis!r}; 'none' runs without"
+        )
+        raise InputError(run_settings.file, "stabilise.method", hold.method, needed)
 
 
 def run(
-    job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = CHECKPOINT_INTERVAL
+    run_settings: SectionRunSettings,
+    run_folder: Path,
+    report_progress: Progress = no_progress,
+    block_duration: float = CHECKPOINT_INTERVAL,
 ) -> SectionOutcome:
-    """Run a recording, or complete its run in ``folder``; ``progress`` is called with the simulated and the total time
-    (s).
+    """Run a recording, or complete its run in ``run_folder``; ``report_progress`` is called with the simulated and the
+    total time (s).
 
-    block : time (s) between checkpoints, which changes no bit of the results. Raises InputError where the folder has a
-    run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle topples.
+    block_duration : time (s) between checkpoints, which changes no bit of the results. Raises InputError where the
+    folder has a run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle
+    topples.
     """
-    check(job)
-    march = _March(job, folder, max(round(block / (job.grid.step * job.grid.steps_per_output)), 1))
-    period = job.recording.period * job.grid.samples_per_output
-    progress(march.done * period, job.recording.duration)
-    while march.done < job.count:
+    check_settings(run_settings)
+    march = _March(
+        run_settings,
+        run_folder,
+        max(round(block_duration / (run_settings.grid.step * run_settings.grid.steps_per_output)), 1),
+    )
+    period = run_settings.recording.period * run_settings.grid.samples_per_output
+    report_progress(march.done * period, run_settings.recording.duration)
+    while march.done < run_settings.count:
         march.advance()
-        progress(march.done * period, job.recording.duration)
+        report_progress(march.done * period, run_settings.recording.duration)
     return march.outcome()
 
 
 class _March:
     """A run in progress: ``done`` output samples are on disk; ``state`` (2 n,) is the state at the next sample."""
 
-    def __init__(self, job: SectionRun, folder: Path, length: int) -> None:
-        self.job, self.grid, self.length, hold = job, job.grid, length, job.hold
-        self.inputs = Inputs(job.recording, job.vehicle, hold.method == "prescribed")
+    def __init__(self, run_settings: SectionRunSettings, run_folder: Path, block_length: int) -> None:
+        self.job, self.grid, self.length, hold = run_settings, run_settings.grid, block_length, run_settings.hold
+        self.inputs = RecordingInputs(run_settings.recording, run_settings.vehicle, hold.method == "prescribed")
         self.filter = self._filter() if hold.method == "kalman" else None
         self.prescribed = None
         if hold.method == "prescribed":
-            self.prescribed = PrescribedAngles(self.inputs, self.grid, hold.smoothing, job.file)
-        folder.mkdir(parents=True, exist_ok=True)
-        self._checkpoint = Checkpoint(folder / "run.npz", _inputs_of(job, self.inputs))
+            self.prescribed = PrescribedAngles(self.inputs, self.grid, hold.smoothing, run_settings.file)
+        run_folder.mkdir(parents=True, exist_ok=True)
+        self._checkpoint = Checkpoint(run_folder / "run.npz", _inputs_of(run_settings, self.inputs))
         saved = self._checkpoint.load()
         self.done, self.state = (0, self._start()) if saved is None else (int(saved["done"]), saved["state"])
         if saved is None:
@@ -211,7 +230,9 @@ class _March:
         elif self.filter is not None:
             known = self.filter.state
             self.filter.state = replace(known, **{name: saved[name] for name in vars(known)})
-        self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
+        self.columns = Columns(
+            run_folder / "run.f64", tuple(answer.name for answer in run_settings.sections.answers), run_settings.count
+        )
 
     def outcome(self) -> SectionOutcome:
         """Returns the outcome of the run up to now."""
@@ -245,15 +266,15 @@ class _March:
             raise failure
         self._save()
 
-    def _marched(self, model: HubModel) -> tuple[np.ndarray, RunFailed | None]:
+    def _marched(self, hub_model: HubModel) -> tuple[np.ndarray, RunFailed | None]:
         """Returns the states of a block up to its end, or up to the time at which the vehicle topples together with the
         failure.
         """
-        began, steps = self.done * self.grid.period * self.grid.samples_per_output, model.steps
+        began, steps = self.done * self.grid.period * self.grid.samples_per_output, hub_model.steps
         try:
-            states = model.marched(*np.split(self.state, 2)).states
+            states = hub_model.marched(*np.split(self.state, 2)).states
         except RunFailed:
-            states = self._march_until_failure(model)
+            states = self._march_until_failure(hub_model)
         bounded_states = states[:, 4:]  # where it is and where it heads may be anything
         toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > TUMBLED_PITCH
         is_invalid = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(bounded_states) > SIZE_BOUND).any(axis=1)
@@ -268,33 +289,33 @@ class _March:
         states = states[: max(first_invalid, 1)]
         return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
-    def _march_until_failure(self, model: HubModel) -> np.ndarray:
+    def _march_until_failure(self, hub_model: HubModel) -> np.ndarray:
         """Returns the states of a block that the engine did not complete: of the longest part from its beginning that
         the engine can run, by bisection.
         """
-        good, bad, states = 0, model.steps, self.state[None]
+        good, bad, states = 0, hub_model.steps, self.state[None]
         while bad - good > 1:
-            model.steps = (good + bad) // 2
+            hub_model.steps = (good + bad) // 2
             try:
-                states = model.marched(*np.split(self.state, 2)).states
-                good = model.steps
+                states = hub_model.marched(*np.split(self.state, 2)).states
+                good = hub_model.steps
             except RunFailed:
-                bad = model.steps
+                bad = hub_model.steps
         return states
 
-    def _hub_inputs(self, first: int, steps: int) -> HubInputs:
-        """Returns the inputs at half steps of a block that begins at sample ``first``: hub forces and, with a
+    def _hub_inputs(self, first_sample: int, step_count: int) -> HubInputs:
+        """Returns the inputs at half steps of a block that begins at sample ``first_sample``: hub forces and, with a
         stabiliser, roll and pitch.
         """
-        grid, rows = self.grid, 2 * steps + 1
+        grid, rows = self.grid, 2 * step_count + 1
         used = math.floor((rows - 1) * grid.half_step_ratio) + 1
-        wrenches = self.inputs.wrenches_with_neighbours(first, used + 1)
+        wrenches = self.inputs.wrenches_with_neighbours(first_sample, used + 1)
         free = HubInputs(grid.cubic_rows(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
-            return replace(free, guide=self.prescribed.rows(first, rows))
+            return replace(free, guide=self.prescribed.rows(first_sample, rows))
         if self.filter is None:
             return free
-        tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first, used))
+        tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first_sample, used))
         guide = np.hstack([grid.rows(tilt, rows), np.zeros((rows, 2))])
         corner, (roll, pitch, _) = (
             2 * math.pi * self.job.hold.bandwidth,
@@ -320,11 +341,11 @@ class _March:
         return state
 
     def _filter(self) -> "TiltFilter":
-        from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
+        from models.systems.hub_forces.tilt_filter import StatedDeviations, TiltFilter
 
         vehicle, hold, period = self.job.vehicle, self.job.hold, self.job.recording.period
         forces = np.tile([hold.force] * 3 + [hold.moment] * 3, len(vehicle.hubs))
-        deviations = Deviations(forces, (hold.angle, hold.rate), hold.model)
+        deviations = StatedDeviations(forces, (hold.angle, hold.rate), hold.model)
         return TiltFilter(vehicle, self.inputs.frame, period, deviations, self.job.file)
 
     def _save(self) -> None:
@@ -332,20 +353,22 @@ class _March:
         self._checkpoint.save(done=np.array(self.done), state=self.state, **known)
 
 
-def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
+def _inputs_of(run_settings: SectionRunSettings, recording_inputs: RecordingInputs) -> dict[str, str]:
     """Checksums of all inputs on which a run's results depend, by names that users understand."""
-    library = {"reference": "numpy"}.get(job.engine, job.engine)
+    library = {"reference": "numpy"}.get(run_settings.engine, run_settings.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
-    idle = HubInputs(np.zeros((1, 6 * len(inputs.hubs))))
-    samples = digest_of(job.recording.period, job.recording.count)
-    for signal in inputs.used_signals:
-        samples = digest_of(samples, signal, job.recording.samples(signal))
+    idle = HubInputs(np.zeros((1, 6 * len(recording_inputs.hubs))))
+    samples = checksum_of(run_settings.recording.period, run_settings.recording.count)
+    for signal in recording_inputs.used_signals:
+        samples = checksum_of(samples, signal, run_settings.recording.samples(signal))
     return {
-        "vehicle": digest_of(table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),
+        "vehicle": checksum_of(
+            table(run_settings.vehicle, idle, run_settings.grid.step), run_settings.vehicle.tree.coordinates()
+        ),
         "recording": samples,
-        "stabiliser": repr(job.hold),
-        "engine": f"{job.engine} {version(library)}",
-        "step": repr(job.grid.step),
-        "list of sections": digest_of(job.sections.answers, job.sections.frame),
+        "stabiliser": repr(run_settings.hold),
+        "engine": f"{run_settings.engine} {version(library)}",
+        "step": repr(run_settings.grid.step),
+        "list of sections": checksum_of(run_settings.sections.answers, run_settings.sections.frame),
         "version": f"{version('twinrig')} {sources}",
     }

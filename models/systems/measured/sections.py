@@ -51,9 +51,13 @@ class SectionChannel:
     at: str = ""
     component: str = ""
 
-    def measures(self, signal: Signal) -> bool:
+    def measures(self, measured_signal: Signal) -> bool:
         """Whether a signal measures the quantity of this channel at the same place and in the same component."""
-        return (self.quantity, self.at, self.component) == (signal.quantity, signal.at, signal.component)
+        return (self.quantity, self.at, self.component) == (
+            measured_signal.quantity,
+            measured_signal.at,
+            measured_signal.component,
+        )
 
 
 @dataclass(frozen=True)
@@ -105,14 +109,21 @@ class Sections:
         points = np.array(rows, float).reshape(len(rows), 5)
         object.__setattr__(self, "_places", SectionPlaces(*_guide_arrays(self.vehicle, joined), points))
 
-    def read(self, numbers: np.ndarray, states: np.ndarray, stride: int) -> np.ndarray:
-        """Computes all channels (n, channels) at states (n, 2 c) that are ``stride`` half steps apart; numbers :
-        parameters as in ``HubModel``.
+    def read(self, model_parameters: np.ndarray, states: np.ndarray, half_steps_per_row: int) -> np.ndarray:
+        """Computes all channels (n, channels) at states (n, 2 c) that are ``half_steps_per_row`` half steps apart;
+        numbers : parameters as in ``HubModel``.
         """
         wrenches, points = len(self._places.guide_joints) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
-        section_results(numbers, float(stride), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
+        section_results(
+            model_parameters,
+            float(half_steps_per_row),
+            np.ascontiguousarray(states),
+            self._places,
+            self.frame == "hub",
+            out,
+        )
         return out[:, self.columns]
 
 
@@ -128,10 +139,10 @@ def guided_bodies(vehicle: CutVehicle) -> tuple[str, ...]:
 
 
 def _kernel_columns(
-    vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]
+    vehicle: CutVehicle, force_frame: str, accelerometer_points_in_use: tuple[AccelerometerPoint, ...]
 ) -> Iterator[SectionChannel]:
     """Yields the channel of every column in a row of the compiled kernel."""
-    chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
+    chassis, about = vehicle.chassis, "chassis" if force_frame == "body" else ""
     for e in vehicle.elements:
         if e.unit == "N":
             text = "along its own axis, compression positive"
@@ -156,25 +167,25 @@ def _kernel_columns(
         for axis, quantity, component, unit in HUB_COMPONENTS:
             text = f"on the hub from outside, axes of {about or tyre.body}"
             yield SectionChannel(f"{hub} hub {axis}", unit, text, f"{hub} hub", quantity, hub, component)
-    for p in points:
+    for p in accelerometer_points_in_use:
         text = f"{'with' if p.gravity else 'without'} gravity, axes of {p.body}"
         yield from (
             SectionChannel(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz"
         )
 
 
-def _zero_components(vehicle: CutVehicle, frame: str) -> set[str]:
+def _zero_components(vehicle: CutVehicle, force_frame: str) -> set[str]:
     """Names of the guide force channels that are zero, as they act along a free direction of the guide."""
     sliding = set[str]()
     for name in guided_bodies(vehicle):
         body = vehicle.uncut.body(name)
         turns = any(freedom.startswith("r") for freedom in body.freedoms)
-        if body.parent == vehicle.chassis and (frame == "body" or not turns):
+        if body.parent == vehicle.chassis and (force_frame == "body" or not turns):
             sliding |= {f"{name} guide F{axis}" for axis in body.freedoms}
     return sliding
 
 
-def _guide_arrays(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
+def _guide_arrays(vehicle: CutVehicle, joints: Joints) -> tuple[np.ndarray, np.ndarray]:
     """Returns the last joint of every guided body (g,), and which bodies, hubs and elements act behind that joint
     (g, b + h + 3 e), in the format of the compiled kernel.
     """
@@ -183,23 +194,23 @@ def _guide_arrays(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.n
     owners = [*heavy, *(tyre.body for tyre in vehicle.uncut.tyres), *ends]
     parents = {body.name: body.parent for body in vehicle.uncut.bodies}
 
-    def behind(name: str | None, guide: str) -> bool:
-        return name is not None and (name == guide or behind(parents[name], guide))
+    def behind(body_name: str | None, guided_body: str) -> bool:
+        return body_name is not None and (body_name == guided_body or behind(parents[body_name], guided_body))
 
-    last = np.array([joined.last_joint[name] for name in guided_bodies(vehicle)], np.int64)
+    last = np.array([joints.last_joint[name] for name in guided_bodies(vehicle)], np.int64)
     rows = [[float(behind(owner, name)) for owner in owners] for name in guided_bodies(vehicle)]
     return last, np.array(rows).reshape(len(last), len(owners))
 
 
 def accelerometer_points(
-    vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, TransducerPlace]
+    vehicle: CutVehicle, signals: Iterable[Signal], transducer_places: Mapping[str, TransducerPlace]
 ) -> tuple[AccelerometerPoint, ...]:
-    """Points at which acceleration signals are measured: sensors in ``places``, and centres of bodies."""
+    """Points at which acceleration signals are measured: sensors in ``transducer_places``, and centres of bodies."""
     section_points = dict[str, AccelerometerPoint]()
     for signal in (signal for signal in signals if signal.quantity == "acceleration"):
-        if signal.at in places:
+        if signal.at in transducer_places:
             section_points[signal.at] = AccelerometerPoint(
-                signal.at, places[signal.at].body, places[signal.at].position, signal.gravity
+                signal.at, transducer_places[signal.at].body, transducer_places[signal.at].position, signal.gravity
             )
         elif signal.at in {body.name for body in vehicle.uncut.bodies}:
             section_points[signal.at] = AccelerometerPoint(

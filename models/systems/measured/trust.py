@@ -23,7 +23,7 @@ import numpy as np
 
 from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.multibody.cut_kernel import WRENCH
-from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
+from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, TrustPrediction
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, RigidVehicle, rigid_vehicle
 
 SUMMED_TIMES = 2000
@@ -63,21 +63,21 @@ class Drift:
     rates: np.ndarray
     frame: str = "hub"
 
-    def passing_time(self, angle: float = UNTRUSTED_PITCH, source: str | None = None) -> float | None:
-        """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad); None if
-        never.
+    def passing_time(self, largest_angle: float = UNTRUSTED_PITCH, error_source: str | None = None) -> float | None:
+        """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``largest_angle`` (rad);
+        None if never.
 
-        source : a key of ``mean_errors``, or "noise" alone; None: all together.
+        error_source : a key of ``mean_errors``, or "noise" alone; None: all together.
         """
         from scipy.special import ndtr
 
         mean = sum(
-            (means for name, means in self.mean_errors.items() if source in (None, name)),
+            (means for name, means in self.mean_errors.items() if error_source in (None, name)),
             np.zeros((len(self.times), 3)),
         )
-        spread = self.deviations if source in (None, "noise") else np.zeros_like(self.deviations)
+        spread = self.deviations if error_source in (None, "noise") else np.zeros_like(self.deviations)
         mean, deviation = mean[:, :2], np.maximum(spread[:, :2], 1e-300)
-        inside = np.prod(ndtr((angle - mean) / deviation) - ndtr((-angle - mean) / deviation), axis=1)
+        inside = np.prod(ndtr((largest_angle - mean) / deviation) - ndtr((-largest_angle - mean) / deviation), axis=1)
         beyond = inside < 0.5
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
@@ -92,54 +92,69 @@ class Drift:
         passed = self.passing_time(self.angle)
         return float(self.times[-1]) if passed is None else passed
 
-    def trust(self, angle: float | None = None) -> Trust:
-        """Returns the time at which each source of error exceeds ``angle`` (rad), by default the limit for section
-        forces; 0.05 rad is the limit for the motion.
+    def trust(self, largest_angle: float | None = None) -> TrustPrediction:
+        """Returns the time at which each source of error exceeds ``largest_angle`` (rad), by default the limit for
+        section forces; 0.05 rad is the limit for the motion.
         """
-        limit = self.angle if angle is None else angle
+        limit = self.angle if largest_angle is None else largest_angle
         times = {name: self.passing_time(limit, name) for name in ("noise", *self.mean_errors)}
-        return Trust({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
+        return TrustPrediction({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
 
 
-def predicted_drift(vehicle: CutVehicle, level: MeasurementErrors, period: float, duration: float, frame: str) -> Drift:
+def predicted_drift(
+    vehicle: CutVehicle, measurement_errors: MeasurementErrors, sample_period: float, duration: float, force_frame: str
+) -> Drift:
     """Predict the drift of a free run over a duration (s), under hub forces in a frame, sampled
-    every ``period`` (s).
+    every ``sample_period`` (s).
     """
     body, law = (
         rigid_vehicle(vehicle),
-        _AngleResponse(rigid_vehicle(vehicle), frame, np.linspace(0.0, duration, SUMMED_TIMES + 1)),
+        _AngleResponse(rigid_vehicle(vehicle), force_frame, np.linspace(0.0, duration, SUMMED_TIMES + 1)),
     )
-    noise = period * body.turning(level.deviations(vehicle))
+    noise = sample_period * body.turning(measurement_errors.deviations(vehicle))
     spread = np.sqrt(
         np.diagonal(law.time_integral(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2)
     )
     means = dict[str, np.ndarray]()
-    if level.bias is not None:
-        turning = np.linalg.solve(body.inertia, body.moments(np.asarray(level.bias, float)[None])[0])
+    if measurement_errors.bias is not None:
+        turning = np.linalg.solve(body.inertia, body.moments(np.asarray(measurement_errors.bias, float)[None])[0])
         means["bias"] = law.time_integral(law.impulse) @ turning
-    for name, start, response in (("tilt", level.tilt, "step"), ("rate", level.rate, "impulse")):
+    for name, start, response in (
+        ("tilt", measurement_errors.tilt, "step"),
+        ("rate", measurement_errors.rate, "impulse"),
+    ):
         if np.any(start):
             means[f"{name} at the start"] = getattr(law, response) @ np.array([*start, 0.0])
-    return Drift(law.times, means, spread, law.rates, frame)
+    return Drift(law.times, means, spread, law.rates, force_frame)
 
 
-def position(vehicle: CutVehicle, level: MeasurementErrors, period: float, times: np.ndarray, frame: str) -> np.ndarray:
+def position_error(
+    vehicle: CutVehicle,
+    measurement_errors: MeasurementErrors,
+    sample_period: float,
+    times: np.ndarray,
+    force_frame: str,
+) -> np.ndarray:
     """Error (n, 3) in m of the position x, y, z of a free run at times (n,) in s, from noise, bias and initial tilt.
 
     With forces that turn with the vehicle, gravity moves a tilted vehicle by g tilt t^2 / 2; in the frame "inertial"
     only noise and bias of the forces act. The result combines one standard deviation of the noise with the means of the
     other errors.
     """
-    body, deviation = rigid_vehicle(vehicle), level.deviations(vehicle)
+    body, deviation = rigid_vehicle(vehicle), measurement_errors.deviations(vehicle)
     mean = np.zeros((len(times), 3))
-    bias = np.zeros(len(deviation)) if level.bias is None else np.asarray(level.bias, float)
+    bias = np.zeros(len(deviation)) if measurement_errors.bias is None else np.asarray(measurement_errors.bias, float)
     mean += np.outer(times**2 / 2, bias.reshape(-1, WRENCH)[:, :3].sum(axis=0) / body.mass)
-    if frame != "inertial":
+    if force_frame != "inertial":
         turning = np.linalg.solve(body.inertia, body.moments(bias[None])[0])
         for axis, about, sign in ((0, 1, 1.0), (1, 0, -1.0)):
-            tilt = level.tilt[about] * times**2 / 2 + level.rate[about] * times**3 / 6 + turning[about] * times**4 / 24
+            tilt = (
+                measurement_errors.tilt[about] * times**2 / 2
+                + measurement_errors.rate[about] * times**3 / 6
+                + turning[about] * times**4 / 24
+            )
             mean[:, axis] += sign * GRAVITY * tilt
-    return np.sqrt(mean**2 + body.position_variance(deviation, period, times, frame))
+    return np.sqrt(mean**2 + body.position_variance(deviation, sample_period, times, force_frame))
 
 
 @dataclass(frozen=True)
@@ -161,10 +176,10 @@ class _AngleResponse:
         """Growth rates (3,) of an error in 1/s; 0 where an error does not grow by itself."""
         return np.asarray(self._modes[0].real)
 
-    def _matrices_of_modes(self, factors: np.ndarray) -> np.ndarray:
+    def _matrices_of_modes(self, mode_functions: np.ndarray) -> np.ndarray:
         """Response matrices (n, 3, 3) of the angles from the time functions (n, 3) of the modes."""
         shapes = self._modes[1]
-        return np.asarray(((shapes * factors[:, None, :]) @ np.linalg.inv(shapes)).real)
+        return np.asarray(((shapes * mode_functions[:, None, :]) @ np.linalg.inv(shapes)).real)
 
     @cached_property
     def impulse(self) -> np.ndarray:
@@ -177,7 +192,7 @@ class _AngleResponse:
         """Response (n, 3, 3) of the angles to an initial tilt, dimensionless."""
         return self._matrices_of_modes(np.cosh(np.outer(self.times, self._modes[0])))
 
-    def time_integral(self, values: np.ndarray) -> np.ndarray:
+    def time_integral(self, values_over_time: np.ndarray) -> np.ndarray:
         """Time integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""
-        steps = 0.5 * (values[1:] + values[:-1]) * self.times[1]
-        return np.concatenate((np.zeros_like(values[:1]), np.cumsum(steps, axis=0)))
+        steps = 0.5 * (values_over_time[1:] + values_over_time[:-1]) * self.times[1]
+        return np.concatenate((np.zeros_like(values_over_time[:1]), np.cumsum(steps, axis=0)))

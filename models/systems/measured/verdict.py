@@ -29,7 +29,7 @@ from models.drift.score import (
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRun
+from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRunSettings
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
@@ -97,109 +97,122 @@ class ChannelComparison:
     trusted_time: float
 
 
-def channels_to_compare(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
+def channels_to_compare(run_settings: SectionRunSettings) -> tuple[tuple[Signal, SectionChannel], ...]:
     """Returns pairs of a measured signal and the run's channel of the same quantity, for check signals and
     accelerations.
 
     The run has no channel for strains and for sensors of unknown place.
     """
-    outside = [s for s in job.recording.signals if s.check or s.quantity == "acceleration"]
-    return tuple((s, a) for s in outside if _same_axes(job, s) for a in job.sections.answers if a.measures(s))
+    outside = [s for s in run_settings.recording.signals if s.check or s.quantity == "acceleration"]
+    return tuple(
+        (s, a) for s in outside if _same_axes(run_settings, s) for a in run_settings.sections.answers if a.measures(s)
+    )
 
 
-def _same_axes(job: SectionRun, signal: Signal) -> bool:
+def _same_axes(run_settings: SectionRunSettings, signal: Signal) -> bool:
     """Whether the run computes a signal's quantity in the axes of the signal."""
-    if signal.at in job.vehicle.hubs and signal.quantity in ("force", "moment"):
-        return signal.frame == job.sections.frame
+    if signal.at in run_settings.vehicle.hubs and signal.quantity in ("force", "moment"):
+        return signal.frame == run_settings.sections.frame
     return signal.frame != "inertial" or signal.quantity == "angle"
 
 
 def paired_channels(
-    recording: Recording, run: SectionOutcome, signal: Signal, answer: SectionChannel
+    recording: Recording, run_outcome: SectionOutcome, signal: Signal, section_channel: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns times (n,) in s of a run, and measured and computed values (n,) of a channel."""
-    computed, skip = run.samples(answer), round(run.period / recording.period)
+    computed, skip = run_outcome.samples(section_channel), round(run_outcome.period / recording.period)
     measured = recording.columns.read(signal.name, 0, (len(computed) - 1) * skip + 1)[::skip]
-    return run.period * np.arange(len(computed)), measured, computed
+    return run_outcome.period * np.arange(len(computed)), measured, computed
 
 
-def compare(
+def compare_channel(
     recording: Recording,
-    run: SectionOutcome,
+    run_outcome: SectionOutcome,
     signal: Signal,
-    answer: SectionChannel,
-    slopes: tuple[float, ...] = (3.0, 5.0, 8.0),
+    section_channel: SectionChannel,
+    woehler_exponents: tuple[float, ...] = (3.0, 5.0, 8.0),
 ) -> ChannelComparison:
-    """Compare a measured signal with the run's channel over the time of the run; slopes : Woehler exponents."""
-    _, measured, computed = paired_channels(recording, run, signal, answer)
+    """Compare a measured signal with the run's channel over the time of the run; woehler_exponents : Woehler
+    exponents.
+    """
+    _, measured, computed = paired_channels(recording, run_outcome, signal, section_channel)
     known = np.isfinite(measured)
     if not known.any():
-        return ChannelComparison(signal, answer, math.nan, (), math.nan, dict.fromkeys(slopes, math.nan), math.inf)
+        return ChannelComparison(
+            signal, section_channel, math.nan, (), math.nan, dict.fromkeys(woehler_exponents, math.nan), math.inf
+        )
     error, size = computed - measured, float(np.std(measured[known]))
-    offset, true = float(np.mean(error[known])), {slope: pseudo_damage(measured[known], slope) for slope in slopes}
+    offset, true = (
+        float(np.mean(error[known])),
+        {slope: pseudo_damage(measured[known], slope) for slope in woehler_exponents},
+    )
     return ChannelComparison(
         signal,
-        answer,
+        section_channel,
         offset,
-        _rms_by_band(measured, error, run.period),
+        _rms_by_band(measured, error, run_outcome.period),
         1.0 - float(np.var(error[known])) / size**2 if size > 0 else math.nan,
         {
             slope: pseudo_damage(computed[known], slope) / damage if damage > 0 else math.nan
             for slope, damage in true.items()
         },
-        _trusted_time(error - offset, size, run.period),
+        _trusted_time(error - offset, size, run_outcome.period),
     )
 
 
-def _rms_by_band(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[FrequencyBand, ...]:
+def _rms_by_band(
+    measured_values: np.ndarray, error_values: np.ndarray, sample_period: float
+) -> tuple[FrequencyBand, ...]:
     """Rms of measured values and of errors by frequency band, from averaged spectra of overlapping segments under a
     Hann window. Segments with gaps are left out.
     """
-    length = min(round(SEGMENT_LENGTH / period), len(error))
+    length = min(round(SEGMENT_LENGTH / sample_period), len(error_values))
     window = np.hanning(length + 1)[:-1]
     power, used = np.zeros((2, length // 2 + 1)), 0
-    for first in range(0, len(error) - length + 1, max(length // 2, 1)):
-        both = np.stack([each[first : first + length] for each in (measured, error)])
+    for first in range(0, len(error_values) - length + 1, max(length // 2, 1)):
+        both = np.stack([each[first : first + length] for each in (measured_values, error_values)])
         if np.isfinite(both).all():
             power += np.abs(np.fft.rfft((both - both.mean(axis=1, keepdims=True)) * window, axis=1)) ** 2
             used += 1
     if used == 0:
         return ()
     power *= 2.0 / (used * length * np.sum(window**2))  # mean squares, from both halves of the spectrum
-    frequencies, bands = np.fft.rfftfreq(length, period), []
+    frequencies, bands = np.fft.rfftfreq(length, sample_period), []
     for low, high in pairwise(FREQUENCY_BANDS):
         inside = (frequencies >= low) & (frequencies < high)
         if inside.any():
-            bands.append(FrequencyBand(low, min(high, 0.5 / period), *np.sqrt(power[:, inside].sum(axis=1))))
+            bands.append(FrequencyBand(low, min(high, 0.5 / sample_period), *np.sqrt(power[:, inside].sum(axis=1))))
     return tuple(bands)
 
 
-def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
-    """Time (s) of the first stretch whose rms error exceeds ``STRETCH_ERROR_LIMIT`` of ``size``; infinite if there is
-    none.
+def _trusted_time(error_values: np.ndarray, signal_size: float, sample_period: float) -> float:
+    """Time (s) of the first stretch whose rms error exceeds ``STRETCH_ERROR_LIMIT`` of ``signal_size``; infinite if
+    there is none.
     """
-    length = max(round(STRETCH_LENGTH / period), 1)
-    whole = error[: len(error) // length * length].reshape(-1, length)
+    length = max(round(STRETCH_LENGTH / sample_period), 1)
+    whole = error_values[: len(error_values) // length * length].reshape(-1, length)
     rms = np.sqrt(np.nanmean(np.where(np.isfinite(whole), whole, 0.0) ** 2, axis=1))
-    beyond = np.flatnonzero(rms > STRETCH_ERROR_LIMIT * size)
-    return float(beyond[0] * length * period) if len(beyond) else math.inf
+    beyond = np.flatnonzero(rms > STRETCH_ERROR_LIMIT * signal_size)
+    return float(beyond[0] * length * sample_period) if len(beyond) else math.inf
 
 
-def judge(
-    job: SectionRun,
-    run: SectionOutcome,
-    limits: Limits = RUN_LIMITS,
-    trusted: float | None = None,
-    compared: Sequence[ChannelComparison] = (),
-    noise: Mapping[str, float] | None = None,
+def judge_run(
+    run_settings: SectionRunSettings,
+    run_outcome: SectionOutcome,
+    verdict_limits: Limits = RUN_LIMITS,
+    trusted_time: float | None = None,
+    channel_comparisons: Sequence[ChannelComparison] = (),
+    noise_by_quantity: Mapping[str, float] | None = None,
 ) -> Verdict:
     """Judge a recording's run without knowledge of the true run.
 
-    trusted : predicted time (s) for which a free run can be trusted, None if not known; compared : comparisons of check
-    channels with the run; noise : standard deviation of the white noise of each channel, by name, in SI.
+    trusted_time : predicted time (s) for which a free run can be trusted, None if not known; channel_comparisons :
+    comparisons of check channels with the run; noise_by_quantity : standard deviation of the white noise of each
+    channel, by name, in SI.
     """
     shares = {
-        channel.signal.name: disagreement(channel, (noise or {}).get(channel.signal.name, 0.0)) for channel in compared
+        channel.signal.name: channel_disagreement(channel, (noise_by_quantity or {}).get(channel.signal.name, 0.0))
+        for channel in channel_comparisons
     }
     off = {name: share for name, share in shares.items() if not share <= LARGEST_DISAGREEMENT}
     if off:
@@ -208,41 +221,47 @@ def judge(
             "rejected", f"channels that were not put in disagree (at most {LARGEST_DISAGREEMENT:.0%}): {told}"
         )
     verdict = score.blind_verdict(
-        figures_of_run(run, job.vehicle),
-        EFFECTS_OF_HOLD[job.hold.method],
-        run.period * (run.done - 1),
-        limits,
-        trusted,
-        uncertainty=uncertainty(job.vehicle, job.hold, job.recording.period),
+        figures_of_run(run_outcome, run_settings.vehicle),
+        EFFECTS_OF_HOLD[run_settings.hold.method],
+        run_outcome.period * (run_outcome.done - 1),
+        verdict_limits,
+        trusted_time,
+        uncertainty=angle_uncertainty(run_settings.vehicle, run_settings.hold, run_settings.recording.period),
     )
     return _worded_for_spatial_vehicle(verdict)
 
 
-def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
+def filter_doubts(run_outcome: SectionOutcome) -> tuple[Finding, ...]:
     """Returns doubts where the innovations of the stabiliser's filter are too large, or biased."""
-    if not run.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT:
+    if not run_outcome.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT:
         return tuple(
-            Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.filter_objections
+            Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.")
+            for text in run_outcome.filter_objections
         )
     text = (
-        f"The filter's innovations squared are {run.normalised_innovation:.3g} times what the noise of "
+        f"The filter's innovations squared are {run_outcome.normalised_innovation:.3g} times what the noise of "
         "forces and angles "
         "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
         "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much."
     )
-    return (Finding("filter", "doubt", "recording", text, run.normalised_innovation, "1"),)
+    return (Finding("filter", "doubt", "recording", text, run_outcome.normalised_innovation, "1"),)
 
 
 def judge_beside_truth(
-    run: SectionOutcome,
-    true: VirtualMeasurement,
-    hold: AttitudeHold,
-    limits: Limits = RUN_LIMITS,
-    slope: float = WOEHLER_SLOPE,
+    run_outcome: SectionOutcome,
+    true_measurement: VirtualMeasurement,
+    attitude_hold: AttitudeHold,
+    verdict_limits: Limits = RUN_LIMITS,
+    woehler_exponent: float = WOEHLER_SLOPE,
 ) -> Verdict:
-    """Judge a run on a virtual measurement by comparison with the true run; slope : Woehler exponent."""
-    figures = figures_of_run(run, true.vehicle), errors_of_run(run, true, slope)
-    return _worded_for_spatial_vehicle(score.verdict_on_run(*figures, EFFECTS_OF_HOLD[hold.method], limits))
+    """Judge a run on a virtual measurement by comparison with the true run; woehler_exponent : Woehler exponent."""
+    figures = (
+        figures_of_run(run_outcome, true_measurement.vehicle),
+        errors_of_run(run_outcome, true_measurement, woehler_exponent),
+    )
+    return _worded_for_spatial_vehicle(
+        score.verdict_on_run(*figures, EFFECTS_OF_HOLD[attitude_hold.method], verdict_limits)
+    )
 
 
 def _worded_for_spatial_vehicle(verdict: Verdict) -> Verdict:
@@ -253,30 +272,33 @@ def _worded_for_spatial_vehicle(verdict: Verdict) -> Verdict:
     return Verdict(verdict.word, reason)
 
 
-def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
+def figures_of_run(run_outcome: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
     """Figures of a run that need no true run (stabilising moment, its share, tilt), for roll or pitch, whichever is
     worse; costs are 0.
     """
     inertia, chassis = np.diag(rigid_vehicle(vehicle).inertia), vehicle.chassis
-    tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
+    tilt = max(float(np.abs(run_outcome.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
     figures = list[RunFigures]()
     for i, name in enumerate(("roll", "pitch")):
-        moment, rate = run.samples(f"stabiliser {name}"), run.samples(f"{chassis} {name} rate")
-        moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run.period
-        shares = _rms_ratio(moment, turning), _rms_ratio(low_pass(moment, run.period), low_pass(turning, run.period))
+        moment, rate = run_outcome.samples(f"stabiliser {name}"), run_outcome.samples(f"{chassis} {name} rate")
+        moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run_outcome.period
+        shares = (
+            _rms_ratio(moment, turning),
+            _rms_ratio(low_pass(moment, run_outcome.period), low_pass(turning, run_outcome.period)),
+        )
         figures.append(RunFigures(root_mean_square(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
     return max(figures, key=lambda each: each.moment_share_band)
 
 
-def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
+def _rms_ratio(part_values: np.ndarray, total_values: np.ndarray) -> float:
     return (
-        root_mean_square(values) / root_mean_square(total)
-        if root_mean_square(total) > 0
-        else float(root_mean_square(values) > 0)
+        root_mean_square(part_values) / root_mean_square(total_values)
+        if root_mean_square(total_values) > 0
+        else float(root_mean_square(part_values) > 0)
     )
 
 
-def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float:
+def angle_uncertainty(vehicle: CutVehicle, attitude_hold: AttitudeHold, sample_period: float) -> float:
     """Twice the standard deviation (rad) of roll or pitch in a stabilised run; 0 for a free run.
 
     A moment I (w^2 (measured - angle) + 2 z w (measured rate - rate)) passes white noise of the angle with the factor
@@ -284,49 +306,56 @@ def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float
     acceleration, with period / (4 z w^3). A filter before it can only reduce this. An enforced angle has the noise of
     its low-pass, 2 x bandwidth x period of its variance. At the start, which is as measured, the noise is larger.
     """
-    if hold.method == "none":
+    if attitude_hold.method == "none":
         return 0.0
-    if hold.method == "prescribed":
-        return 2.0 * hold.angle * math.sqrt(min(2.0 * hold.smoothing * period, 1.0))
-    corner = 2.0 * math.pi * hold.bandwidth
+    if attitude_hold.method == "prescribed":
+        return 2.0 * attitude_hold.angle * math.sqrt(min(2.0 * attitude_hold.smoothing * sample_period, 1.0))
+    corner = 2.0 * math.pi * attitude_hold.bandwidth
     pushed = np.diag(
-        rigid_vehicle(vehicle).turning(np.tile(np.repeat([hold.force, hold.moment], 3), len(vehicle.hubs)))
+        rigid_vehicle(vehicle).turning(
+            np.tile(np.repeat([attitude_hold.force, attitude_hold.moment], 3), len(vehicle.hubs))
+        )
     )[:2]
     each = (
-        hold.angle**2 * corner / (4 * PULL_DAMPING)
-        + hold.rate**2 * PULL_DAMPING / corner
+        attitude_hold.angle**2 * corner / (4 * PULL_DAMPING)
+        + attitude_hold.rate**2 * PULL_DAMPING / corner
         + float(pushed.max()) / (4 * PULL_DAMPING * corner**3)
     )
-    return 2.0 * math.sqrt(period * each)
+    return 2.0 * math.sqrt(sample_period * each)
 
 
-def errors_of_run(run: SectionOutcome, true: VirtualMeasurement, slope: float = WOEHLER_SLOPE) -> RunErrors:
+def errors_of_run(
+    run_outcome: SectionOutcome, true_measurement: VirtualMeasurement, woehler_exponent: float = WOEHLER_SLOPE
+) -> RunErrors:
     """Errors of a run relative to the true run, at the times of the run's answers: of section forces in springs, mounts
     and bars, and of angles.
     """
-    every, chassis = round(run.period / true.step), true.vehicle.chassis
-    loads, states = true.run.elements[::every][: run.done], true.run.states[::every][: run.done]
+    every, chassis = round(run_outcome.period / true_measurement.step), true_measurement.vehicle.chassis
+    loads, states = (
+        true_measurement.run.elements[::every][: run_outcome.done],
+        true_measurement.run.states[::every][: run_outcome.done],
+    )
     damage, force = dict[str, float](), dict[str, float]()
-    for element, load in zip(true.vehicle.elements, loads.T, strict=True):
-        computed = run.samples(f"{element.name} {'M' if element.unit != 'N' else 'F'}")
-        damage[element.name] = damage_ratio(computed, load, slope)
+    for element, load in zip(true_measurement.vehicle.elements, loads.T, strict=True):
+        computed = run_outcome.samples(f"{element.name} {'M' if element.unit != 'N' else 'F'}")
+        damage[element.name] = damage_ratio(computed, load, woehler_exponent)
         force[element.name] = root_mean_square(computed - load)
     roll, pitch, height = (
-        np.abs(run.samples(f"{chassis} {name}") - states[:, i])
+        np.abs(run_outcome.samples(f"{chassis} {name}") - states[:, i])
         for name, i in (("roll", ROLL), ("pitch", PITCH), ("z", Z))
     )
     tilt = np.maximum(roll, pitch)
     return RunErrors(damage, force, {}, float(tilt.max()), root_mean_square(tilt), float(height.max()))
 
 
-def disagreement(compared_channel: ChannelComparison, noise: float = 0.0) -> float:
+def channel_disagreement(compared_channel: ChannelComparison, noise_deviation: float = 0.0) -> float:
     """Rms error of a check channel divided by the channel's rms, after its noise (standard deviation) is removed from
     both.
 
     0 for a channel that is more than a third noise, as it cannot contradict the run. Unknown noise, NaN, counts as 0.
     """
-    noise = 0.0 if math.isnan(noise) else noise
+    noise_deviation = 0.0 if math.isnan(noise_deviation) else noise_deviation
     error, whole = (sum(getattr(band, name) ** 2 for band in compared_channel.bands) for name in ("error", "measured"))
-    if whole <= 0.0 or noise > LARGEST_NOISE_SHARE * math.sqrt(whole):
+    if whole <= 0.0 or noise_deviation > LARGEST_NOISE_SHARE * math.sqrt(whole):
         return 0.0
-    return math.sqrt(max(error - noise**2, 0.0) / (whole - noise**2))
+    return math.sqrt(max(error - noise_deviation**2, 0.0) / (whole - noise_deviation**2))

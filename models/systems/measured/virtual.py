@@ -27,8 +27,8 @@ from models.measured.signal import HUB_COMPONENTS, Quantity, Signal
 from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import specific_forces_on_body
 from models.systems.hub_forces.measurement import element_travels
-from models.systems.hub_forces.run import on_road
-from models.systems.hub_forces.scene import Frame, Road
+from models.systems.hub_forces.run import run_on_road
+from models.systems.hub_forces.scene import ForceFrame, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
 
 if TYPE_CHECKING:
@@ -52,11 +52,11 @@ Place = Annotated[list[float], Field(min_length=3, max_length=3)]
 class VirtualTable(Strict):
     """[virtual]: road, duration and sampling of a virtual measurement, its transducers and their faults."""
 
-    road: Road = Field(default=Road(), description="two tracks of a random road")
+    road: TwoTrackRoadTable = Field(default=TwoTrackRoadTable(), description="two tracks of a random road")
     duration: float = quantity("s", "of the measurement", default=15.0)
     step: float = quantity("s", "of Runge-Kutta 4 on the road", default=1e-3)
     sampling_rate: float = quantity("Hz", "of every channel", default=1000.0)
-    frame: Frame = Field(default="hub", description="axes of the hub forces")
+    frame: ForceFrame = Field(default="hub", description="axes of the hub forces")
     accelerometers: dict[str, Place] = Field(
         default={}, description="tri-axial ones on the chassis: name and place x, y, z in the vehicle's design axes, m"
     )
@@ -92,108 +92,122 @@ class VirtualMeasurement:
         """Sampling period of the transducers (s)."""
         return self.step * self.stride
 
-    def samples(self, faults: Faults, seed: int, path: int = 0) -> np.ndarray:
+    def samples(self, transducer_faults: Faults, noise_seed: int, noise_path: int = 0) -> np.ndarray:
         """Returns the samples (m, signals) in SI with faults of the transducers; NaN where a
         transducer has no value.
         """
-        return measured_samples(faults, self.signals, self.values, self.step, self.stride, seed, path)
+        return measured_samples(
+            transducer_faults, self.signals, self.values, self.step, self.stride, noise_seed, noise_path
+        )
 
 
 def virtual_measurement(
-    vehicle: CutVehicle, virtual: VirtualTable, engine: str, file: str = "", error: bool = False
+    vehicle: CutVehicle, virtual_settings: VirtualTable, engine: str, scene_path: str = "", estimate_error: bool = False
 ) -> VirtualMeasurement:
     """Run the vehicle on its tyres over the road in an engine, and read all transducers. Raises InputError, Refused or
     RunFailed.
 
-    error : whether the error of the time steps is estimated, by further runs.
+    estimate_error : whether the error of the time steps is estimated, by further runs.
     """
-    signals = check(vehicle, virtual, file)
-    run, told = on_road(
+    signals = checked_signals(vehicle, virtual_settings, scene_path)
+    run, told = run_on_road(
         vehicle,
-        virtual.road,
-        virtual.frame,
-        (engine, Settings(FIXED_STEP_METHOD, virtual.step, virtual.duration), "compiled"),
-        error,
+        virtual_settings.road,
+        virtual_settings.frame,
+        (engine, Settings(FIXED_STEP_METHOD, virtual_settings.step, virtual_settings.duration), "compiled"),
+        estimate_error,
     )
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]
-    moved = element_travels(vehicle, run) if virtual.travels else {}
-    checks = [run.elements[:, [elements.index(name)]] for name in virtual.sections]
-    checks += [moved[name][:, None] for name in virtual.travels]
-    values = np.hstack([hubs, _chassis_motion(vehicle, run, virtual.accelerometers), *checks])
-    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (virtual.sampling_rate * virtual.step)), told)
+    moved = element_travels(vehicle, run) if virtual_settings.travels else {}
+    checks = [run.elements[:, [elements.index(name)]] for name in virtual_settings.sections]
+    checks += [moved[name][:, None] for name in virtual_settings.travels]
+    values = np.hstack([hubs, _chassis_motion(vehicle, run, virtual_settings.accelerometers), *checks])
+    return VirtualMeasurement(
+        vehicle, run, signals, values, round(1.0 / (virtual_settings.sampling_rate * virtual_settings.step)), told
+    )
 
 
-def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[Signal, ...]:
+def checked_signals(vehicle: CutVehicle, virtual_settings: VirtualTable, scene_path: str = "") -> tuple[Signal, ...]:
     """Returns the signals of all channels of a virtual measurement. Raises InputError for steps that do not divide one
     another, and for names that the vehicle does not have.
     """
-    period, divides_text = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
-    if not divides(virtual.step, virtual.duration):
-        allowed = f"must {divides_text}, as {dividing_step(virtual.step, virtual.duration)} s does"
-        raise InputError(file, "virtual.step", virtual.step, allowed)
-    if not (divides(virtual.step, period) and divides(period, virtual.duration)):
-        allowed = f"its period must be a multiple of virtual.step = {virtual.step:g} s and {divides_text}"
-        raise InputError(file, "virtual.sampling_rate", virtual.sampling_rate, allowed)
+    period, divides_text = (
+        1.0 / virtual_settings.sampling_rate,
+        f"divide virtual.duration = {virtual_settings.duration:g} s",
+    )
+    if not divides(virtual_settings.step, virtual_settings.duration):
+        allowed = f"must {divides_text}, as {dividing_step(virtual_settings.step, virtual_settings.duration)} s does"
+        raise InputError(scene_path, "virtual.step", virtual_settings.step, allowed)
+    if not (divides(virtual_settings.step, period) and divides(period, virtual_settings.duration)):
+        allowed = f"its period must be a multiple of virtual.step = {virtual_settings.step:g} s and {divides_text}"
+        raise InputError(scene_path, "virtual.sampling_rate", virtual_settings.sampling_rate, allowed)
     known = tuple(element.name for element in vehicle.elements)
     for key in ("travels", "sections"):
-        for name in (name for name in getattr(virtual, key) if name not in known):
-            raise InputError(file, f"virtual.{key}", name, "the vehicle has no such spring, mount or bar", known)
-    signals = _signals_of_channels(vehicle, virtual)
-    check_faults(virtual.faults, signals, file)
+        for name in (name for name in getattr(virtual_settings, key) if name not in known):
+            raise InputError(scene_path, f"virtual.{key}", name, "the vehicle has no such spring, mount or bar", known)
+    signals = _signals_of_channels(vehicle, virtual_settings)
+    check_faults(virtual_settings.faults, signals, scene_path)
     return signals
 
 
-def _signals_of_channels(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
+def _signals_of_channels(vehicle: CutVehicle, virtual_settings: VirtualTable) -> tuple[Signal, ...]:
     """Signals of hub forces, chassis motion, accelerometers and check channels, in the order of the
     measured columns.
     """
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
-    rows: list[tuple[str, Quantity, str, str, Frame]] = [
-        (f"{hub}_{name.lower()}", quantity, hub, axis, virtual.frame)
+    rows: list[tuple[str, Quantity, str, str, ForceFrame]] = [
+        (f"{hub}_{name.lower()}", quantity, hub, axis, virtual_settings.frame)
         for hub in vehicle.hubs
         for name, quantity, axis, _ in HUB_COMPONENTS
     ]
     rows += [(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
     rows += [(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
     rows += [
-        (f"{name}_a{axis}", "acceleration", name, axis, "body") for name in virtual.accelerometers for axis in "xyz"
+        (f"{name}_a{axis}", "acceleration", name, axis, "body")
+        for name in virtual_settings.accelerometers
+        for axis in "xyz"
     ]
     first_check = len(rows)
     rows += [
-        (f"{name}_force", "force" if units[name] == "N" else "moment", name, "", "body") for name in virtual.sections
+        (f"{name}_force", "force" if units[name] == "N" else "moment", name, "", "body")
+        for name in virtual_settings.sections
     ]
-    rows += [(f"{name}_travel", "travel", name, "", "body") for name in virtual.travels]
+    rows += [(f"{name}_travel", "travel", name, "", "body") for name in virtual_settings.travels]
     return tuple(
         Signal(name, "", name, quantity, at, axis, frame, 1, *FILE_UNITS[quantity], check=i >= first_check)
         for i, (name, quantity, at, axis, frame) in enumerate(rows)
     )
 
 
-def _chassis_motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
+def _chassis_motion(
+    vehicle: CutVehicle, hub_run: HubRun, accelerometer_positions: dict[str, list[float]]
+) -> np.ndarray:
     """Roll and pitch (rad), gyro rates about axes of the chassis (rad/s), and readings of its accelerometers (m/s^2),
     as columns (n, m).
     """
     from scipy.interpolate import make_interp_spline
 
-    n, angles = vehicle.size, run.states[:, [ROLL, PITCH]]
-    rates = body_rates(angles, run.states[:, [n + ROLL, n + PITCH, n + HEADING]])
-    if not places:
+    n, angles = vehicle.size, hub_run.states[:, [ROLL, PITCH]]
+    rates = body_rates(angles, hub_run.states[:, [n + ROLL, n + PITCH, n + HEADING]])
+    if not accelerometer_positions:
         return np.hstack([angles, rates])
-    slopes = make_interp_spline(run.times, np.hstack([run.states[:, [n + X, n + Y, n + Z]], rates]), k=5).derivative()
-    felt, alpha = np.split(np.asarray(slopes(run.times)), 2, axis=1)
+    slopes = make_interp_spline(
+        hub_run.times, np.hstack([hub_run.states[:, [n + X, n + Y, n + Z]], rates]), k=5
+    ).derivative()
+    felt, alpha = np.split(np.asarray(slopes(hub_run.times)), 2, axis=1)
     felt[:, 2] += GRAVITY
-    turn = rotation_matrix(quaternion_from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
-    arms = np.array(list(places.values())) - np.array(vehicle.tree.body(vehicle.chassis).position)
+    turn = rotation_matrix(quaternion_from_cardan(angles[:, 0], angles[:, 1], hub_run.states[:, HEADING]))
+    arms = np.array(list(accelerometer_positions.values())) - np.array(vehicle.tree.body(vehicle.chassis).position)
     readings = specific_forces_on_body(arms, np.einsum("nji,nj->ni", turn, felt), rates, alpha)
     return np.hstack([angles, rates, readings.reshape(len(readings), -1)])
 
 
-def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+def body_rates(angles: np.ndarray, angle_rates: np.ndarray) -> np.ndarray:
     """Angular rates (n, 3) in rad/s about axes of the chassis, from roll and pitch (n, 2) in rad and the rates (n, 3)
     of roll, pitch and heading. The order of rotations is heading, pitch, roll.
     """
-    (roll, pitch), (droll, dpitch, dheading) = angles.T, rates.T
+    (roll, pitch), (droll, dpitch, dheading) = angles.T, angle_rates.T
     return np.column_stack(
         [
             droll - dheading * np.sin(pitch),
@@ -203,16 +217,18 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     )
 
 
-def channel_group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> ChannelGroup:
+def channel_group(signals: tuple[Signal, ...], samples: np.ndarray, sample_period: float) -> ChannelGroup:
     """Returns samples (n, signals) in SI as a group of channels in the units of the file to be written."""
     factors = np.array([signal.factor for signal in signals])
     blocks = (samples[i : i + SAMPLES_PER_BLOCK] / factors for i in range(0, len(samples), SAMPLES_PER_BLOCK))
     comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in signals)
     names, units = tuple(s.channel for s in signals), tuple(s.unit for s in signals)
-    return ChannelGroup(names, units, comments, period, len(samples), blocks)
+    return ChannelGroup(names, units, comments, sample_period, len(samples), blocks)
 
 
-def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> Path:
+def write_pattern(
+    scene: "MeasuredScene", measurement: VirtualMeasurement, samples: np.ndarray, output_folder: Path
+) -> Path:
     """Write samples (n, signals) in SI as ``measured.EXTENSION`` in the file's units, and a ``scene.toml`` that reads
     this file.
 
@@ -220,8 +236,8 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
     """
     assert scene.virtual is not None
     path, groups = (
-        folder / f"measured.{scene.virtual.format}",
-        [channel_group(virtual.signals, samples, virtual.period)],
+        output_folder / f"measured.{scene.virtual.format}",
+        [channel_group(measurement.signals, samples, measurement.period)],
     )
     write(path, groups, START_OF_MEASUREMENT, f"virtual measurement: {scene.title}")
     table = scene.model_dump(exclude_unset=True, exclude={"virtual", "files", "sensors", "file", "folder", "options"})
@@ -231,21 +247,26 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
         if isinstance(entries, dict):
             lines += ["", f"[{name}]", *(f"{key} = {_toml_text(value)}" for key, value in entries.items())]
     for name, place in scene.virtual.accelerometers.items():
-        lines += ["", f"[sensors.{_toml_text(name)}]", f'body = "{virtual.vehicle.chassis}"', f"position = {place}"]
-    write_whole(folder / "scene.toml", "\n".join([*lines, "", map_lines(virtual.signals, path.name)]))
-    return folder / "scene.toml"
+        lines += ["", f"[sensors.{_toml_text(name)}]", f'body = "{measurement.vehicle.chassis}"', f"position = {place}"]
+    write_whole(output_folder / "scene.toml", "\n".join([*lines, "", map_lines(measurement.signals, path.name)]))
+    return output_folder / "scene.toml"
 
 
-def _toml_text(value: object) -> str:
+def _toml_text(toml_value: object) -> str:
     """Returns a string, number, boolean or list of these as TOML text."""
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(toml_value, ensure_ascii=False)
 
 
-def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
-    """Returns the TOML text of a table [[files]] with a channel map of signals; ``offset`` (s) is added to the file's
-    clock.
+def map_lines(signals: tuple[Signal, ...], file_name: str, clock_offset: float = 0.0) -> str:
+    """Returns the TOML text of a table [[files]] with a channel map of signals; ``clock_offset`` (s) is added to the
+    file's clock.
     """
-    lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
+    lines = [
+        "[[files]]",
+        f'file = "{file_name}"',
+        *([f"offset = {clock_offset}"] if clock_offset else []),
+        "channels = [",
+    ]
     for signal in signals:
         entry = {key: getattr(signal, key) for key in ("channel", "quantity", "at", "component", "frame")}
         text = ", ".join(f'{key} = "{value}"' for key, value in entry.items() if value)
@@ -253,10 +274,10 @@ def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> st
     return "\n".join([*lines, "]", ""])
 
 
-def recording_of_samples(virtual: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
+def recording_of_samples(measurement: VirtualMeasurement, samples: np.ndarray, columns_path: Path) -> Recording:
     """Returns samples (m, signals) of a virtual measurement as a recording, without measurement files and channel maps;
-    ``path`` : file of its columns.
+    ``columns_path`` : file of its columns.
     """
-    columns = Columns(path, tuple(signal.name for signal in virtual.signals), len(samples))
+    columns = Columns(columns_path, tuple(signal.name for signal in measurement.signals), len(samples))
     columns.write(0, samples)
-    return Recording(virtual.signals, columns, virtual.period)
+    return Recording(measurement.signals, columns, measurement.period)

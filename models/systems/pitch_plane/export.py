@@ -30,14 +30,14 @@ def exported(scene: Scene, engine: str) -> Exported:
     return _in_mujoco(assembly, settings_of(scene, engine), subject, left_out)
 
 
-def _left_out(assembly: Assembly) -> list[str]:
+def _left_out(vehicle_assembly: Assembly) -> list[str]:
     """Names of what the export leaves out: inputs, moments on the pitch, tyres that only push, and pitch springs with a
     dead band.
     """
-    vehicle = assembly.vehicle
+    vehicle = vehicle_assembly.vehicle
     return [
-        *INPUTS_OF_MODE[assembly.mode],
-        *(["moment that holds the pitch"] if assembly.moment is not None else []),
+        *INPUTS_OF_MODE[vehicle_assembly.mode],
+        *(["moment that holds the pitch"] if vehicle_assembly.moment is not None else []),
         *(f"tyre {tyre.name!r}, which only pushes" for tyre in vehicle.tyres if tyre.pushes_only),
         *(
             f"pitch spring of {pitch_spring.body!r}, with its dead band"
@@ -47,19 +47,21 @@ def _left_out(assembly: Assembly) -> list[str]:
     ]
 
 
-def _in_mujoco(assembly: Assembly, settings: Settings, export_subject: ExportSubject, omissions: list[str]) -> Exported:
+def _in_mujoco(
+    vehicle_assembly: Assembly, solver_settings: Settings, export_subject: ExportSubject, omissions: list[str]
+) -> Exported:
     from models.engines.mujoco import specification
     from models.engines.mujoco_export import add_shapes
 
-    spec = specification(assembly.vehicle, settings)
-    add_shapes(spec, {body.name: body.mass for body in assembly.vehicle.bodies})
+    spec = specification(vehicle_assembly.vehicle, solver_settings)
+    add_shapes(spec, {body.name: body.mass for body in vehicle_assembly.vehicle.bodies})
     return exported_mujoco_model(spec, spec.compile(), {}, export_subject, omissions)
 
 
-def _in_exudyn(assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> Exported:
+def _in_exudyn(vehicle_assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> Exported:
     from models.engines.exudyn import coordinate_indices, native_elements
 
-    built, vehicle = native_elements(assembly), assembly.vehicle
+    built, vehicle = native_elements(vehicle_assembly), vehicle_assembly.vehicle
     built.mbs.Assemble()
     names = [" ".join(coordinate) for coordinate in vehicle.coordinates()]
     return exported_exudyn_system(

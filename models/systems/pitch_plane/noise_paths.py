@@ -55,23 +55,23 @@ class NoisePaths:
     truth: np.ndarray
     threshold: float = DRIFT_OFF_PITCH
 
-    def assembly(self, path: int) -> Assembly:
+    def assembly(self, noise_path: int) -> Assembly:
         """Returns the assembly of the scene with the noise path of a number."""
         assembly = self.base
         for name, p in self.path_effects:
-            with_path = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
+            with_path = p.model_copy(update={"path": noise_path}) if "path" in type(p).model_fields else p
             assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
         return assembly
 
-    def trajectory(self, path: int) -> Trajectory:
+    def trajectory(self, noise_path: int) -> Trajectory:
         """Runs a noise path in the engine; raises RunFailed if it leaves all bounds."""
-        return build(self.engine, self.assembly(path), self.settings).run()
+        return build(self.engine, self.assembly(noise_path), self.settings).run()
 
-    def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+    def trajectories(self, path_numbers: range) -> Iterator[Trajectory | RunFailed]:
         """Yields the trajectory of each path, or its RunFailed. Raises PathFailed for a failure that is not of the
         simulated physics.
         """
-        for path in paths:
+        for path in path_numbers:
             try:
                 yield self.trajectory(path)
             except RunFailed as error:
@@ -79,23 +79,23 @@ class NoisePaths:
             except Exception as error:
                 raise PathFailed(path, f"{type(error).__name__}: {error}") from error
 
-    def __call__(self, paths: range) -> Arrays:
+    def __call__(self, path_numbers: range) -> Arrays:
         """Runs a block of n paths. Returns arrays by name.
 
         ``states`` (n, rows, 8); ``drift_off`` (n,): first time (s) at which the pitch is further than ``threshold``
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then NaN and whose drift-off is at the latest that time; NaN for all others.
         """
-        columns = zip(*map(self._saved_part, self.trajectories(paths)), strict=True)
+        columns = zip(*map(self._saved_part, self.trajectories(path_numbers)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
-    def _saved_part(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
-        if isinstance(run, RunFailed):
-            failure_time = 0.0 if run.time is None else run.time
+    def _saved_part(self, path_outcome: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
+        if isinstance(path_outcome, RunFailed):
+            failure_time = 0.0 if path_outcome.time is None else path_outcome.time
             return np.full((len(self.rows), 8), np.nan), failure_time, failure_time
-        far = np.abs(run.states[:, 3] - self.truth) > self.threshold
+        far = np.abs(path_outcome.states[:, 3] - self.truth) > self.threshold
         first = far.argmax()
-        return run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan
+        return path_outcome.states[self.rows], path_outcome.times[first] if far[first] else np.inf, np.nan
 
     def facts(self) -> dict[str, Any]:
         """Returns everything on which the paths depend, by name."""
@@ -114,15 +114,16 @@ class NoisePaths:
 
 def noise_paths(
     scene: Scene,
-    times: np.ndarray,
-    truth: np.ndarray | None = None,
-    threshold: float = DRIFT_OFF_PITCH,
+    saved_times: np.ndarray,
+    true_states: np.ndarray | None = None,
+    drift_off_pitch: float = DRIFT_OFF_PITCH,
     engine: str = "reference",
 ) -> NoisePaths:
-    """Returns the job that runs a scene's noise paths; states are returned at ``times`` (s), multiples of the step.
+    """Returns the job that runs a scene's noise paths; states are returned at ``saved_times`` (s), multiples of the
+    step.
 
-    truth : pitch (rad) of the true path at every step, shape (steps + 1,); None takes the run of the same scene in
-    the reference without noise on its forces. Raises InputError for a scene without ``force_noise``, an integrator
+    true_states : pitch (rad) of the true path at every step, shape (steps + 1,); None takes the run of the same scene
+    in the reference without noise on its forces. Raises InputError for a scene without ``force_noise``, an integrator
     that picks its own steps, times off the steps and a truth of another length.
     """
     if "force_noise" not in scene.effects:
@@ -136,13 +137,17 @@ def noise_paths(
             "picks its own steps: an ensemble keeps states at common times and needs fixed ones",
         )
     base, path_effects = _shared_and_path_effects(scene)
-    if truth is None:
+    if true_states is None:
         silent = scene.effects["force_noise"].model_copy(update={"deviation": 0.0})
         quiet = scene.model_copy(update={"effects": scene.effects | {"force_noise": silent}})
-        truth = build("reference", assembly_of_scene(quiet), settings_of(quiet, "reference")).run().states[:, 3]
-    if truth.shape != (settings.steps + 1,):
-        raise InputError(scene.file, "truth", list(truth.shape), f"must have one pitch per step: {settings.steps + 1}")
-    return NoisePaths(base, path_effects, engine, settings, _step_rows(scene, settings, times), truth, threshold)
+        true_states = build("reference", assembly_of_scene(quiet), settings_of(quiet, "reference")).run().states[:, 3]
+    if true_states.shape != (settings.steps + 1,):
+        raise InputError(
+            scene.file, "truth", list(true_states.shape), f"must have one pitch per step: {settings.steps + 1}"
+        )
+    return NoisePaths(
+        base, path_effects, engine, settings, _step_rows(scene, settings, saved_times), true_states, drift_off_pitch
+    )
 
 
 def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
@@ -156,13 +161,16 @@ def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, A
     return replace(assembly_of_scene(shared), scene=scene), tuple((name, scene.effects[name]) for name in unshared)
 
 
-def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
+def _step_rows(scene: Scene, solver_settings: Settings, saved_times: np.ndarray) -> np.ndarray:
     """Numbers of the time steps at requested times (s); raises InputError for a time between steps."""
-    for time in times:
-        if not 0 <= time <= settings.duration * (1 + 1e-9) or (time > 0 and not divides(settings.step, time)):
-            allowed = f"must lie between 0 and {settings.duration:g} s, on a multiple of the step {settings.step:g} s"
+    for time in saved_times:
+        if not 0 <= time <= solver_settings.duration * (1 + 1e-9) or (
+            time > 0 and not divides(solver_settings.step, time)
+        ):
+            duration, step = solver_settings.duration, solver_settings.step
+            allowed = f"must lie between 0 and {duration:g} s, on a multiple of the step {step:g} s"
             raise InputError(scene.file, "times", float(time), allowed)
-    return np.rint(np.asarray(times) / settings.step).astype(np.int64)
+    return np.rint(np.asarray(saved_times) / solver_settings.step).astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -175,15 +183,15 @@ class MujocoThreads(NoisePaths):
         if self.engine != "mujoco" or self.base.guided:
             raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
 
-    def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+    def trajectories(self, path_numbers: range) -> Iterator[Trajectory | RunFailed]:
         """Yields the trajectory of each path, all from one call of MuJoCo's ``rollout``. If MuJoCo warns, the paths are
         run again one by one.
         """
-        models = [build("mujoco", self.assembly(path), self.settings) for path in paths]
+        models = [build("mujoco", self.assembly(path), self.settings) for path in path_numbers]
         step_times = self.settings.step * np.arange(self.settings.steps + 1)
         marched, warned = self._rollout(models)
         if warned:
-            yield from super().trajectories(paths)
+            yield from super().trajectories(path_numbers)
             return
         for states in marched:
             try:
@@ -192,7 +200,7 @@ class MujocoThreads(NoisePaths):
             except RunFailed as error:
                 yield error
 
-    def _rollout(self, models: list[Any]) -> tuple[np.ndarray, bool]:
+    def _rollout(self, mujoco_models: list[Any]) -> tuple[np.ndarray, bool]:
         """Returns the states (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
         from mujoco import rollout
 
@@ -200,18 +208,18 @@ class MujocoThreads(NoisePaths):
         from models.engines.mujoco_quiet import installed, without_warnings
 
         start = np.concatenate(([0.0], self.base.initial))
-        has_controls = models[0].drive.controls is not None
-        controls = np.stack([model.controls() for model in models]) if has_controls else None
-        working = models[: self.threads]
-        with installed(models[0].drive.law), without_warnings():
+        has_controls = mujoco_models[0].drive.controls is not None
+        controls = np.stack([model.controls() for model in mujoco_models]) if has_controls else None
+        working = mujoco_models[: self.threads]
+        with installed(mujoco_models[0].drive.law), without_warnings():
             sensed, _ = rollout.rollout(
-                [model.model for model in models],
+                [model.model for model in mujoco_models],
                 [model.data for model in working],
-                np.tile(start, (len(models), 1)),
+                np.tile(start, (len(mujoco_models), 1)),
                 control=controls,
                 nstep=self.settings.steps,
             )
-        states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), sensed[:, :, 1:9]), axis=1)
+        states = np.concatenate((np.tile(self.base.initial, (len(mujoco_models), 1, 1)), sensed[:, :, 1:9]), axis=1)
         return states, any(warning_text(model.data) for model in working)
 
     def facts(self) -> dict[str, Any]:
@@ -221,29 +229,31 @@ class MujocoThreads(NoisePaths):
 
 def mujoco_threads(
     scene: Scene,
-    times: np.ndarray,
-    truth: np.ndarray | None = None,
-    threshold: float = DRIFT_OFF_PITCH,
-    threads: int = 2,
+    saved_times: np.ndarray,
+    true_states: np.ndarray | None = None,
+    drift_off_pitch: float = DRIFT_OFF_PITCH,
+    thread_count: int = 2,
 ) -> MujocoThreads:
     """Returns the job that runs a scene's noise paths in MuJoCo with several threads; arguments as of
     ``noise_paths``.
     """
-    return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
+    return MujocoThreads(
+        **vars(noise_paths(scene, saved_times, true_states, drift_off_pitch, "mujoco")), threads=thread_count
+    )
 
 
-def largest_difference(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
+def largest_difference(reference_paths: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
     """Largest difference in any state between two ensembles of the same paths, before both drift off, divided by the
     reference's largest state in that time.
 
-    reference, other_paths : arrays of ``NoisePaths``; the second may hold fewer paths; times (rows,) in s. After
+    reference_paths, other_paths : arrays of ``NoisePaths``; the second may hold fewer paths; times (rows,) in s. After
     drift-off a rounding error is as large as the run, so that a comparison is meaningless; nan where all paths have
     drifted off before the first row after the start.
     """
     count = len(other_paths["states"])
-    until = np.minimum(reference["drift_off"][:count], other_paths["drift_off"])
+    until = np.minimum(reference_paths["drift_off"][:count], other_paths["drift_off"])
     if not (times[times > 0.0] < until[:, None]).any():
         return math.nan
-    first = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
+    first = np.where((times < until[:, None])[:, :, None], reference_paths["states"][:count], 0.0)
     other_states = np.where((times < until[:, None])[:, :, None], other_paths["states"], 0.0)
     return float(np.abs(first - other_states).max() / np.abs(first).max())

@@ -22,8 +22,8 @@ class PathStatistics:
     ``saved_paths`` paths.
     """
 
-    def __init__(self, true_states: np.ndarray, saved_paths: int) -> None:
-        self._true, self._saved, self._blocks = true_states, saved_paths, list[Arrays]()
+    def __init__(self, true_states: np.ndarray, saved_path_count: int) -> None:
+        self._true, self._saved, self._blocks = true_states, saved_path_count, list[Arrays]()
         self.moments, self.covariance, self._spread, self.drift_off = (
             StreamedMoments(),
             StreamedCovariance(),
@@ -32,18 +32,18 @@ class PathStatistics:
         )
         self.lost, self.steepest = 0, np.full(len(true_states), np.nan)
 
-    def add(self, block: Arrays) -> None:
+    def add(self, path_block: Arrays) -> None:
         """Add a block of noise paths to all statistics."""
-        errors = block["states"] - self._true
+        errors = path_block["states"] - self._true
         self.moments.add(errors)
         self.covariance.add(errors)
         self._spread.add(errors[:, :, PITCH_STATE])
-        self.drift_off.add(block["drift_off"])
-        self.lost += int(np.isfinite(block["failed"]).sum())
-        self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(block["states"][:, :, PITCH_STATE]), axis=0))
+        self.drift_off.add(path_block["drift_off"])
+        self.lost += int(np.isfinite(path_block["failed"]).sum())
+        self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(path_block["states"][:, :, PITCH_STATE]), axis=0))
         paths_kept = sum(len(saved_block["drift_off"]) for saved_block in self._blocks)
         if paths_kept < self._saved:
-            self._blocks.append({name: values[: self._saved - paths_kept] for name, values in block.items()})
+            self._blocks.append({name: values[: self._saved - paths_kept] for name, values in path_block.items()})
 
     @property
     def first(self) -> Arrays:
@@ -51,7 +51,7 @@ class PathStatistics:
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
 
     @property
-    def fan(self) -> np.ndarray:
+    def pitch_error_percentiles(self) -> np.ndarray:
         """Percentiles FAN_PERCENTILES of the magnitude of the pitch error (rad), shape (5, rows), each within
         ``streamed.QUANTILE_ACCURACY``.
         """

@@ -30,9 +30,9 @@ from models.engines.assembly import Assembly
 from models.engines.reference import compiled_closure, march_of
 from models.engines.stability import first_order, linearised
 
-KEPT_STATES = np.array([0, 1, 3, 4, 5, 7])
+FILTERED_STATES = np.array([0, 1, 3, 4, 5, 7])
 """Indices of z1, z2, pitch and their rates in the vehicle's state (8,)."""
-RELATIVE_STATES = np.eye(8)[KEPT_STATES]
+RELATIVE_STATES = np.eye(8)[FILTERED_STATES]
 RELATIVE_STATES[0:2, 2] = RELATIVE_STATES[3:5, 6] = -1.0
 """Matrix (6, 8) that maps the vehicle's state to z1 - z3, z2 - z3, pitch and their rates."""
 PITCH_INERTIA = 5
@@ -67,17 +67,25 @@ class PitchStep:
         self._p = assembly.parameters.array()
         self._respond = compiled_filter_step(assembly.mode, assembly.vehicle.geometry)
 
-    def advance(self, x: np.ndarray, step_number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def advance(
+        self, filter_state: np.ndarray, step_index: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Advance the filter's state x (7,) by a step. Returns the new state (7,), its derivatives with respect to x
         (7, 7), and with respect to the force samples at the step's start and at its end, (7, 2) per N each.
 
-        x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's.
+        filter_state : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's.
         A held sample acts on the step after it alone; a spline counts as the polyline through its samples.
         """
-        first = step_number * self._substeps * self._rows[2]
+        first = step_index * self._substeps * self._rows[2]
         inputs = self._inputs[first : first + len(self._sample_weights)]
         answer = self._respond(
-            x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._sample_weights
+            filter_state,
+            self.period / self._substeps,
+            self._substeps,
+            inputs,
+            self._rows,
+            self._p,
+            self._sample_weights,
         )
         return answer[:, 0].copy(), answer[:, 1:8], answer[:, 8:10], answer[:, 10:]
 
@@ -93,24 +101,26 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
     # the march goes in as Python: numba cannot cache what encloses compiled code
     march = register_jitable(march_of(drive_mode, geometry).py_func)
 
-    def respond(x, step, step_count, inputs, rows, p, sample_weights):
-        states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), p.copy()
+    def respond(filter_state, time_step, step_count, force_inputs, input_rows, vehicle_parameters, sample_weights):
+        states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), vehicle_parameters.copy()
         for column in range(12):
             for sign in (1.0, -1.0):
-                y, pushed, nudge = np.zeros(8), inputs, sign * DIFFERENCE_WIDTHS[column]
-                y[KEPT_STATES] = x[:6]
-                parameters[PITCH_INERTIA] = p[PITCH_INERTIA] / (1.0 + x[6] + (nudge if column == 7 else 0.0))
+                y, pushed, nudge = np.zeros(8), force_inputs, sign * DIFFERENCE_WIDTHS[column]
+                y[FILTERED_STATES] = filter_state[:6]
+                parameters[PITCH_INERTIA] = vehicle_parameters[PITCH_INERTIA] / (
+                    1.0 + filter_state[6] + (nudge if column == 7 else 0.0)
+                )
                 if 0 < column < 7:
-                    y[KEPT_STATES[column - 1]] += nudge
+                    y[FILTERED_STATES[column - 1]] += nudge
                 elif column > 7:
-                    pushed = inputs.copy()
+                    pushed = force_inputs.copy()
                     pushed[:, (column - 8) % 2] += nudge * sample_weights[:, (column - 8) // 2]
-                march(y, step, step_count, pushed, rows, parameters, states)
+                march(y, time_step, step_count, pushed, input_rows, parameters, states)
                 end, share = states[step_count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):
                     heave = end[2] if row < 2 else end[6] if 2 < row < 5 else 0.0
-                    transition[row, column] += share * (end[KEPT_STATES[row]] - heave)
-        transition[6, 0], transition[6, 7] = x[6], 1.0
+                    transition[row, column] += share * (end[FILTERED_STATES[row]] - heave)
+        transition[6, 0], transition[6, 7] = filter_state[6], 1.0
         return transition
 
     return compiled_closure(respond, ("pitch_step", drive_mode, geometry))
@@ -123,7 +133,7 @@ KNOWN_DEVIATION = 1e-6
 
 
 @dataclass(frozen=True)
-class Measurement:
+class PitchMeasurement:
     """Measurement of the pitch, the pitch rate, or both.
 
     values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
@@ -181,22 +191,22 @@ class PitchFilter(ExtendedKalmanFilter):
 
     def __init__(
         self,
-        step: PitchStep,
+        prediction_step: PitchStep,
         start_state: np.ndarray,
-        covariance: np.ndarray,
-        intensity: float,
-        measurement: Measurement,
+        start_covariance: np.ndarray,
+        force_variance: float,
+        pitch_measurement: PitchMeasurement,
     ) -> None:
-        """Start from a state (7,) and a covariance (7, 7); intensity : variance (N^2) of a force sample, per step of
-        the filter.
+        """Start from a state (7,) and a covariance (7, 7); force_variance : variance (N^2) of a force sample, per step
+        of the filter.
         """
         super().__init__(dim_x=FILTER_STATES, dim_z=1)
-        self.step, self.intensity, self.measured = step, intensity, measurement
-        self.x, self.P = start_state.copy(), covariance.copy()
+        self.step, self.intensity, self.measured = prediction_step, force_variance, pitch_measurement
+        self.x, self.P = start_state.copy(), start_covariance.copy()
         self.pending_response = np.zeros((FILTER_STATES, 2))
-        self._present_columns = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
+        self._present_columns = np.isfinite(pitch_measurement.values) @ (1 << np.arange(len(pitch_measurement.columns)))
         self._measurement_models = [
-            self._model_of_columns(column_mask) for column_mask in range(1 << len(measurement.columns))
+            self._model_of_columns(column_mask) for column_mask in range(1 << len(pitch_measurement.columns))
         ]
 
     def predict_x(self, u: Any = 0) -> None:
@@ -210,15 +220,15 @@ class PitchFilter(ExtendedKalmanFilter):
         push = early + self.F.dot(self.pending_response)
         self.Q, self.pending_response = self.intensity * push.dot(push.T), late
 
-    def measure(self, row_number: int) -> np.ndarray:
+    def measure(self, measurement_row: int) -> np.ndarray:
         """Update the filter with the finite values in a row of the measurement. Returns whitened innovations
         (columns,), NaN for missing values."""
-        white, columns_present = np.full(len(self.measured.columns), math.nan), self._present_columns[row_number]
+        white, columns_present = np.full(len(self.measured.columns), math.nan), self._present_columns[measurement_row]
         if not columns_present:
             return white
         chosen, rows, variance = self._measurement_models[columns_present]
         late = rows.dot(self.pending_response)
-        values = self.measured.values[row_number, chosen]
+        values = self.measured.values[measurement_row, chosen]
         self.update(values, lambda x: rows, rows.dot, R=variance + self.intensity * late.dot(late.T))
         white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
         return white
@@ -235,96 +245,100 @@ class PitchFilter(ExtendedKalmanFilter):
         )
 
 
-def estimate(
-    assembly: Assembly,
-    measurement: Measurement,
-    deviation: float,
+def estimate_pitch(
+    vehicle_assembly: Assembly,
+    pitch_measurement: PitchMeasurement,
+    force_deviation: float,
     *,
     start_deviation: float = 0.0,
     inertia_deviation: float = 0.0,
-    smoother: bool = False,
+    with_smoother: bool = False,
 ) -> PitchEstimate:
     """Estimate the pitch of a force-excited assembly over its run from a measurement, by the Kalman filter or smoother.
 
-    deviation : standard deviation of the white noise on each force sample (N)
+    force_deviation : standard deviation of the white noise on each force sample (N)
     start_deviation : standard deviation of the pitch at the start, by a rotation of the vehicle (rad)
     inertia_deviation : standard deviation of the share by which 1/I may differ from the model's; 0 trusts the model
-    smoother : whether each estimate uses later measurements, too
+    with_smoother : whether each estimate uses later measurements, too
 
     The steps are the finer of the two sampling periods, of which the coarser one is a multiple; between force
     samples that are coarser the noise keeps its intensity, not its correlation over their period. Raises RunFailed
     if anything that is not a number reaches the estimate.
     """
-    assert assembly.input is not None and assembly.input.period is not None
-    period = min(assembly.input.period, measurement.period)
-    step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
-    start = _initial_state_and_covariance(assembly, start_deviation, inertia_deviation)
+    assert vehicle_assembly.input is not None and vehicle_assembly.input.period is not None
+    period = min(vehicle_assembly.input.period, pitch_measurement.period)
+    step = PitchStep(vehicle_assembly, period, math.ceil(vehicle_assembly.scene.run.duration / period - 1e-9))
+    start = _initial_state_and_covariance(vehicle_assembly, start_deviation, inertia_deviation)
     estimated, steps = _march_filter(
-        PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measurement)
+        PitchFilter(step, *start, force_deviation**2 * vehicle_assembly.input.period / period, pitch_measurement)
     )
-    return _smoothed_estimate(estimated, steps) if smoother else estimated
+    return _smoothed_estimate(estimated, steps) if with_smoother else estimated
 
 
-def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _StepRecord]:
+def _march_filter(pitch_filter: PitchFilter) -> tuple[PitchEstimate, _StepRecord]:
     """Run the filter: predict each step, update with the measurement at its end. Returns estimates and step records."""
-    n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
+    n, period, measured = pitch_filter.step.count + 1, pitch_filter.step.period, pitch_filter.measured
     stride, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
     covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
     missed, innovations = np.zeros(n, dtype=int), np.full((n, width), np.nan)
     for i in range(n):
         if i:
-            filtered.predict(i - 1)
-        if not math.isfinite(filtered.x.dot(filtered.P).dot(filtered.x)):
+            pitch_filter.predict(i - 1)
+        if not math.isfinite(pitch_filter.x.dot(pitch_filter.P).dot(pitch_filter.x)):
             raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
-        predictions[i], transitions[i], noises[i] = filtered.x, filtered.F, filtered.Q
+        predictions[i], transitions[i], noises[i] = pitch_filter.x, pitch_filter.F, pitch_filter.Q
         if i % stride == 0 and i // stride < len(measured.values):
-            innovations[i] = filtered.measure(i // stride)
+            innovations[i] = pitch_filter.measure(i // stride)
             missed[i] = np.count_nonzero(np.isnan(innovations[i]))
-        states[i], covariances[i], pending[i] = filtered.x, filtered.P, filtered.pending_response
-    pending *= math.sqrt(filtered.intensity)
+        states[i], covariances[i], pending[i] = pitch_filter.x, pitch_filter.P, pitch_filter.pending_response
+    pending *= math.sqrt(pitch_filter.intensity)
     used = np.count_nonzero(np.isfinite(innovations), axis=1)
     surprises = np.where(used > 0, np.nansum(innovations**2, axis=1), np.nan)
     estimated = PitchEstimate(period, states, covariances, pending, used, missed, surprises, innovations)
     return estimated, _StepRecord(predictions, transitions, noises)
 
 
-def _smoothed_estimate(filtered: PitchEstimate, steps: _StepRecord) -> PitchEstimate:
+def _smoothed_estimate(filter_estimate: PitchEstimate, step_record: _StepRecord) -> PitchEstimate:
     """Smooth the filter's estimate by filterpy's Rauch-Tung-Striebel smoother.
 
     The smoother supports linear steps only, x -> F x. An eighth state, always 1, carries the difference between the
     nonlinear step and F x.
     """
-    n = len(filtered.states)
+    n = len(filter_estimate.states)
     states, covariances = np.ones((n, 8)), np.zeros((n, 8, 8))
     transitions, noises = np.zeros((n, 8, 8)), np.zeros((n, 8, 8))
-    states[:, :7], covariances[:, :7, :7], noises[:, :7, :7] = filtered.states, filtered.covariances, steps.noises
-    transitions[:, :7, :7], transitions[:, 7, 7] = steps.transitions, 1.0
-    linear = np.einsum("nij,nj->ni", steps.transitions[1:], filtered.states[:-1])
-    transitions[1:, :7, 7] = steps.predictions[1:] - linear
+    states[:, :7], covariances[:, :7, :7], noises[:, :7, :7] = (
+        filter_estimate.states,
+        filter_estimate.covariances,
+        step_record.noises,
+    )
+    transitions[:, :7, :7], transitions[:, 7, 7] = step_record.transitions, 1.0
+    linear = np.einsum("nij,nj->ni", step_record.transitions[1:], filter_estimate.states[:-1])
+    transitions[1:, :7, 7] = step_record.predictions[1:] - linear
     states, covariances, _, _ = KalmanFilter(8, 1).rts_smoother(
         states, covariances, transitions, noises, _covariance_inverse
     )
-    return replace(filtered, states=states[:, :7], covariances=covariances[:, :7, :7])
+    return replace(filter_estimate, states=states[:, :7], covariances=covariances[:, :7, :7])
 
 
-def _covariance_inverse(matrix: np.ndarray) -> np.ndarray:
+def _covariance_inverse(covariance: np.ndarray) -> np.ndarray:
     """Inverse of a covariance (8, 8) of seven states and an eighth that is certain, whose row and column stay zero."""
     inverse = np.zeros((8, 8))
-    inverse[:7, :7] = np.linalg.inv(matrix[:7, :7])
+    inverse[:7, :7] = np.linalg.inv(covariance[:7, :7])
     return inverse
 
 
 def _initial_state_and_covariance(
-    assembly: Assembly, turn_deviation: float, inertia: float
+    vehicle_assembly: Assembly, pitch_deviation: float, inertia_deviation: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """State (7,) and covariance (7, 7) of the filter at the start.
 
-    turn_deviation : standard deviation of a rotation of the vehicle (rad); inertia : standard deviation of the share by
-    which 1/I is wrong.
+    pitch_deviation : standard deviation of a rotation of the vehicle (rad); inertia_deviation : standard deviation of
+    the share by which 1/I is wrong.
     """
-    p = assembly.parameters
-    rotated_state = turn_deviation * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
+    p = vehicle_assembly.parameters
+    rotated_state = pitch_deviation * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
     covariance = np.outer(rotated_state, rotated_state) + KNOWN_DEVIATION**2 * np.eye(FILTER_STATES)
-    covariance[INERTIA_SHARE, INERTIA_SHARE] += inertia**2
-    return np.append(RELATIVE_STATES @ assembly.initial, 0.0), covariance
+    covariance[INERTIA_SHARE, INERTIA_SHARE] += inertia_deviation**2
+    return np.append(RELATIVE_STATES @ vehicle_assembly.initial, 0.0), covariance

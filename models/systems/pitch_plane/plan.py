@@ -65,9 +65,9 @@ def _plan_line(label: str, text: str) -> str:
     return f"  {label:<10} {text}"
 
 
-def _vehicle_lines(scene: Scene, assembly: Assembly) -> list[str]:
+def _vehicle_lines(scene: Scene, vehicle_assembly: Assembly) -> list[str]:
     """Lines of text on the parameter set, the bodies, the struts, the pitch springs and the initial state."""
-    scene_vehicle, vehicle = scene.vehicle, assembly.vehicle
+    scene_vehicle, vehicle = scene.vehicle, vehicle_assembly.vehicle
     changed = ", ".join(f"{name} = {value:g}" for name, value in scene_vehicle.override.items())
     lines = [_plan_line("vehicle", scene_vehicle.parameters + (f", but {changed}" if changed else ""))]
     for body in vehicle.bodies:
@@ -82,56 +82,58 @@ def _vehicle_lines(scene: Scene, assembly: Assembly) -> list[str]:
         band = f", beyond {spring.dead_band:g} rad" if spring.dead_band else ""
         text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground{band}"
         lines.append(_plan_line("  spring", text))
-    values = zip(STATE_NAMES, assembly.initial, strict=True)
+    values = zip(STATE_NAMES, vehicle_assembly.initial, strict=True)
     start = ", ".join(f"{name} {value:.4g}" for name, value in values if value)
     return [*lines, _plan_line("states", ", ".join(STATE_NAMES)), _plan_line("start", start or "all zero")]
 
 
-def _channel_lines(assembly: Assembly) -> list[str]:
+def _channel_lines(vehicle_assembly: Assembly) -> list[str]:
     names = ["states", "f1", "f2", "f3", "f4", "suspension_moment"]
-    names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
-    names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
-    names += ["inertia_term", "enforced_moment"] if assembly.guided else []
-    return names + [channel for name in assembly.scene.effects for channel in module_of(DEFAULT_SYSTEM, name).CHANNELS]
+    names += ["zeta1", "zeta2"] if vehicle_assembly.mode == "road" else []
+    names += ["enforced_force"] if vehicle_assembly.mode == "heave-pitch" else []
+    names += ["inertia_term", "enforced_moment"] if vehicle_assembly.guided else []
+    return names + [
+        channel for name in vehicle_assembly.scene.effects for channel in module_of(DEFAULT_SYSTEM, name).CHANNELS
+    ]
 
 
-def trust_line(assembly: Assembly) -> list[str]:
+def trust_line(vehicle_assembly: Assembly) -> list[str]:
     """Line of text on how long the pitch of a force-excited run can be trusted; none on a road or with prescribed
     pitch.
     """
-    if assembly.mode not in ("force", "force-body"):
+    if vehicle_assembly.mode not in ("force", "force-body"):
         return []
     from models.systems.pitch_plane.trust import predict_trust
 
-    limit = predict_trust(assembly)
+    limit = predict_trust(vehicle_assembly)
     if limit is None:
         return []
-    if limit.until is None and assembly.doubts:
+    if limit.until is None and vehicle_assembly.doubts:
         return [_plan_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked_text}")]
     return [_plan_line("trust", str(limit))]
 
 
-def doubt_lines(assembly: Assembly) -> list[str]:
+def doubt_lines(vehicle_assembly: Assembly) -> list[str]:
     """Lines of text with the doubts about a scene's inputs."""
-    return [_plan_line("doubt", text) for text in assembly.doubts]
+    return [_plan_line("doubt", text) for text in vehicle_assembly.doubts]
 
 
 TABLE_HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")
 
 
-def _engine_table(scene: Scene, assembly: Assembly) -> list[str]:
+def _engine_table(scene: Scene, vehicle_assembly: Assembly) -> list[str]:
     """Lines of a text table on what each engine builds, or why it refuses the scene."""
-    rows = [TABLE_HEADINGS, *(_engine_row(scene, assembly, engine) for engine in CATALOGUE)]
+    rows = [TABLE_HEADINGS, *(_engine_row(scene, vehicle_assembly, engine) for engine in CATALOGUE)]
     widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(TABLE_HEADINGS))]
     padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
     note = ["  exudyn is handed M, D and K of the linear vehicle: no spring of its own takes part"]
     return ["  " + "  ".join(row).rstrip() for row in padded] + (note if scene.vehicle.geometry == "linear" else [])
 
 
-def _engine_row(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:
+def _engine_row(scene: Scene, vehicle_assembly: Assembly, engine: str) -> tuple[str, ...]:
     settings = settings_of(scene, engine)
     try:
-        plan = build(engine, assembly, settings).plan()
+        plan = build(engine, vehicle_assembly, settings).plan()
     except Refused as error:
         return engine, f"refused: {error.why}"
     order = CATALOGUE[engine][settings.integrator].order

@@ -32,26 +32,34 @@ calls of a method of order 8.
 
 
 def run(
-    scene: Scene, engine: str, settings: Settings | None = None, assembly: Assembly | None = None, error: bool = False
+    scene: Scene,
+    engine: str,
+    solver_settings: Settings | None = None,
+    vehicle_assembly: Assembly | None = None,
+    error: bool = False,
 ) -> Result:
     """Run a pitch-plane scene in an engine; the result's detail is the trajectory at every step. Raises InputError,
     Refused or RunFailed, never returns a partial run.
 
-    settings : in place of the scene's; assembly : in place of the scene's, where it is known already or was changed by
-    hand; error : whether the error of the time steps is estimated, by further runs. Assumptions are always checked. A
-    run of an engine outside of this package is compared with the reference; the comparison is in "beside reference".
+    solver_settings : in place of the scene's; vehicle_assembly : in place of the scene's, where it is known already or
+    was changed by hand; error : whether the error of the time steps is estimated, by further runs. Assumptions are
+    always checked. A run of an engine outside of this package is compared with the reference; the comparison is in
+    "beside reference".
     """
-    assembly, settings = assembly or assembly_of_scene(scene), settings or settings_of(scene, engine)
-    rows = slice(None, None, _steps_per_saved_row(scene, settings))
-    model = build(engine, assembly, settings)
+    vehicle_assembly, solver_settings = (
+        vehicle_assembly or assembly_of_scene(scene),
+        solver_settings or settings_of(scene, engine),
+    )
+    rows = slice(None, None, _steps_per_saved_row(scene, solver_settings))
+    model = build(engine, vehicle_assembly, solver_settings)
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    channels, comparison_texts = output_channels(assembly, trajectory, model), dict[str, str]()
+    channels, comparison_texts = output_channels(vehicle_assembly, trajectory, model), dict[str, str]()
     if engine in OUTSIDE_CLASSES:
         from models.engines.outside import beside_reference
 
-        comparison_texts["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
+        comparison_texts["beside reference"] = beside_reference(engine, vehicle_assembly, solver_settings, trajectory)
     labelled = result(
         scene,
         {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
@@ -59,150 +67,177 @@ def run(
         engine=engine,
         counts=trajectory.counts,
         seconds=seconds,
-        doubts=assembly.doubts,
+        doubts=vehicle_assembly.doubts,
         detail=trajectory,
-        mode=assembly.mode,
-        integrator=settings.integrator,
-        step=settings.step,
+        mode=vehicle_assembly.mode,
+        integrator=solver_settings.integrator,
+        step=solver_settings.step,
         integrated=json.dumps(STATES),
         **comparison_texts,
     )
-    with_assumptions(labelled, assumptions(assembly))
-    return _with_error(labelled, assembly, settings, channels) if error else labelled
+    with_assumptions(labelled, assumptions(vehicle_assembly))
+    return _with_error(labelled, vehicle_assembly, solver_settings, channels) if error else labelled
 
 
-def run_with_drift(scene: Scene, engine: str, error: bool = False) -> Result:
+def run_with_drift(scene: Scene, engine: str, estimate_error: bool = False) -> Result:
     """Run a scene of a vehicle that may drift off: a result whose error is as large as its motion is returned. Raises
     RunFailed only where a run has no result.
     """
     try:
-        return run(scene, engine, error=error)
+        return run(scene, engine, error=estimate_error)
     except RunFailed as failure:
         if failure.partial is None:
             raise
         return failure.partial
 
 
-def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: Channels) -> Result:
+def _with_error(
+    run_result: Result, vehicle_assembly: Assembly, solver_settings: Settings, output_channels_of_run: Channels
+) -> Result:
     """Returns the result with the stated errors of its principal channels, estimated from all steps and not only from
     the saved rows.
     """
-    engine, names = run.data.attrs["engine"], principal_channels(assembly)
-    fine, sizes = _series_of_run(run.detail.times, channels, names), _enforced_sizes(assembly, channels)
-    method = CATALOGUE[engine][settings.integrator]
+    engine, names = run_result.data.attrs["engine"], principal_channels(vehicle_assembly)
+    fine, sizes = (
+        _series_of_run(run_result.detail.times, output_channels_of_run, names),
+        _enforced_sizes(vehicle_assembly, output_channels_of_run),
+    )
+    method = CATALOGUE[engine][solver_settings.integrator]
 
-    def rerun(changed: Settings) -> Series:
-        trajectory = build(engine, assembly, changed).run()
-        return _series_of_run(trajectory.times, output_channels(replace(assembly, sensors=()), trajectory), names)
+    def rerun(changed_settings: Settings) -> Series:
+        trajectory = build(engine, vehicle_assembly, changed_settings).run()
+        return _series_of_run(
+            trajectory.times, output_channels(replace(vehicle_assembly, sensors=()), trajectory), names
+        )
 
     if method.adaptive:
-        looser = _with_longer_engine_step(rerun, replace(settings, tolerance=TOLERANCE_FACTOR * settings.tolerance))
-        return with_tolerance_error(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
+        looser = _with_longer_engine_step(
+            rerun, replace(solver_settings, tolerance=TOLERANCE_FACTOR * solver_settings.tolerance)
+        )
+        return with_tolerance_error(run_result, fine, looser, TOLERANCE_FACTOR, solver_settings.tolerance, sizes)
 
-    def longer(step_factor: float, share: float) -> Series:
-        return rerun(_settings_of_longer_step(settings, step_factor, share))
+    def longer(step_factor: float, run_share: float) -> Series:
+        return rerun(_settings_of_longer_step(solver_settings, step_factor, run_share))
 
     return with_estimated_errors(
-        run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), channel_sizes=sizes
+        run_result,
+        fine,
+        longer,
+        method.order,
+        solver_settings.step,
+        growth=_pitch_error_growth(vehicle_assembly),
+        channel_sizes=sizes,
     )
 
 
-def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
+def _with_longer_engine_step(run_with_settings: Callable[[Settings], Series], solver_settings: Settings) -> Series:
     """Repeats a run with the engine's longest step doubled as well, where the input allows it: this step may dominate
     the error.
     """
     try:
-        return rerun(replace(settings, step=2.0 * settings.step))
+        return run_with_settings(replace(solver_settings, step=2.0 * solver_settings.step))
     except InputError:
-        return rerun(settings)
+        return run_with_settings(solver_settings)
 
 
-def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Series:
-    return Series(times, {name: channels[name][2] for name in names})
+def _series_of_run(times: np.ndarray, run_channels: Channels, channel_names: tuple[str, ...]) -> Series:
+    return Series(times, {name: run_channels[name][2] for name in channel_names})
 
 
-def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
+def _enforced_sizes(vehicle_assembly: Assembly, run_channels: Channels) -> dict[str, float]:
     """Sizes by which errors of the enforced moment and force are divided, as these may be zero: the chassis' inertia
     term (N m), and the sum of the suspension forces (N).
     """
     sizes = {}
-    if "enforced_moment" in channels:
-        sizes["enforced_moment"] = reference_size(channels["inertia_term"][2])
-    if "enforced_force" in channels:
-        sizes["enforced_force"] = reference_size(channels["f3"][2] + channels["f4"][2])
+    if "enforced_moment" in run_channels:
+        sizes["enforced_moment"] = reference_size(run_channels["inertia_term"][2])
+    if "enforced_force" in run_channels:
+        sizes["enforced_force"] = reference_size(run_channels["f3"][2] + run_channels["f4"][2])
     return sizes
 
 
-def _pitch_error_growth(assembly: Assembly) -> dict[str, float]:
+def _pitch_error_growth(vehicle_assembly: Assembly) -> dict[str, float]:
     """Ratio of the rms pitch error over a run to the rms pitch error over its first part, for vehicles under wheel
     forces, whose pitch error grows; else empty.
     """
-    if assembly.mode != "force" or assembly.vehicle.geometry == "linear" or assembly.vehicle.pitch_springs:
+    if (
+        vehicle_assembly.mode != "force"
+        or vehicle_assembly.vehicle.geometry == "linear"
+        or vehicle_assembly.vehicle.pitch_springs
+    ):
         return {}
     from models.drift.growth import pitch_variance
     from models.systems.pitch_plane.trust import pitch_error_growth
 
-    forces = pitch_error_growth(assembly)
+    forces = pitch_error_growth(vehicle_assembly)
     grown = np.asarray(pitch_variance(forces.times, forces.sinh_rate, 1.0))
     rows_of_part = max(2, round(FINE_WINDOW * len(grown)))
     return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:rows_of_part])))}
 
 
-def _settings_of_longer_step(settings: Settings, step_factor: float, share: float) -> Settings:
-    """Returns settings with a step ``step_factor`` times as long, over the first ``share`` of the run, rounded down to
-    whole steps, at least one."""
-    step = step_factor * settings.step
-    return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
+def _settings_of_longer_step(solver_settings: Settings, step_factor: float, run_share: float) -> Settings:
+    """Returns settings with a step ``step_factor`` times as long, over the first ``run_share`` of the run, rounded down
+    to whole steps, at least one."""
+    step = step_factor * solver_settings.step
+    return replace(
+        solver_settings,
+        step=step,
+        duration=step * max(1, math.floor(run_share * solver_settings.duration / step + 1e-9)),
+    )
 
 
-def _steps_per_saved_row(scene: Scene, settings: Settings) -> int:
+def _steps_per_saved_row(scene: Scene, solver_settings: Settings) -> int:
     """Number of time steps between saved rows; raises InputError if run.output_step is no multiple of the step."""
     wanted = scene.run.output_step
     if wanted is None:
         return 1
-    ratio = wanted / settings.step
+    ratio = wanted / solver_settings.step
     if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
-        raise InputError(scene.file, "run.output_step", wanted, f"must be a multiple of the step {settings.step:g} s")
+        raise InputError(
+            scene.file, "run.output_step", wanted, f"must be a multiple of the step {solver_settings.step:g} s"
+        )
     return round(ratio)
 
 
-def output_channels(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
+def output_channels(vehicle_assembly: Assembly, trajectory: Trajectory, engine_model: Model | None = None) -> Channels:
     """Returns all channels of a run as name -> (unit, meaning, values): states, forces, and channels of effects.
 
-    model : the model that made the run; effects that need accelerations compute them with it.
+    engine_model : the model that made the run; effects that need accelerations compute them with it.
     """
     channels: Channels = {}
     for i, (name, meaning) in enumerate(zip(STATES, MEANINGS_OF_STATES, strict=True)):
         unit = "rad" if name == "pitch" else "m"
-        channels[name] = (unit, meaning, run.states[:, i])
-        channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", run.states[:, 4 + i])
-    channels |= _force_channels(assembly, run, _inputs_at_times(assembly, run.times))
-    for output in assembly.outputs:
-        channels |= output(assembly, run.times, run.states)
-    for sensor in assembly.sensors:
-        assert model is not None
-        channels |= sensor(assembly, run, model)
+        channels[name] = (unit, meaning, trajectory.states[:, i])
+        channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", trajectory.states[:, 4 + i])
+    channels |= _force_channels(vehicle_assembly, trajectory, _inputs_at_times(vehicle_assembly, trajectory.times))
+    for output in vehicle_assembly.outputs:
+        channels |= output(vehicle_assembly, trajectory.times, trajectory.states)
+    for sensor in vehicle_assembly.sensors:
+        assert engine_model is not None
+        channels |= sensor(vehicle_assembly, trajectory, engine_model)
     return channels
 
 
-def _inputs_at_times(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
+def _inputs_at_times(vehicle_assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
     """Values of the vehicle's input (road or wheel forces, prescribed motion) at times (n,) in s;
     None for free motion.
     """
-    if assembly.input is None:
+    if vehicle_assembly.input is None:
         return None
     step = times[1] - times[0]
     if np.allclose(np.diff(times), step, rtol=1e-6, atol=0):
-        return assembly.input.sample(0.0, float(step), len(times))
-    return np.array([assembly.input.at(time) for time in times])
+        return vehicle_assembly.input.sample(0.0, float(step), len(times))
+    return np.array([vehicle_assembly.input.at(time) for time in times])
 
 
-def _force_channels(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> Channels:
+def _force_channels(vehicle_assembly: Assembly, trajectory: Trajectory, input_values: np.ndarray | None) -> Channels:
     """Channels of wheel forces f1, f2, suspension forces f3, f4 and suspension moment; road heights, enforced force and
     moment, and inertia term where the run has them (eqs 33, 35, 36).
     """
-    f1, f2 = _wheel_forces(assembly, run.states, inputs)
-    f3, f4, moment = suspension_loads(run.states.T, assembly.parameters, assembly.vehicle.geometry)
+    f1, f2 = _wheel_forces(vehicle_assembly, trajectory.states, input_values)
+    f3, f4, moment = suspension_loads(
+        trajectory.states.T, vehicle_assembly.parameters, vehicle_assembly.vehicle.geometry
+    )
     channels: Channels = {
         "f1": ("N", "front wheel force, up", f1),
         "f2": ("N", "rear wheel force, up", f2),
@@ -210,26 +245,32 @@ def _force_channels(assembly: Assembly, run: Trajectory, inputs: np.ndarray | No
         "f4": ("N", "rear suspension force, compression", f4),
         "suspension_moment": ("N m", "pitch moment of the suspension on the chassis, nose up", moment),
     }
-    if assembly.mode == "road" and inputs is not None:
-        channels["zeta1"] = ("m", "road under the front wheel, down", inputs[:, 0])
-        channels["zeta2"] = ("m", "road under the rear wheel, down", inputs[:, 1])
-    if run.force is not None:
-        channels["enforced_force"] = ("N", "force on the chassis, down, that the prescribed heave takes", run.force)
-    if run.moment is not None and inputs is not None:
-        channels["inertia_term"] = ("N m", "I beta''", assembly.parameters.I * inputs[:, -1])
-        channels["enforced_moment"] = ("N m", "moment, nose up, that the prescribed pitch takes", run.moment)
+    if vehicle_assembly.mode == "road" and input_values is not None:
+        channels["zeta1"] = ("m", "road under the front wheel, down", input_values[:, 0])
+        channels["zeta2"] = ("m", "road under the rear wheel, down", input_values[:, 1])
+    if trajectory.force is not None:
+        channels["enforced_force"] = (
+            "N",
+            "force on the chassis, down, that the prescribed heave takes",
+            trajectory.force,
+        )
+    if trajectory.moment is not None and input_values is not None:
+        channels["inertia_term"] = ("N m", "I beta''", vehicle_assembly.parameters.I * input_values[:, -1])
+        channels["enforced_moment"] = ("N m", "moment, nose up, that the prescribed pitch takes", trajectory.moment)
     return channels
 
 
-def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    p = assembly.parameters
-    if assembly.mode not in ("free", "road"):
-        assert inputs is not None
-        return inputs[:, 0], inputs[:, 1]
-    u = np.zeros((len(y), 4)) if inputs is None else inputs
-    pressed = np.array([p.k1, p.k2]) * (y[:, :2] - u[:, :2])
-    forces = pressed + np.array([p.d1, p.d2]) * (y[:, 4:6] - u[:, 2:])
-    if any(tyre.pushes_only for tyre in assembly.vehicle.tyres):
+def _wheel_forces(
+    vehicle_assembly: Assembly, states: np.ndarray, input_values: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    p = vehicle_assembly.parameters
+    if vehicle_assembly.mode not in ("free", "road"):
+        assert input_values is not None
+        return input_values[:, 0], input_values[:, 1]
+    u = np.zeros((len(states), 4)) if input_values is None else input_values
+    pressed = np.array([p.k1, p.k2]) * (states[:, :2] - u[:, :2])
+    forces = pressed + np.array([p.d1, p.d2]) * (states[:, 4:6] - u[:, 2:])
+    if any(tyre.pushes_only for tyre in vehicle_assembly.vehicle.tyres):
         forces = np.maximum(np.minimum(forces, 2.0 * pressed), 0.0)
     return forces[:, 0], forces[:, 1]
 

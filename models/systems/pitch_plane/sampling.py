@@ -28,23 +28,23 @@ NO_ROW_AT_SAMPLE_TEXT = (
 )
 
 
-def check_rate(scene: Scene, key_path: str, rate: float) -> None:
+def check_rate(scene: Scene, key_path: str, sampling_rate: float) -> None:
     """Raise InputError, before a run, for a sampling rate (Hz) whose sampling times are not at time steps of every
     engine.
     """
     if CATALOGUE["exudyn"][str(scene.settings("exudyn").integrator)].adaptive:
-        raise InputError(scene.file, key_path, rate, NO_ROW_AT_SAMPLE_TEXT)
+        raise InputError(scene.file, key_path, sampling_rate, NO_ROW_AT_SAMPLE_TEXT)
     for engine in CATALOGUE:
         step = float(scene.settings(engine).step or 0)
-        if not divides(step, 1 / rate):
+        if not divides(step, 1 / sampling_rate):
             allowed = (
-                f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
-                f"{dividing_step(step, 1 / rate)} s or another rate"
+                f"its period {1 / sampling_rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
+                f"{dividing_step(step, 1 / sampling_rate)} s or another rate"
             )
-            raise InputError(scene.file, key_path, rate, allowed)
+            raise InputError(scene.file, key_path, sampling_rate, allowed)
 
 
-def check_end(scene: Scene, key_path: str, file: str, end_time: float) -> None:
+def check_end(scene: Scene, key_path: str, input_path: str, end_time: float) -> None:
     """Raise InputError for an input file that ends at ``end_time`` (s), before the end of the run."""
     length = scene.run.duration
     if end_time < length * (1 - 1e-9):
@@ -52,54 +52,91 @@ def check_end(scene: Scene, key_path: str, file: str, end_time: float) -> None:
 
         remedy = f"shorten run.duration{wrong_time_unit_hint(end_time, length)}"
         allowed = f"ends at {end_time:g} s, but the run lasts {length:g} s: {remedy}"
-        raise InputError(scene.file, key_path, file, allowed)
+        raise InputError(scene.file, key_path, input_path, allowed)
 
 
-def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
+def instant_numbers(row_times: np.ndarray, sampling_rate: float) -> np.ndarray:
     """Index of the sensor's last sampling time at or before each of the times (n,) in s; rate in Hz."""
-    return np.floor(times * rate + INSTANT_TOLERANCE).astype(np.int64)
+    return np.floor(row_times * sampling_rate + INSTANT_TOLERANCE).astype(np.int64)
 
 
-def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, key_path: str) -> np.ndarray:
+def sample_and_hold(
+    row_times: np.ndarray, exact_values: np.ndarray, sampling_rate: float, scene: Scene, key_path: str
+) -> np.ndarray:
     """Sample-and-hold of values (n,): for each row the value at the sensor's last sampling time at or before it.
 
     Raises InputError where a run has no row at a sampling time, as with engines that choose their own steps.
     """
-    number = instant_numbers(times, rate)
-    row = np.searchsorted(times, (number - INSTANT_TOLERANCE) / rate)
-    if np.abs(times[row] * rate - number).max() > INSTANT_TOLERANCE:
-        raise InputError(scene.file, key_path, rate, NO_ROW_AT_SAMPLE_TEXT)
-    return values[row]
+    number = instant_numbers(row_times, sampling_rate)
+    row = np.searchsorted(row_times, (number - INSTANT_TOLERANCE) / sampling_rate)
+    if np.abs(row_times[row] * sampling_rate - number).max() > INSTANT_TOLERANCE:
+        raise InputError(scene.file, key_path, sampling_rate, NO_ROW_AT_SAMPLE_TEXT)
+    return exact_values[row]
 
 
 def noisy_reading(
-    p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, key_path: str
+    sensor_parameters: Any,
+    noise_stream: int,
+    row_times: np.ndarray,
+    exact_values: np.ndarray,
+    scene: Scene,
+    key_path: str,
 ) -> np.ndarray:
-    """Sample-and-hold of values (n,) with white noise on each sample; ``p`` has sampling_rate, deviation, seed and
-    path.
+    """Sample-and-hold of values (n,) with white noise on each sample; ``sensor_parameters`` has sampling_rate,
+    deviation, seed and path.
     """
-    number = instant_numbers(times, p.sampling_rate)
-    noise = p.deviation * normal_samples(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
-    return read_samples(times, values, p.sampling_rate, scene, key_path) + noise[number]
+    number = instant_numbers(row_times, sensor_parameters.sampling_rate)
+    noise = (
+        sensor_parameters.deviation
+        * normal_samples(sensor_parameters.seed, sensor_parameters.path, int(number[-1]) + 1, 1, source=noise_stream)[
+            :, 0
+        ]
+    )
+    return sample_and_hold(row_times, exact_values, sensor_parameters.sampling_rate, scene, key_path) + noise[number]
 
 
-def within_range(effect: str, channels: Mapping[str, str], unit: str, sensor_range: float) -> Assumption:
-    """Assumption that readings of a sensor stay within its range; ``channels`` : channel of the run by sensor name."""
-    says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
-    return Assumption(f"{effect} in range", says, remedy, watch_function(**channels), unit, -sensor_range, sensor_range)
+def within_range(
+    effect_name: str, channel_by_sensor: Mapping[str, str], channel_unit: str, sensor_range: float
+) -> Assumption:
+    """Assumption that readings of a sensor stay within its range; ``channel_by_sensor`` : channel of the run by sensor
+    name.
+    """
+    says, remedy = (
+        f"{effect_name}: readings are within the sensor's range",
+        f"take one of a larger effects.{effect_name}.range",
+    )
+    return Assumption(
+        f"{effect_name} in range",
+        says,
+        remedy,
+        watch_function(**channel_by_sensor),
+        channel_unit,
+        -sensor_range,
+        sensor_range,
+    )
 
 
-def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:
-    """Write samples of a result at a rate (Hz) to a file that other effects read; ``columns`` : channel of the result
-    by column name.
+def write_samples(
+    result: Result, channel_by_column: Mapping[str, str], sampling_rate: float, output_path: Path
+) -> None:
+    """Write samples of a result at a rate (Hz) to a file that other effects read; ``channel_by_column`` : channel of
+    the result by column name.
 
     Raises InputError where the result's rows are not equally spaced at a whole part of the sampling period.
     """
     spacing = float(result.times[1] - result.times[0])
-    if not divides(spacing, 1 / rate) or not np.allclose(
+    if not divides(spacing, 1 / sampling_rate) or not np.allclose(
         np.diff(result.times), spacing, rtol=INSTANT_TOLERANCE, atol=0
     ):
-        raise InputError(path, "sampling rate", rate, f"the result's rows, {spacing:g} s apart, do not fit its period")
-    stride = round(1 / (rate * spacing))
-    rows = {name: (result.data[channel].attrs["units"], result[channel][::stride]) for name, channel in columns.items()}
-    write_time_series(path, rows, 1 / rate)
+        raise InputError(
+            output_path,
+            "sampling rate",
+            sampling_rate,
+            f"the result's rows, {spacing:g} s apart, do not fit its period",
+        )
+    stride = round(1 / (sampling_rate * spacing))
+    rows = {
+        name: (result.data[channel].attrs["units"], result[channel][::stride])
+        for name, channel in channel_by_column.items()
+    }
+    write_time_series(output_path, rows, 1 / sampling_rate)

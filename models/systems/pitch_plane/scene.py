@@ -29,7 +29,7 @@ def parameter_sets() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in PARAMETER_SET_FOLDER.glob("*.py") if path.stem != "__init__"))
 
 
-class VehicleTable(Strict):
+class PitchPlaneVehicleTable(Strict):
     """[vehicle]: a published parameter set or the user's parameter file, and values that replace some parameters."""
 
     parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
@@ -38,7 +38,7 @@ class VehicleTable(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class RunTable(Strict):
+class PitchPlaneRunTable(Strict):
     """[run]: duration, time step, and spacing of the saved rows."""
 
     duration: float = quantity("s", "length of the run")
@@ -62,8 +62,8 @@ class Scene(SceneFile):
 
     system: Literal["pitch-plane"] = "pitch-plane"
     study: str = Field(default="single_run", description="the study that runs the scene")
-    vehicle: VehicleTable = VehicleTable()
-    run: RunTable = Field(description="table with at least the duration")
+    vehicle: PitchPlaneVehicleTable = PitchPlaneVehicleTable()
+    run: PitchPlaneRunTable = Field(description="table with at least the duration")
     start: dict[str, float] = Field(default_factory=dict, description="initial states beside the static equilibrium")
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)
@@ -94,30 +94,34 @@ class Scene(SceneFile):
         return named.model_copy(update={"integrator": named.integrator or usual, "step": named.step or self.run.step})
 
 
-def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
+def parameter_set(set_name: str, scene_path: str, scene_folder: Path) -> pitch_plane.Parameters:
     """A published parameter set by its name, or the user's own from a TOML file."""
-    if name.endswith(".toml"):
-        return read(pitch_plane.Parameters, parse(existing_file(name, folder, file, "vehicle.parameters")), name)
-    if name not in parameter_sets():
+    if set_name.endswith(".toml"):
+        return read(
+            pitch_plane.Parameters,
+            parse(existing_file(set_name, scene_folder, scene_path, "vehicle.parameters")),
+            set_name,
+        )
+    if set_name not in parameter_sets():
         allowed = "must be a TOML file with all parameters, or a published set"
-        raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())
-    return import_module(f"models.vehicles.parameters.{name}").PARAMETERS
+        raise InputError(scene_path, "vehicle.parameters", set_name, allowed, parameter_sets())
+    return import_module(f"models.vehicles.parameters.{set_name}").PARAMETERS
 
 
 SMALLEST_PARAMETER = 1e-9
 """Smallest positive value of a vehicle's parameter in SI units."""
 
 
-def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
+def _check_rest(vehicle_parameters: pitch_plane.Parameters, scene: Scene) -> None:
     """Raise InputError for parameters without a static equilibrium, in which every run begins, and for tiny
     parameters.
     """
-    for name, value in parameters:
+    for name, value in vehicle_parameters:
         if 0 < value < SMALLEST_PARAMETER:
             allowed = f"too small for a vehicle: at least {SMALLEST_PARAMETER:g}"
             raise InputError(scene.file, f"vehicle.override.{name}", value, allowed)
     try:
-        rest_state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
+        rest_state = pitch_plane.equilibrium(vehicle_parameters, scene.vehicle.geometry)
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
         rest_state = np.full(8, np.nan)
     if not np.isfinite(rest_state).all():
@@ -129,43 +133,45 @@ def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
         )
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> Scene:
     """Build a checked pitch-plane scene from the nested tables of a scene file. Raises InputError for unknown keys and
     for values outside their ranges.
     """
-    scene = checked(Scene, table, file, folder)
-    effects = read_tables(scene.effects, DEFAULT_SYSTEM, file)
+    scene = checked(Scene, scene_tables, scene_path, scene_folder)
+    effects = read_tables(scene.effects, DEFAULT_SYSTEM, scene_path)
     for name in scene.engines:
         _check_engine(name, scene)
     _check_times(scene)
     return scene.model_copy(update={"effects": effects})
 
 
-def changed_scene(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
-    """Returns the scene with some keys changed; ``tables`` : new values of keys by the names of their tables."""
+def changed_scene(scene: Scene, **changed_tables: Mapping[str, Any]) -> Scene:
+    """Returns the scene with some keys changed; ``changed_tables`` : new values of keys by the names of their
+    tables.
+    """
     table = scene.table()
-    tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
+    tables_now = {name: {**table.get(name, {}), **values} for name, values in changed_tables.items()}
     return build({**table, **tables_now}, scene.file, Path(scene.folder))
 
 
-def _check_engine(name: str, scene: Scene) -> None:
+def _check_engine(engine: str, scene: Scene) -> None:
     """Raise InputError for unknown engines and integrators, and for settings that the integrator does not have."""
-    if name not in CATALOGUE:
-        raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
-    engine_settings, key_path = scene.engines[name], f"engines.{name}"
-    integrator = str(scene.settings(name).integrator)
-    if integrator not in CATALOGUE[name]:
-        names = tuple(key for key in CATALOGUE[name] if (name, key) not in UNAVAILABLE_INTEGRATORS)
+    if engine not in CATALOGUE:
+        raise InputError(scene.file, f"engines.{engine}", None, "no such engine", tuple(CATALOGUE))
+    engine_settings, key_path = scene.engines[engine], f"engines.{engine}"
+    integrator = str(scene.settings(engine).integrator)
+    if integrator not in CATALOGUE[engine]:
+        names = tuple(key for key in CATALOGUE[engine] if (engine, key) not in UNAVAILABLE_INTEGRATORS)
         raise InputError(scene.file, f"{key_path}.integrator", integrator, "no such integrator", names)
     if "spectral_radius" in engine_settings.model_fields_set and integrator != "GeneralizedAlpha":
         allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
         raise InputError(scene.file, f"{key_path}.spectral_radius", engine_settings.spectral_radius, allowed)
-    if "tolerance" in engine_settings.model_fields_set and not CATALOGUE[name][integrator].adaptive:
+    if "tolerance" in engine_settings.model_fields_set and not CATALOGUE[engine][integrator].adaptive:
         adaptive = (
             " or ".join(
                 key
-                for key, value in CATALOGUE[name].items()
-                if value.adaptive and (name, key) not in UNAVAILABLE_INTEGRATORS
+                for key, value in CATALOGUE[engine].items()
+                if value.adaptive and (engine, key) not in UNAVAILABLE_INTEGRATORS
             )
             or "other engines"
         )
@@ -192,16 +198,18 @@ def _check_times(scene: Scene) -> None:
         raise InputError(scene.file, "run.output_step", wanted, allowed)
 
 
-def _check_step(scene: Scene, key_path: str, step: float) -> None:
+def _check_step(scene: Scene, key_path: str, time_step: float) -> None:
     length, wanted = scene.run.duration, scene.run.output_step
-    if length / step > MOST_STEPS:
-        allowed = f"needs {length / step:.3g} steps of {key_path} = {step:g} s; at most {MOST_STEPS:,} are possible"
+    if length / time_step > MOST_STEPS:
+        allowed = (
+            f"needs {length / time_step:.3g} steps of {key_path} = {time_step:g} s; at most {MOST_STEPS:,} are possible"
+        )
         raise InputError(scene.file, "run.duration", length, allowed)
-    if not divides(step, length):
-        allowed = f"must divide run.duration = {length:g} s; use for example {dividing_step(step, length)}"
-        raise InputError(scene.file, key_path, step, allowed)
-    if wanted is not None and not divides(step, wanted):
-        allowed = f"must be a multiple of {key_path} = {step:g} s"
+    if not divides(time_step, length):
+        allowed = f"must divide run.duration = {length:g} s; use for example {dividing_step(time_step, length)}"
+        raise InputError(scene.file, key_path, time_step, allowed)
+    if wanted is not None and not divides(time_step, wanted):
+        allowed = f"must be a multiple of {key_path} = {time_step:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
 
 
@@ -226,9 +234,9 @@ def assembly_of_scene(scene: Scene) -> Assembly:
     return assembly
 
 
-def _initial_state(scene: Scene, parameters: pitch_plane.Parameters) -> np.ndarray:
+def _initial_state(scene: Scene, vehicle_parameters: pitch_plane.Parameters) -> np.ndarray:
     """Initial state (8,) of a scene: the static equilibrium, except for the states in [start]."""
-    state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
+    state = pitch_plane.equilibrium(vehicle_parameters, scene.vehicle.geometry)
     for name, value in scene.start.items():
         if name not in STATE_NAMES:
             raise InputError(scene.file, f"start.{name}", value, "not a state", STATE_NAMES)

@@ -27,7 +27,7 @@ DRIFT_OFF_PITCH = 0.05
 """Difference (rad) from the measured pitch beyond which a run has drifted off."""
 
 
-class Options(Strict):
+class SixRunOptions(Strict):
     """[options] of the study of six runs: sampling rate, noise, perturbed models, seed."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
@@ -39,24 +39,26 @@ class Options(Strict):
     seed: int = Field(1, ge=0, lt=2**63, description="seed of noise and models")
 
 
-def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
+def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> SixRunOptions:
     """Reads the scene's options. Raises InputError, before any file is written, for options with which a run of the
     study is impossible.
     """
-    options = read(Options, scene.options, scene.file, "options")
+    options = read(SixRunOptions, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     return options
 
 
-def measurement_and_runs(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, float, dict[str, Scene]]:
+def measurement_and_runs(
+    scene: Scene, output_folder: Path, estimate_error: bool = False
+) -> tuple[Result, float, dict[str, Scene]]:
     """Makes the virtual measurement and writes its files. Returns the measurement, the standard deviation (N) of the
     force noise, and the scenes of all runs on the measured files by name.
 
-    error : whether the error of the measurement's time steps is estimated.
+    estimate_error : whether the error of the measurement's time steps is estimated.
     """
-    options, measured = options_of(scene), measure(scene, error)
-    deviation = options.noise_fraction * write_measurement(measured, folder, 1.0 / options.sampling_rate)
-    vehicle, follow = scene.vehicle_parameters(), follower_builder(scene, folder)
+    options, measured = options_of(scene), measure(scene, estimate_error)
+    deviation = options.noise_fraction * write_measurement(measured, output_folder, 1.0 / options.sampling_rate)
+    vehicle, follow = scene.vehicle_parameters(), follower_builder(scene, output_folder)
     paper = perturbed_parameters(vehicle)
     noises = [
         {"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}} for i in range(options.noise_samples)
@@ -76,26 +78,26 @@ def measurement_and_runs(scene: Scene, folder: Path, error: bool = False) -> tup
     return measured, deviation, scenes
 
 
-def channel_error(measured_run: Result, run: Result, channel: str) -> np.ndarray:
+def channel_error(measured_run: Result, run_result: Result, channel_name: str) -> np.ndarray:
     """A run's channel minus the measured channel, at the times of the run."""
-    return run[channel] - np.interp(run.times, measured_run.times, measured_run[channel])
+    return run_result[channel_name] - np.interp(run_result.times, measured_run.times, measured_run[channel_name])
 
 
-def figures_of_run(engine: str, name: str, measured_run: Result, run: Result) -> dict[str, Any]:
+def figures_of_run(engine: str, run_name: str, measured_run: Result, run_result: Result) -> dict[str, Any]:
     """Figures of a run for a JSON file: drift-off time (s, None if never) and largest heave error (m); with prescribed
     pitch also enforced moment and inertia term (N m).
     """
     figures: dict[str, Any] = {
         "engine": engine,
-        "run": name,
-        "drift-off": GrowthCurve(run.times, np.abs(channel_error(measured_run, run, "pitch"))).passing_time(
-            DRIFT_OFF_PITCH
-        ),
-        "heave error": float(np.abs(channel_error(measured_run, run, "z3")).max()),
+        "run": run_name,
+        "drift-off": GrowthCurve(
+            run_result.times, np.abs(channel_error(measured_run, run_result, "pitch"))
+        ).passing_time(DRIFT_OFF_PITCH),
+        "heave error": float(np.abs(channel_error(measured_run, run_result, "z3")).max()),
     }
-    if "enforced_moment" in run.data:
-        moment = run["enforced_moment"]
+    if "enforced_moment" in run_result.data:
+        moment = run_result["enforced_moment"]
         figures["moment rms"] = float(np.sqrt(np.mean(moment**2)))
         figures["moment max"] = float(np.abs(moment).max())
-        figures["inertia max"] = float(np.abs(run["inertia_term"]).max())
+        figures["inertia max"] = float(np.abs(run_result["inertia_term"]).max())
     return figures

@@ -51,13 +51,13 @@ from models.systems.pitch_plane.virtual_measurement import (
 from models.vehicles.pitch_plane import Parameters
 
 Progress = Callable[[str, float], None]
-Row = dict[str, Any]
+FiguresRow = dict[str, Any]
 
 DAMPING_RATIO = 0.7
 """Damping ratio of stabilising springs and high-pass filters."""
 
 
-class Options(Strict):
+class StabiliserOptions(Strict):
     """[options] of the study of stabilisers: measurement, perturbed model, stabilisers, limits of the score."""
 
     sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
@@ -80,11 +80,11 @@ class Options(Strict):
     limits: Limits = Limits()
 
 
-def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
+def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> StabiliserOptions:
     """Reads the scene's options. Raises InputError, before any file is written, for options with which a run of the
     study is impossible.
     """
-    options = read(Options, scene.options, scene.file, "options")
+    options = read(StabiliserOptions, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     check_steps(scene, engines)
     if scene.run.step > COARSEST_SPACING or scene.run.duration < FEWEST_ROWS * scene.run.step:
@@ -99,43 +99,46 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
         for value in getattr(options, name):
             if not 0.0 < value < math.inf:
                 raise InputError(scene.file, f"options.{name}", value, "must be above 0 and finite")
-    for on_road in roads(scene, options).values():
+    for on_road in scenes_by_road(scene, options).values():
         assembly_of_scene(on_road)
     return options
 
 
-def roads(scene: Scene, options: Options) -> dict[str, Scene]:
+def scenes_by_road(scene: Scene, study_options: StabiliserOptions) -> dict[str, Scene]:
     """Returns the scene on its road and, where options.grade is set, on the same road with that grade, by name."""
-    if options.grade is None:
+    if study_options.grade is None:
         return {"road": scene}
     road = scene.table()["effects"]["road"]
     if "grade" in road:
         allowed = "this study puts the road on options.grade itself: drop this key"
         raise InputError(scene.file, "effects.road.grade", road["grade"], allowed)
-    return {"road": scene, "grade": changed_scene(scene, effects={"road": {**road, "grade": options.grade}})}
+    return {"road": scene, "grade": changed_scene(scene, effects={"road": {**road, "grade": study_options.grade}})}
 
 
-def compare(
-    scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
-) -> tuple["list[Bench]", list[Row], dict[str, str]]:
+def compare_stabilisers(
+    scene: Scene, engines: tuple[str, ...], output_folder: Path, report_study_progress: Progress
+) -> tuple["list[StabiliserBench]", list[FiguresRow], dict[str, str]]:
     """Run all stabilisers on all roads. Returns the benches, a row of figures for each run, and reasons of failed runs
     by name.
 
     The first engine runs all stabilisers; the other engines run, on the scene's road, the free run and
     those that are accepted.
     """
-    options, failed, rows = options_of(scene, engines), dict[str, str](), list[Row]()
-    benches = [Bench(on_road, road, options, folder, scene.error) for road, on_road in roads(scene, options).items()]
+    options, failed, rows = options_of(scene, engines), dict[str, str](), list[FiguresRow]()
+    benches = [
+        StabiliserBench(on_road, road, options, output_folder, scene.error)
+        for road, on_road in scenes_by_road(scene, options).items()
+    ]
     for i, bench in enumerate(benches):
 
-        def report_progress(text: str, share: float, completed: int = i) -> None:
-            progress(text, (completed + share) / (len(benches) + 1))
+        def report_progress(progress_text: str, road_share: float, completed_share: int = i) -> None:
+            report_study_progress(progress_text, (completed_share + road_share) / (len(benches) + 1))
 
-        rows += bench.score(engines[0], () if i else engines[1:], failed, report_progress)
+        rows += bench.score_stabilisers(engines[0], () if i else engines[1:], failed, report_progress)
     return benches, rows, failed
 
 
-class Bench:
+class StabiliserBench:
     """Virtual measurement on a road, and runs of the perturbed model with each stabiliser on the measured files.
 
     trusted : time (s) until which a free run can be trusted; holding : stiffness (N m/rad) of a spring that prevents
@@ -143,25 +146,34 @@ class Bench:
     results : the measurement and all runs, by name.
     """
 
-    def __init__(self, scene: Scene, road: str, options: Options, folder: Path, error: bool = False) -> None:
-        self.road, self.options, self.folder = road, options, folder / road
+    def __init__(
+        self,
+        scene: Scene,
+        road_name: str,
+        study_options: StabiliserOptions,
+        output_folder: Path,
+        estimate_error: bool = False,
+    ) -> None:
+        self.road, self.options, self.folder = road_name, study_options, output_folder / road_name
         self.folder.mkdir()
-        self.truth, period = measure(scene, error), 1.0 / options.sampling_rate
-        self.results = {f"measurement ({road})": self.truth}
-        self.deviation = options.noise_fraction * write_measurement(self.truth, self.folder, period)
-        self._write_sensors(steps_per_sample(scene, options.sampling_rate), period)
-        self.override = perturbed_parameters(scene.vehicle_parameters(), options.factors)
+        self.truth, period = measure(scene, estimate_error), 1.0 / study_options.sampling_rate
+        self.results = {f"measurement ({road_name})": self.truth}
+        self.deviation = study_options.noise_fraction * write_measurement(self.truth, self.folder, period)
+        self._write_sensors(steps_per_sample(scene, study_options.sampling_rate), period)
+        self.override = perturbed_parameters(scene.vehicle_parameters(), study_options.factors)
         self.follow = follower_builder(scene, self.folder)
         self.parameters = self.follow(self.override, {}).vehicle_parameters()
         self.methods = self._effects_of_methods()
-        predicted = predict_trust(assembly_of_scene(self._scene({})), options.limits.pitch_error)
+        predicted = predict_trust(assembly_of_scene(self._scene({})), study_options.limits.pitch_error)
         assert predicted is not None  # nothing holds a free run
         self.trusted = scene.run.duration if predicted.until is None else predicted.until[1]
         self.holding = holding_stiffness(self.parameters, predicted.rate)
 
-    def _write_sensors(self, stride: int, sample_period: float) -> None:
-        """Write files of measured pitch with noise, and of exact heave and pitch, sampled every ``stride`` steps."""
-        heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
+    def _write_sensors(self, steps_per_sample: int, sample_period: float) -> None:
+        """Write files of measured pitch with noise, and of exact heave and pitch, sampled every ``steps_per_sample``
+        steps.
+        """
+        heave, pitch = self.truth["z3"][::steps_per_sample], self.truth["pitch"][::steps_per_sample]
         noise = normal_samples(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
         write_time_series(self.folder / "measured_pitch.csv", noisy, sample_period)
@@ -173,11 +185,14 @@ class Bench:
         """Pitch inertia of chassis and wheels together, I + J, in kg m^2."""
         return rigid_pitch(self.parameters).total_inertia
 
-    def spring_settings(self, stiffness: float) -> dict[str, float]:
+    def spring_settings(self, spring_stiffness: float) -> dict[str, float]:
         """Stiffness (N m/rad) and damping (N m s/rad) of a pitch spring to the ground with the damping ratio
         DAMPING_RATIO.
         """
-        return {"stiffness": stiffness, "damping": 2.0 * DAMPING_RATIO * math.sqrt(stiffness * self.pitch_inertia)}
+        return {
+            "stiffness": spring_stiffness,
+            "damping": 2.0 * DAMPING_RATIO * math.sqrt(spring_stiffness * self.pitch_inertia),
+        }
 
     def _effects_of_methods(self) -> dict[str, dict[str, Any]]:
         """Effects of each stabiliser by name, in addition to wheel forces and noise."""
@@ -206,67 +221,79 @@ class Bench:
         }
 
     def score(
-        self, engine: str, other_engines: tuple[str, ...], failed: dict[str, str], progress: Progress
-    ) -> list[Row]:
+        self, engine: str, other_engines: tuple[str, ...], failures: dict[str, str], report_progress: Progress
+    ) -> list[FiguresRow]:
         """Run all stabilisers in an engine, and the free run and the accepted ones in the other engines. Returns a row
-        of figures per run; reasons of failed runs are added to ``failed``.
+        of figures per run; reasons of failed runs are added to ``failures``.
         """
-        rows: list[Row] = []
+        rows: list[FiguresRow] = []
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
         for i, (name, effects) in enumerate(self.methods.items()):
-            progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
-            of_method = self._rows_of_run(engine, name, effects, failed)
+            report_progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
+            of_method = self._rows_of_run(engine, name, effects, failures)
             rows += of_method
             if of_method and (name == "free" or of_method[0]["verdict"] == "accepted"):
                 rows += [
                     row
                     for other_engine in other_engines
-                    for row in self._rows_of_run(other_engine, name, effects, failed)
+                    for row in self._rows_of_run(other_engine, name, effects, failures)
                 ]
         return rows
 
-    def _rows_of_run(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
+    def _rows_of_run(
+        self, engine: str, stabiliser_name: str, stabiliser_effects: dict[str, Any], failures: dict[str, str]
+    ) -> list[FiguresRow]:
         """Run a stabiliser in an engine. Returns its row of figures, or nothing if the run fails."""
         start = time.perf_counter()
         try:
-            result = self.simulate(engine, effects)
+            result = self.simulate(engine, stabiliser_effects)
         except RunFailed as error:
-            failed[f"{engine}, {self.road}, {name}"] = str(error)
+            failures[f"{engine}, {self.road}, {stabiliser_name}"] = str(error)
             return []
         seconds = time.perf_counter() - start
-        self.results[f"{engine}: {name} ({self.road})"] = result
-        return [{"engine": engine, "road": self.road, **self.row(name, effects, result), "seconds": seconds}]
+        self.results[f"{engine}: {stabiliser_name} ({self.road})"] = result
+        return [
+            {
+                "engine": engine,
+                "road": self.road,
+                **self.row(stabiliser_name, stabiliser_effects, result),
+                "seconds": seconds,
+            }
+        ]
 
-    def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
+    def simulate(self, engine: str, stabiliser_effects: dict[str, Any]) -> Result:
         """Run the perturbed model under the noisy forces with some effects in an engine."""
-        return run(self._scene(effects), engine)
+        return run(self._scene(stabiliser_effects), engine)
 
-    def _scene(self, effects: dict[str, Any]) -> Scene:
+    def _scene(self, stabiliser_effects: dict[str, Any]) -> Scene:
         noise = {"force_noise": {"deviation": self.deviation, "seed": self.options.seed}}
-        return self.follow(self.override, noise | effects)
+        return self.follow(self.override, noise | stabiliser_effects)
 
-    def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
+    def row(self, stabiliser_name: str, stabiliser_effects: dict[str, Any], run_result: Result) -> FiguresRow:
         """Figures and verdicts of a run by name. A run whose vehicle tumbled has no damage ratios,
         which would mislead.
         """
         limits = self.options.limits
-        figures, wrong = figures_of_run(result, self.parameters), errors_of_run(result, self.truth, self.options.slope)
-        with_truth = verdict_on_run(figures, wrong, effects, limits)
+        figures, wrong = (
+            figures_of_run(run_result, self.parameters),
+            errors_of_run(run_result, self.truth, self.options.slope),
+        )
+        with_truth = verdict_on_run(figures, wrong, stabiliser_effects, limits)
         verdict_without_truth = blind_verdict(
             figures,
-            effects,
-            float(result.times[-1]),
+            stabiliser_effects,
+            float(run_result.times[-1]),
             limits,
             self.trusted,
-            innovations_are_consistent(result),
-            uncertainty(result),
+            innovations_are_consistent(run_result),
+            uncertainty(run_result),
         )
         loads = {f"damage {channel}": wrong.damage[channel] for channel in SECTION_FORCE_CHANNELS}
         loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in SECTION_FORCE_CHANNELS}
         return {
-            "method": name,
+            "method": stabiliser_name,
             **(dict.fromkeys(loads) if figures.pitch_max > TUMBLING_PITCH else loads),
-            **{f"vertical damage {name}": ratio for name, ratio in wrong.vertical_damage.items()},
+            **{f"vertical damage {stabiliser_name}": ratio for stabiliser_name, ratio in wrong.vertical_damage.items()},
             "pitch error max [rad]": wrong.pitch_max,
             "pitch error rms [rad]": wrong.pitch_rms,
             "heave error max [m]": wrong.heave_max,

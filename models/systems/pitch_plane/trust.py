@@ -25,7 +25,7 @@ from models.drift.growth import (
     sinh_law_rate,
 )
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.tangent import LONGEST_STEP, TangentPath, path_of
+from models.systems.pitch_plane.tangent import LONGEST_TIME_STEP, TangentPath, tangent_path_of
 from models.vehicles.pitch_plane import Parameters
 
 if TYPE_CHECKING:
@@ -41,22 +41,27 @@ SMALL_PITCH = 0.2
 """Largest pitch error (rad) for the laws of growth, which are right to 5 % up to here (Monte Carlo)."""
 
 
-def small_errors(angle: float) -> Assumption:
-    """Assumption that the pitch error ``angle`` (rad) up to which a run is trusted is small enough for the laws of
-    growth.
+def small_errors(largest_pitch_error: float) -> Assumption:
+    """Assumption that the pitch error ``largest_pitch_error`` (rad) up to which a run is trusted is small enough for
+    the laws of growth.
     """
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
     return Assumption(
-        "small errors", says, remedy, partial(_watched_allowed_error, angle), "rad", upper_limit=SMALL_PITCH
+        "small errors",
+        says,
+        remedy,
+        partial(_watched_allowed_error, largest_pitch_error),
+        "rad",
+        upper_limit=SMALL_PITCH,
     )
 
 
-def _watched_allowed_error(angle: float, run: Result) -> Watched:
-    return {"allowed error": np.array([angle])}
+def _watched_allowed_error(largest_pitch_error: float, run_result: Result) -> Watched:
+    return {"allowed error": np.array([largest_pitch_error])}
 
 
 @dataclass(frozen=True)
-class Growth:
+class PitchErrorGrowth:
     """Growth of a pitch error along the wheel forces of a run, computed before the run.
 
     times (n,) : of the samples (s); rate : mean growth rate (1/s); sinh_rate (n,) : the rate in the sinh law at each
@@ -75,68 +80,72 @@ class GrowthCurve:
     times: np.ndarray
     size: np.ndarray
 
-    def passing_time(self, angle: float = UNTRUSTED_PITCH) -> float | None:
-        """First time (s) at which the pitch error exceeds ``angle`` (rad); None if it never does."""
-        beyond = ~(self.size <= angle)  # what is not a number any more has
+    def passing_time(self, largest_pitch_error: float = UNTRUSTED_PITCH) -> float | None:
+        """First time (s) at which the pitch error exceeds ``largest_pitch_error`` (rad); None if it never does."""
+        beyond = ~(self.size <= largest_pitch_error)  # what is not a number any more has
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
 
-def pitch_error_growth(assembly: Assembly) -> Growth:
+def pitch_error_growth(vehicle_assembly: Assembly) -> PitchErrorGrowth:
     """Computes the growth of a pitch error along a free force-excited run; raises ValueError for a
     run of another kind.
     """
-    path = path_of(assembly)
+    path = tangent_path_of(vehicle_assembly)
     sample_times = path.forces.period * np.arange(path.samples + 1)
-    if assembly.mode == "force-body" or assembly.vehicle.geometry == "linear":
-        return Growth(sample_times, 0.0, np.zeros(len(sample_times)))
-    values, p = _covering_samples(path), assembly.parameters
+    if vehicle_assembly.mode == "force-body" or vehicle_assembly.vehicle.geometry == "linear":
+        return PitchErrorGrowth(sample_times, 0.0, np.zeros(len(sample_times)))
+    values, p = _covering_samples(path), vehicle_assembly.parameters
     rate = pitch_rate_of_forces(values, path.forces.period, p)
     arguments = (rate, path.forces.period, p)
-    return Growth(sample_times, growth_rate(*arguments), sinh_law_rate(*arguments))
+    return PitchErrorGrowth(sample_times, growth_rate(*arguments), sinh_law_rate(*arguments))
 
 
-def _covering_samples(path: TangentPath) -> np.ndarray:
+def _covering_samples(tangent_path: TangentPath) -> np.ndarray:
     """Wheel force samples (n + 1, 2) in N that cover the run; if held samples end with the run, the
     last is repeated.
     """
-    values = path.forces.values[: path.samples + 1]
-    return values if len(values) > path.samples else np.vstack([values, values[-1:]])
+    values = tangent_path.forces.values[: tangent_path.samples + 1]
+    return values if len(values) > tangent_path.samples else np.vstack([values, values[-1:]])
 
 
-def noise_error_curve(assembly: Assembly, deviation: float) -> GrowthCurve:
-    """Pitch error over time from white noise of ``deviation`` (N) on each force sample: median magnitude over noise
-    paths.
+def noise_error_curve(vehicle_assembly: Assembly, force_deviation: float) -> GrowthCurve:
+    """Pitch error over time from white noise of ``force_deviation`` (N) on each force sample: median magnitude over
+    noise paths.
     """
-    growing, period = pitch_error_growth(assembly), path_of(assembly).forces.period
-    intensity = rigid_pitch(assembly.parameters).noise_intensity(deviation, period)
+    growing, period = pitch_error_growth(vehicle_assembly), tangent_path_of(vehicle_assembly).forces.period
+    intensity = rigid_pitch(vehicle_assembly.parameters).noise_intensity(force_deviation, period)
     return GrowthCurve(
         growing.times, MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity))
     )
 
 
-def interpolation_error(path: TangentPath) -> np.ndarray:
+def interpolation_error(tangent_path: TangentPath) -> np.ndarray:
     """Error (3 steps, 2) in N of the scene's interpolation of force samples, compared with a quintic spline, at the
     start, the middle and the end of each step.
 
     Linear samples err by f'' t (T - t) / 2, on average by f'' T^2 / 12. Held samples delay the run by T / 2, which is
     no drift: they are compared with the spline at that delay, and err by -f'' T^2 / 24 on average.
     """
-    spline = Smooth(_covering_samples(path), path.forces.period, degree=5)
-    count, stage_forces = path.steps, path.forces_at_stages
-    late = path.forces.period / 2 if path.forces.held else 0.0
-    true = spline.sample(-late, path.step / 2, 2 * count + 1)
-    read = [stage_forces] * 3 if path.forces.held else [stage_forces[0:-1:2], stage_forces[1::2], stage_forces[2::2]]
+    spline = Smooth(_covering_samples(tangent_path), tangent_path.forces.period, degree=5)
+    count, stage_forces = tangent_path.steps, tangent_path.forces_at_stages
+    late = tangent_path.forces.period / 2 if tangent_path.forces.held else 0.0
+    true = spline.sample(-late, tangent_path.step / 2, 2 * count + 1)
+    read = (
+        [stage_forces] * 3
+        if tangent_path.forces.held
+        else [stage_forces[0:-1:2], stage_forces[1::2], stage_forces[2::2]]
+    )
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation_error_curve(assembly: Assembly, longest_step: float = LONGEST_STEP) -> GrowthCurve:
+def interpolation_error_curve(vehicle_assembly: Assembly, longest_step: float = LONGEST_TIME_STEP) -> GrowthCurve:
     """Pitch error over time from the interpolation between force samples alone; 0 for a run with too few samples."""
-    path = path_of(assembly, longest_step)
+    path = tangent_path_of(vehicle_assembly, longest_step)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
 
 def model_error_curve(
-    assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_STEP
+    vehicle_assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_TIME_STEP
 ) -> GrowthCurve:
     """Pitch error over time of a run with ``wrong_parameters`` instead of the assembly's parameters.
 
@@ -144,27 +153,29 @@ def model_error_curve(
     alone. The difference is propagated along a run with the mean of both models, which leaves no error of second
     order.
     """
-    parameters = assembly.parameters.model_dump()
+    parameters = vehicle_assembly.parameters.model_dump()
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _growth_by_parameters(path_of(replace(assembly, parameters=mean), longest_step), wrong_parameters=shifted)
+    return _growth_by_parameters(
+        tangent_path_of(replace(vehicle_assembly, parameters=mean), longest_step), wrong_parameters=shifted
+    )
 
 
 def _growth_by_parameters(
-    path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
+    tangent_path: TangentPath, force_errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
 ) -> GrowthCurve:
-    pushes = None if errors is None else errors[:, None, :]
-    _, columns = path.propagate_errors(np.zeros((1, 8)), pushes, wrong_parameters)
-    return GrowthCurve(path.times, np.abs(columns[:, 0, 3]))
+    pushes = None if force_errors is None else force_errors[:, None, :]
+    _, columns = tangent_path.propagate_errors(np.zeros((1, 8)), pushes, wrong_parameters)
+    return GrowthCurve(tangent_path.times, np.abs(columns[:, 0, 3]))
 
 
-def rounding_error_curve(assembly: Assembly) -> GrowthCurve:
+def rounding_error_curve(vehicle_assembly: Assembly) -> GrowthCurve:
     """Pitch error over time from rounding alone, median magnitude: each step rounds the pitch rate. No solver can do
     better.
     """
-    growing, path = pitch_error_growth(assembly), path_of(assembly)
-    rate = pitch_rate_of_forces(_covering_samples(path), path.forces.period, assembly.parameters)
+    growing, path = pitch_error_growth(vehicle_assembly), tangent_path_of(vehicle_assembly)
+    rate = pitch_rate_of_forces(_covering_samples(path), path.forces.period, vehicle_assembly.parameters)
     rounding_deviation = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
     return GrowthCurve(
         growing.times,
@@ -173,7 +184,7 @@ def rounding_error_curve(assembly: Assembly) -> GrowthCurve:
 
 
 @dataclass(frozen=True)
-class Trust:
+class TrustPrediction:
     """Prediction of how long a run can be trusted. times : time (s) at which each source of error exceeds ``angle``
     (rad), None where it never does; rate : mean growth rate of a pitch error (1/s).
 
@@ -203,36 +214,48 @@ class Trust:
         return f"trusted until about {time:.3g} s ({grown}, {name}){remarks}"
 
 
-def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust | None:
-    """Predict how long a scene's run can be trusted, up to a pitch error ``angle`` (rad). None for a run with
-    prescribed pitch, with a pitch spring or on a road, whose errors do not grow.
+def predict_trust(vehicle_assembly: Assembly, largest_pitch_error: float = UNTRUSTED_PITCH) -> TrustPrediction | None:
+    """Predict how long a scene's run can be trusted, up to a pitch error ``largest_pitch_error`` (rad). None for a run
+    with prescribed pitch, with a pitch spring or on a road, whose errors do not grow.
     """
-    forces = assembly.input
+    forces = vehicle_assembly.input
     try:
-        path_of(assembly)
+        tangent_path_of(vehicle_assembly)
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
-    times_of_causes = {"interpolation between the samples": interpolation_error_curve(assembly).passing_time(angle)}
-    added = assembly.scene.effects.get("force_noise")
+    times_of_causes = {
+        "interpolation between the samples": interpolation_error_curve(vehicle_assembly).passing_time(
+            largest_pitch_error
+        )
+    }
+    added = vehicle_assembly.scene.effects.get("force_noise")
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
-        times_of_causes[named] = noise_error_curve(assembly, added.deviation).passing_time(angle)
-    times_of_causes |= _steady_drift_time(assembly, angle)
-    times_of_causes["rounding"] = rounding_error_curve(assembly).passing_time(angle)
-    return Trust(times_of_causes, pitch_error_growth(assembly).rate, angle, _unchecked_sentence(assembly))
+        times_of_causes[named] = noise_error_curve(vehicle_assembly, added.deviation).passing_time(largest_pitch_error)
+    times_of_causes |= _steady_drift_time(vehicle_assembly, largest_pitch_error)
+    times_of_causes["rounding"] = rounding_error_curve(vehicle_assembly).passing_time(largest_pitch_error)
+    return TrustPrediction(
+        times_of_causes,
+        pitch_error_growth(vehicle_assembly).rate,
+        largest_pitch_error,
+        _unchecked_sentence(vehicle_assembly),
+    )
 
 
-def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
-    """Times (s) after which mean accelerations of doubtful wheel forces have turned the vehicle by ``angle`` (rad), or
-    moved it vertically by ``angle`` times the wheelbase.
+def _steady_drift_time(vehicle_assembly: Assembly, largest_pitch_error: float) -> dict[str, float]:
+    """Times (s) after which mean accelerations of doubtful wheel forces have turned the vehicle by
+    ``largest_pitch_error`` (rad), or moved it vertically by ``largest_pitch_error`` times the wheelbase.
     """
-    if not assembly.doubts:
+    if not vehicle_assembly.doubts:
         return {}
     from models.measured.axle_forces import equilibrium_residual
 
-    p, motion = assembly.parameters, equilibrium_residual(_axles(assembly))
-    limits_of_motion = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
+    p, motion = vehicle_assembly.parameters, equilibrium_residual(_axles(vehicle_assembly))
+    limits_of_motion = {
+        "mean of the wheel forces": largest_pitch_error * (p.a + p.b),
+        "balance of the axles": largest_pitch_error,
+    }
     return {
         name: math.sqrt(2 * limit_of_motion / abs(acceleration))
         for (name, limit_of_motion), acceleration, is_significant in zip(
@@ -242,17 +265,19 @@ def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
     }
 
 
-def _axles(assembly: Assembly) -> "AxleForces":
+def _axles(vehicle_assembly: Assembly) -> "AxleForces":
     """Returns the wheel forces of a run in the form that the checks of recordings take."""
     from models.measured.axle_forces import AxleForces
 
-    path, turn = path_of(assembly), assembly.mode == "force-body"
-    forces, lasts = _covering_samples(path), assembly.scene.run.duration
-    return AxleForces(forces, path.forces.period, assembly.parameters, ((), ()), lasts, turns_with_chassis=turn)
+    path, turn = tangent_path_of(vehicle_assembly), vehicle_assembly.mode == "force-body"
+    forces, lasts = _covering_samples(path), vehicle_assembly.scene.run.duration
+    return AxleForces(forces, path.forces.period, vehicle_assembly.parameters, ((), ()), lasts, turns_with_chassis=turn)
 
 
-def _unchecked_sentence(assembly: Assembly) -> str:
+def _unchecked_sentence(vehicle_assembly: Assembly) -> str:
     """Sentence on properties of wheel forces from a file that were not checked; empty without such a file."""
     from models.measured.axle_forces import unchecked_delay_sentence
 
-    return unchecked_delay_sentence(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""
+    return (
+        unchecked_delay_sentence(_axles(vehicle_assembly)) if "wheel_forces" in vehicle_assembly.scene.effects else ""
+    )

@@ -34,14 +34,18 @@ BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 """Function that builds a force-excited scene from overrides of vehicle parameters and further effects."""
 
 
-def perturbed_parameters(parameters: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
-    """Returns the changed parameters by name: each is the value in ``parameters`` times its factor."""
-    return {name: getattr(parameters, name) * factor for name, factor in factors.items()}
+def perturbed_parameters(
+    vehicle_parameters: Parameters, factor_by_parameter: Mapping[str, float] = PAPER_FACTORS
+) -> dict[str, float]:
+    """Returns the changed parameters by name: each is the value in ``vehicle_parameters`` times its factor."""
+    return {name: getattr(vehicle_parameters, name) * factor for name, factor in factor_by_parameter.items()}
 
 
-def measure(scene: Scene, error: bool = False) -> Result:
-    """Run the vehicle on the road in the reference, with Runge-Kutta 4; error : whether its error is estimated."""
-    return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration), error=error)
+def measure(scene: Scene, estimate_error: bool = False) -> Result:
+    """Run the vehicle on the road in the reference, with Runge-Kutta 4; estimate_error : whether its error is
+    estimated.
+    """
+    return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration), error=estimate_error)
 
 
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
@@ -91,41 +95,45 @@ def steps_per_sample(scene: Scene, sampling_rate: float) -> int:
     return round(ratio)
 
 
-def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, sample_period: float) -> None:
+def write_wheel_forces(
+    output_folder: Path, front_forces: np.ndarray, rear_forces: np.ndarray, sample_period: float
+) -> None:
     """Write ``wheel_forces.csv`` with front and rear wheel forces (n,) in N, positive up, every
     ``sample_period`` (s).
     """
-    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, sample_period)
+    write_time_series(
+        output_folder / "wheel_forces.csv", {"front": ("N", front_forces), "rear": ("N", rear_forces)}, sample_period
+    )
 
 
-def write_measurement(measured_run: Result, folder: Path, sample_period: float) -> float:
+def write_measurement(measured_run: Result, output_folder: Path, sample_period: float) -> float:
     """Write ``wheel_forces.csv`` and ``pitch.csv`` of a measurement with a sample every ``sample_period`` (s). Returns
     the largest force (N).
     """
     stride = round(sample_period / float(measured_run.times[1] - measured_run.times[0]))
     front, rear, pitch = (measured_run[name][::stride] for name in ("f1", "f2", "pitch"))
-    write_wheel_forces(folder, front, rear, sample_period)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, sample_period)
+    write_wheel_forces(output_folder, front, rear, sample_period)
+    write_time_series(output_folder / "pitch.csv", {"pitch": ("rad", pitch)}, sample_period)
     return float(max(np.abs(front).max(), np.abs(rear).max()))
 
 
-def follower_builder(scene: Scene, folder: Path) -> BuildFollower:
-    """Returns a function that builds scenes driven by the measured files in ``folder``; their runs start in the state
-    in which the measurement started.
+def follower_builder(scene: Scene, measured_folder: Path) -> BuildFollower:
+    """Returns a function that builds scenes driven by the measured files in ``measured_folder``; their runs start in
+    the state in which the measurement started.
     """
     initial = dict(zip(STATE_NAMES, assembly_of_scene(scene).initial.tolist(), strict=True))
     parameters = scene.vehicle_parameters().model_dump()
 
-    def follow(override: Mapping[str, float], effects: Mapping[str, Any]) -> Scene:
+    def follow(parameter_override: Mapping[str, float], effects: Mapping[str, Any]) -> Scene:
         prescribed = next((states for effect, states in PRESCRIBED_STATES.items() if effect in effects), ())
         table = {
             "title": scene.title,
-            "vehicle": {"geometry": scene.vehicle.geometry, "override": {**parameters, **override}},
+            "vehicle": {"geometry": scene.vehicle.geometry, "override": {**parameters, **parameter_override}},
             "run": {"duration": scene.run.duration, "step": scene.run.step},
             "start": {name: value for name, value in initial.items() if name not in prescribed},
             "engines": {name: settings.model_dump(exclude_unset=True) for name, settings in scene.engines.items()},
             "effects": {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}, **effects},
         }
-        return build(table, scene.file, folder)
+        return build(table, scene.file, measured_folder)
 
     return follow

@@ -39,17 +39,20 @@ LEAST_UPRIGHT_COSINE = 0.7
 
 
 def assumptions(
-    scene: RideScene, vehicle: SpatialVehicle, motion: WatchedMotion | None = None, replaced: bool = False
+    scene: RideScene,
+    vehicle: SpatialVehicle,
+    watched_motion: WatchedMotion | None = None,
+    gains_replace_curves: bool = False,
 ) -> list[Assumption]:
-    """Assumptions of the vehicle and road of a ride scene; ``motion`` : of a run, on which they are checked, None to
-    list them only.
+    """Assumptions of the vehicle and road of a ride scene; ``watched_motion`` : of a run, on which they are checked,
+    None to list them only.
 
-    replaced : whether statistical linearisation replaces nonlinear springs by gains.
+    gains_replace_curves : whether statistical linearisation replaces nonlinear springs by gains.
     """
 
-    def values_of(name: str) -> np.ndarray | Gaussian:
-        assert motion is not None
-        return motion.motion_of_part(name)
+    def values_of(motion_name: str) -> np.ndarray | Gaussian:
+        assert watched_motion is not None
+        return watched_motion.motion_of_part(motion_name)
 
     assumptions_of_vehicle = [
         *_tyre_assumptions(vehicle, values_of),
@@ -63,29 +66,35 @@ def assumptions(
             else _travel_assumptions(scene, vehicle, spring, values_of)
         )
     assumptions_of_vehicle += [*_wave_assumptions(scene, vehicle), *_seat_assumptions(scene)]
-    return [*assumptions_of_vehicle, *([NEARLY_GAUSSIAN] if replaced else [])]
+    return [*assumptions_of_vehicle, *([NEARLY_GAUSSIAN] if gains_replace_curves else [])]
 
 
 ValuesByName = Callable[[str], np.ndarray | Gaussian]
 
 
-def _tyre_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
+def _tyre_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -> Iterator[Assumption]:
     loads = static_loads(vehicle)
     if not loads or vehicle.lifts:
         return
 
-    def watched(run: Result) -> Watched:
-        return {f"tyre {name}": _with_static_load(values_of(f"load {name}"), load) for name, load in loads.items()}
+    def watched(run_result: Result) -> Watched:
+        return {
+            f"tyre {name}": _with_static_load(values_of_motion(f"load {name}"), load) for name, load in loads.items()
+        }
 
     remedy = f'{RUN_IN_TIME_TEXT} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
     yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _with_static_load(values: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
-    return replace(values, mean=values.mean + static_load) if isinstance(values, Gaussian) else values + static_load
+def _with_static_load(dynamic_loads: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+    return (
+        replace(dynamic_loads, mean=dynamic_loads.mean + static_load)
+        if isinstance(dynamic_loads, Gaussian)
+        else dynamic_loads + static_load
+    )
 
 
-def _angle_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
+def _angle_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -> Iterator[Assumption]:
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
     if turning:
         names = {"rx": "roll", "ry": "pitch", "rz": "yaw"}
@@ -93,20 +102,22 @@ def _angle_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iter
             "small angles",
             "bodies turn so little that sines are angles",
             "take a smoother road or a slower speed: ride is small motion",
-            lambda run: {f"{names[f]} of {body}": values_of(f"{f} {body}") for body, f in turning},
+            lambda run: {f"{names[f]} of {body}": values_of_motion(f"{f} {body}") for body, f in turning},
             "rad",
             -SMALL_ANGLE,
             SMALL_ANGLE,
         )
 
 
-def _slip_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
+def _slip_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -> Iterator[Assumption]:
     if vehicle.side_forces:
         yield Assumption(
             "small slip",
             "side forces of tyres grow in proportion to slip angles",
             "use the system handling, whose tyres saturate",
-            lambda run: {f"side force {force.name}": values_of(f"slip {force.name}") for force in vehicle.side_forces},
+            lambda run: {
+                f"side force {force.name}": values_of_motion(f"slip {force.name}") for force in vehicle.side_forces
+            },
             "rad",
             -LARGEST_SLIP_ANGLE,
             LARGEST_SLIP_ANGLE,
@@ -114,7 +125,7 @@ def _slip_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Itera
 
 
 def _travel_assumptions(
-    scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, values_of: ValuesByName
+    scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, values_of_motion: ValuesByName
 ) -> Iterator[Assumption]:
     """Assumption that the linear spring between a wheel and the body above stays within its free travel."""
     wheels = {tyre.body for tyre in vehicle.tyres}
@@ -126,14 +137,14 @@ def _travel_assumptions(
         f"free travel of {spring.name}",
         f"the suspension {spring.name} meets no stop",
         f"give its spring in the vehicle file a travel_force with stops, and {RUN_IN_TIME_TEXT}",
-        lambda run: {spring.name: values_of(f"travel {spring.name}")},
+        lambda run: {spring.name: values_of_motion(f"travel {spring.name}")},
         "m",
         -free,
         free,
     )
 
 
-def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of: ValuesByName) -> Iterator[Assumption]:
+def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of_motion: ValuesByName) -> Iterator[Assumption]:
     """Assumptions that travel and rate of a nonlinear spring stay within its curves' tables, or within their linear
     range about rest where slopes at rest are used.
     """
@@ -157,21 +168,21 @@ def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of: Values
             f"{kind} of {spring.name}",
             says,
             remedy,
-            lambda run, name=f"{kind} {spring.name}": {spring.name: values_of(name)},  # type: ignore[misc]
+            lambda run, name=f"{kind} {spring.name}": {spring.name: values_of_motion(name)},  # type: ignore[misc]
             unit,
             low,
             high,
         )
 
 
-def _curve_range(curve: Curve | None, small_motion: bool) -> tuple[float, float]:
+def _curve_range(force_curve: Curve | None, small_motion: bool) -> tuple[float, float]:
     """Lowest and highest argument of a curve's table or, for small motion, of its linear range about rest."""
-    if curve is None:
+    if force_curve is None:
         return -np.inf, np.inf
-    curve_arguments = np.array(curve.arguments)
+    curve_arguments = np.array(force_curve.arguments)
     if not small_motion:
         return float(curve_arguments[0]), float(curve_arguments[-1])
-    _, _, corners, bends = curve.hinges()
+    _, _, corners, bends = force_curve.hinges()
     bent = np.array(corners)[np.array(bends) != 0.0] if corners else np.zeros(0)
     if (bent == 0.0).any():  # no slope at rest stands for a corner at rest, however small the motion is
         return 0.0, 0.0
@@ -188,7 +199,7 @@ def _wave_assumptions(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Ass
     speeds = scene.speeds.all() if scene.speeds is not None else np.array(scene.drive.speed if scene.drive else [0.0])
     slow, fast = float(speeds.min()), float(speeds.max())
 
-    def watched(run: Result) -> Watched:
+    def watched(run_result: Result) -> Watched:
         wheels = {f"the wheels at {slow:g} m/s": np.array([slow / hop])} if hop and scene.speeds is not None else {}
         body = {f"the body at {fast:g} m/s": np.array([fast / bounce])} if bounce else {}
         return wheels | body
@@ -229,11 +240,11 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
     if not people:
         return
 
-    def watched(run: Result) -> Watched:
-        outputs, deviation = run["output"].tolist(), run["deviation"]
+    def watched(run_result: Result) -> Watched:
+        outputs, deviation = run_result["output"].tolist(), run_result["deviation"]
         if deviation.ndim == 3:
             deviation = deviation[0]
-        rows = [f"at {speed:g} m/s" for speed in run["speed"]] if "speed" in run.data.coords else []
+        rows = [f"at {speed:g} m/s" for speed in run_result["speed"]] if "speed" in run_result.data.coords else []
         deviations = {name: deviation[:, outputs.index(name)] for name in people if name in outputs}
         return {name: Gaussian(np.zeros(len(values)), values, rows) for name, values in deviations.items()}
 

@@ -35,21 +35,27 @@ SAFETY_FACTOR = 2.0
 """Factor on the observed change, as a single change of last digits may have little effect by chance."""
 
 
-def with_changed_last_digits(vehicle: LinearVehicle, accuracy: float, draw: int = 0) -> LinearVehicle:
-    """Returns the vehicle with every entry of its matrices changed by a relative error of up to ``accuracy``.
+def with_changed_last_digits(
+    linear_vehicle: LinearVehicle, relative_accuracy: float, draw_number: int = 0
+) -> LinearVehicle:
+    """Returns the vehicle with every entry of its matrices changed by a relative error of up to ``relative_accuracy``.
 
-    draw : offset in the sequence of errors, which selects another set of changes.
+    draw_number : offset in the sequence of errors, which selects another set of changes.
     """
 
     def changed(matrix: np.ndarray) -> np.ndarray:
-        return matrix * (1.0 + accuracy * np.cos(np.arange(1 + draw, 1 + draw + matrix.size)).reshape(matrix.shape))
+        return matrix * (
+            1.0
+            + relative_accuracy
+            * np.cos(np.arange(1 + draw_number, 1 + draw_number + matrix.size)).reshape(matrix.shape)
+        )
 
     return replace(
-        vehicle,
-        mass=_symmetrised(changed(vehicle.mass)),
-        damping=changed(vehicle.damping),
-        stiffness=changed(vehicle.stiffness),
-        road_stiffness=changed(vehicle.road_stiffness),
+        linear_vehicle,
+        mass=_symmetrised(changed(linear_vehicle.mass)),
+        damping=changed(linear_vehicle.damping),
+        stiffness=changed(linear_vehicle.stiffness),
+        road_stiffness=changed(linear_vehicle.road_stiffness),
     )
 
 
@@ -58,52 +64,64 @@ def _symmetrised(matrix: np.ndarray) -> np.ndarray:
 
 
 def with_error_of_sweep(
-    run: Result,
-    sweep: Sweep,
-    linear: LinearVehicleAtSpeed,
-    roads: Mapping[str, Excitation],
-    weightings: Mapping[str, str],
+    run_result: Result,
+    sweep_by_speed: Sweep,
+    vehicle_at_speed: LinearVehicleAtSpeed,
+    road_by_case: Mapping[str, Excitation],
+    weighting_by_output: Mapping[str, str],
     matrix_accuracy: float,
 ) -> Result:
     """Returns the result with the rounding errors of its standard deviations, estimated at some speeds on all roads.
 
     matrix_accuracy : relative accuracy of the entries of the vehicle's matrices.
     """
-    checked_speeds = np.unique(np.linspace(0, len(sweep.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
+    checked_speeds = np.unique(np.linspace(0, len(sweep_by_speed.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
     recomputed = np.array(
         [
             [
-                _deviations_of_changed(linear, road, weightings, float(sweep.speeds[i]), matrix_accuracy)
+                _deviations_of_changed(
+                    vehicle_at_speed, road, weighting_by_output, float(sweep_by_speed.speeds[i]), matrix_accuracy
+                )
                 for i in checked_speeds
             ]
-            for road in roads.values()
+            for road in road_by_case.values()
         ]
     )
-    deviation = sweep.deviation[:, checked_speeds]
+    deviation = sweep_by_speed.deviation[:, checked_speeds]
     known = np.isfinite(deviation) & np.isfinite(recomputed)
-    sizes, estimates = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(sweep.outputs))], {}
+    sizes, estimates = (
+        [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(sweep_by_speed.outputs))],
+        {},
+    )
     largest = {
-        unit: max(size for size, unit_of_output in zip(sizes, sweep.units, strict=True) if unit_of_output == unit)
-        for unit in sweep.units
+        unit: max(
+            size for size, unit_of_output in zip(sizes, sweep_by_speed.units, strict=True) if unit_of_output == unit
+        )
+        for unit in sweep_by_speed.units
     }
-    for i, (name, unit, size) in enumerate(zip(sweep.outputs, sweep.units, sizes, strict=True)):
+    for i, (name, unit, size) in enumerate(zip(sweep_by_speed.outputs, sweep_by_speed.units, sizes, strict=True)):
         if size > 0.0:
             is_known = known[..., i]
             changes = recomputed[..., i][is_known] - deviation[..., i][is_known]
             error = max(SAFETY_FACTOR * root_mean_square(changes), MATRIX_ACCURACY / 4.0 * size)
             estimates[name] = Estimate(error, unit, error / max(size, STANDSTILL_SHARE * largest[unit]), 1.0, 0.0)
-    points = f"{len(checked_speeds)} of {len(sweep.speeds)} speeds"
-    return with_stated_errors(run, estimates, f"the Lyapunov equation of nudged matrices at {points}", "")
+    points = f"{len(checked_speeds)} of {len(sweep_by_speed.speeds)} speeds"
+    return with_stated_errors(run_result, estimates, f"the Lyapunov equation of nudged matrices at {points}", "")
 
 
 def _deviations_of_changed(
-    linear: LinearVehicleAtSpeed, road: Excitation, weightings: Mapping[str, str], speed: float, matrix_accuracy: float
+    vehicle_at_speed: LinearVehicleAtSpeed,
+    road: Excitation,
+    weighting_by_output: Mapping[str, str],
+    speed: float,
+    matrix_accuracy: float,
 ) -> np.ndarray:
     """Standard deviations (outputs,) at a speed (m/s) of the vehicle with changed last digits; NaN where the solution
     fails.
     """
     system = system_with_weightings(
-        vehicle_with_road(with_changed_last_digits(linear(speed), matrix_accuracy), road, speed), weightings
+        vehicle_with_road(with_changed_last_digits(vehicle_at_speed(speed), matrix_accuracy), road, speed),
+        weighting_by_output,
     )
     try:
         return stationary_covariance(system).deviation

@@ -46,9 +46,9 @@ every n-th of the solved speeds.
 
 
 def with_error_of_drive(
-    run: Result,
+    run_result: Result,
     scene: RideScene,
-    linear: LinearVehicle,
+    vehicle_at_speed: LinearVehicle,
     road: Excitation,
     quasi_stationary_of: DeviationsAtConstantSpeed,
 ) -> Result:
@@ -60,30 +60,30 @@ def with_error_of_drive(
     is 0 along a drive of constant speed. A drive of one step has no estimate.
     """
     assert scene.drive is not None
-    drive: VaryingSpeed = run.detail
+    drive: VaryingSpeed = run_result.detail
     if len(drive.time) < 3:
-        return not_estimated(run, "the drive is one step long, and no longer step could be beside it")
+        return not_estimated(run_result, "the drive is one step long, and no longer step could be beside it")
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
     shown = np.isfinite(drive.deviation).all(axis=0)
 
-    def series(time: np.ndarray, deviation: np.ndarray, quasi_stationary_rows: np.ndarray) -> Series:
+    def series(time_rows: np.ndarray, deviation: np.ndarray, quasi_stationary_rows: np.ndarray) -> Series:
         channels = {str(name): deviation[:, i] for i, name in enumerate(drive.names) if shown[i]}
         speed_by_speed = {
             f"{name}{SPEED_BY_SPEED}": quasi_stationary_rows[:, i]
             for i, name in enumerate(drive.names)
             if np.isfinite(quasi_stationary_rows[:, i]).all()
         }
-        return Series(time, channels | speed_by_speed)
+        return Series(time_rows, channels | speed_by_speed)
 
-    def rerun(step_factor: float, share: float) -> Series:
+    def rerun(step_factor: float, run_share: float) -> Series:
         stride = max(1, round(step_factor))
-        end = drive.time[0] + share * (drive.time[-1] - drive.time[0])
+        end = drive.time[0] + run_share * (drive.time[-1] - drive.time[0])
         wanted = drive.time[::stride][drive.time[::stride] <= end + 1e-9]
         if step_factor < 1.0 or len(wanted) < 2:
-            raise RunFailed(str(run.data.attrs["engine"]), "the drive cannot be repeated in other steps")
+            raise RunFailed(str(run_result.data.attrs["engine"]), "the drive cannot be repeated in other steps")
         cut = _drive_until(profile, float(wanted[-1]))
         coarse = varying_speed(
-            linear,
+            vehicle_at_speed,
             road,
             cut,
             weightings=scene.weighting,
@@ -93,11 +93,11 @@ def with_error_of_drive(
         rows = np.abs(coarse.time[:, None] - wanted).argmin(axis=0)
         return series(coarse.time[rows], coarse.deviation[rows], quasi_stationary_of(stride)[::stride][: len(wanted)])
 
-    units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
+    units = dict(zip(run_result["output"].tolist(), run_result["unit"].tolist(), strict=True))
     units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
-    fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
+    fine = series(drive.time, drive.deviation, run_result["quasi_stationary"])._replace(units=units)
     return with_estimated_errors(
-        run,
+        run_result,
         fine,
         rerun,
         DRIVE_ORDER,
@@ -108,20 +108,20 @@ def with_error_of_drive(
     )
 
 
-def _drive_until(profile: SpeedProfile, end_time: float) -> SpeedProfile:
+def _drive_until(speed_profile: SpeedProfile, end_time: float) -> SpeedProfile:
     """Returns the drive up to a time (s)."""
-    is_before = profile.times < end_time - 1e-9
-    kept_times = [*profile.times[is_before], end_time]
-    return SpeedProfile(kept_times, [*profile.speeds[is_before], float(profile.speed(end_time))])
+    is_before = speed_profile.times < end_time - 1e-9
+    kept_times = [*speed_profile.times[is_before], end_time]
+    return SpeedProfile(kept_times, [*speed_profile.speeds[is_before], float(speed_profile.speed(end_time))])
 
 
 def with_error_of_copies(
-    run: Result,
+    run_result: Result,
     vehicle: SpatialVehicle,
     road: Excitation,
-    equivalents: Mapping[float, StatisticallyLinear],
-    copies: Mapping[float, Copies],
-    seed: int,
+    linearised_by_speed: Mapping[float, StatisticallyLinear],
+    copies_by_speed: Mapping[float, Copies],
+    road_seed: int,
 ) -> Result:
     """Returns the result with the errors of its standard deviations by copies and by statistical linearisation, for
     each output.
@@ -130,42 +130,45 @@ def with_error_of_copies(
     error. Statistical linearisation: the difference from the copies at the same speeds, less the statistical error of
     this difference, or LEAST_ERROR_OF_NEGLECTED_SHARE of the variance that gains neglect where that is more.
     """
-    first = next(iter(copies.values()))
-    units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
-    size = _rms_over_speeds([copies_at_speed.deviation for copies_at_speed in copies.values()])
+    first = next(iter(copies_by_speed.values()))
+    units = dict(zip(run_result["output"].tolist(), run_result["unit"].tolist(), strict=True))
+    size = _rms_over_speeds([copies_at_speed.deviation for copies_at_speed in copies_by_speed.values()])
     chance = _rms_over_speeds(
-        [copies_at_speed.error / (2.0 * copies_at_speed.deviation) for copies_at_speed in copies.values()]
+        [copies_at_speed.error / (2.0 * copies_at_speed.deviation) for copies_at_speed in copies_by_speed.values()]
     )
-    steps = [_step_errors(vehicle, road, speed, copies_at_speed, seed) for speed, copies_at_speed in copies.items()]
+    steps = [
+        _step_errors(vehicle, road, speed, copies_at_speed, road_seed)
+        for speed, copies_at_speed in copies_by_speed.items()
+    ]
     estimates = {}
     for i, name in enumerate(first.names):
         if size[i] > 0.0:
             error, order = max(((row[i], orders[i]) for row, orders in steps), key=lambda pair: pair[0])
             estimates[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
-    if equivalents:
-        estimates |= _linearisation_errors(equivalents, copies, units)
-    with_stated_errors(run, estimates, "the copies in longer steps, and gains beside copies")
+    if linearised_by_speed:
+        estimates |= _linearisation_errors(linearised_by_speed, copies_by_speed, units)
+    with_stated_errors(run_result, estimates, "the copies in longer steps, and gains beside copies")
     scatter = {
         f"{name}, copies": sampling_error(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
         for i, name in enumerate(first.names)
         if size[i] > 0.0
     }
-    return with_sampling_error(run, scatter, len(first.moments[0]))
+    return with_sampling_error(run_result, scatter, len(first.moments[0]))
 
 
-def _rms_over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
+def _rms_over_speeds(deviation_rows: Sequence[np.ndarray]) -> np.ndarray:
     with np.errstate(invalid="ignore"):
-        return np.nan_to_num(np.sqrt(np.mean(np.square(rows), axis=0)))
+        return np.nan_to_num(np.sqrt(np.mean(np.square(deviation_rows), axis=0)))
 
 
 def _step_errors(
-    vehicle: SpatialVehicle, road: Excitation, speed: float, fine_copies: Copies, seed: int
+    vehicle: SpatialVehicle, road: Excitation, speed: float, fine_copies: Copies, road_seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors that the time steps cause in the copies' standard deviations at a speed (m/s), and observed orders of
     convergence, each (outputs,).
     """
     twice, fourfold = (
-        coarser_variances(vehicle, road, speed, fine_copies, step_factor, seed) for step_factor in (2, 4)
+        coarser_variances(vehicle, road, speed, fine_copies, step_factor, road_seed) for step_factor in (2, 4)
     )
     count = len(twice)
     deviation = np.sqrt(fine_copies.about_mean()[:count].mean(axis=0))
@@ -176,12 +179,14 @@ def _step_errors(
 
 
 def _linearisation_errors(
-    equivalents: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
+    linearised_by_speed: Mapping[float, StatisticallyLinear],
+    copies_by_speed: Mapping[float, Copies],
+    unit_by_output: Mapping[str, str],
 ) -> dict[str, Estimate]:
     """Errors of the standard deviations by statistical linearisation, from their difference to the copies' standard
     deviations at the same speeds.
     """
-    pairs = [(equivalents[speed], copies_at_speed) for speed, copies_at_speed in copies.items()]
+    pairs = [(linearised_by_speed[speed], copies_at_speed) for speed, copies_at_speed in copies_by_speed.items()]
     gains = np.array([copies_at_speed.covariance.deviation for copies_at_speed, _ in pairs])
     true = np.array([copies_at_speed.deviation for _, copies_at_speed in pairs])
     scatter = np.array([copies_at_speed.error / (2.0 * copies_at_speed.deviation) for _, copies_at_speed in pairs])
@@ -192,5 +197,5 @@ def _linearisation_errors(
         known = np.isfinite(errors[:, i]) & (gains[:, i] > 0.0) & np.isfinite(gains[:, i])
         if known.any():
             error, size = root_mean_square(errors[known, i]), root_mean_square(gains[known, i])
-            estimates[f"{name}, gains"] = Estimate(error, units[name], error / size, 1.0, 0.0)
+            estimates[f"{name}, gains"] = Estimate(error, unit_by_output[name], error / size, 1.0, 0.0)
     return estimates

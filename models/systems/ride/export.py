@@ -37,7 +37,7 @@ def exported(scene: RideScene, engine: str) -> Exported:
     return (_in_exudyn if engine == "exudyn" else _in_mujoco)(still, subject, by_speed)
 
 
-def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed: list[str]) -> Exported:
+def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dependent_items: list[str]) -> Exported:
     from models.engines.exudyn_export import items_with_functions
     from models.engines.spatial_exudyn_build import RoadRows, assemble
 
@@ -47,15 +47,15 @@ def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed:
     node_indices = [built.coordinate_nodes[coordinate] for coordinate in vehicle.coordinates()]
     columns = [mbs.GetNodeODE2Index(node) + index for node, index in node_indices]
     names = dict(zip(coordinate_names(vehicle), columns, strict=True))
-    return exported_exudyn_system(mbs, names, export_subject, [*items_with_functions(mbs), *by_speed])
+    return exported_exudyn_system(mbs, names, export_subject, [*items_with_functions(mbs), *speed_dependent_items])
 
 
-def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed: list[str]) -> Exported:
+def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dependent_items: list[str]) -> Exported:
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
     from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 
-    left_out = [*elements_left_out(vehicle), *by_speed]
+    left_out = [*elements_left_out(vehicle), *speed_dependent_items]
     vehicle, lowered = realisable(vehicle)
     spec = spec_of(vehicle, 1e-3)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))

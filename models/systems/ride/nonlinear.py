@@ -33,17 +33,17 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import MotionInRun, Spectral, checked_speeds, watched_vehicle
+from models.systems.ride.watched import MotionInRun, SpectralMotion, checked_speeds, watched_vehicle
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 
-LONGEST_STEP = 2e-3
+LONGEST_TIME_STEP = 2e-3
 """Longest time step (s) of runs in engines; stiff springs need a shorter step."""
 Progress = Callable[[str, float], None]
 
 
-class Sampling(Strict):
+class RunSampling(Strict):
     """Settings of runs in time: number and length of copies, time step, speeds and seed."""
 
     beside: list[float] = Field(default_factory=list, description="speeds in m/s for Monte Carlo; the middle if none")
@@ -61,7 +61,7 @@ class Sampling(Strict):
 
 
 @dataclass(frozen=True)
-class Nonlinear:
+class NonlinearRide:
     """Results of a nonlinear ride. small_motion (speeds, outputs) : standard deviations with slopes at rest;
     linearised_vehicles : by statistical linearisation, one per speed; copies : Monte Carlo copies by speed (m/s).
 
@@ -76,9 +76,9 @@ class Nonlinear:
     shown: StatisticallyLinear
     tyres_may_lift: bool = False
 
-    def quantity_by_speed(self, name: str) -> np.ndarray:
+    def quantity_by_speed(self, quantity_name: str) -> np.ndarray:
         """Returns a quantity of the statistically linearised vehicles, by its name, shape (speeds, outputs)."""
-        return np.array([getattr(linearised, name) for linearised in self.linearised_vehicles])
+        return np.array([getattr(linearised, quantity_name) for linearised in self.linearised_vehicles])
 
     @property
     def deviation(self) -> np.ndarray:
@@ -87,26 +87,30 @@ class Nonlinear:
 
 
 def linearised_result(
-    scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress, error: bool = False
+    scene: RideScene,
+    vehicle: SpatialVehicle,
+    run_sampling: RunSampling,
+    report_progress: Progress,
+    estimate_error: bool = False,
 ) -> Result:
     """Compute standard deviations by small motion and by statistical linearisation at all speeds, and by Monte Carlo
-    copies at some; the result's detail is ``Nonlinear``.
+    copies at some; the result's detail is ``NonlinearRide``.
 
-    error : whether errors are estimated, by further copies in longer steps.
+    estimate_error : whether errors are estimated, by further copies in longer steps.
     """
     assert scene.speeds is not None
     speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
     linear, on_road, start_time = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
     small, replaced = [], []
     for i, speed in enumerate(speeds):
-        progress("statistical linearisation", 0.3 * i / len(speeds))
+        report_progress("statistical linearisation", 0.3 * i / len(speeds))
         small.append(stationary_covariance(vehicle_with_road(linear(speed), road, speed)).deviation)
         replaced.append(statistically_linear(on_road, road, speed))
-    shown = sampling.shown(speeds)
-    compared_speeds = sampling.beside or [shown]
-    copies = _copies_by_speed(scene, CopiesBySpeed(vehicle, road, tuple(compared_speeds), sampling), progress)
+    shown = run_sampling.shown(speeds)
+    compared_speeds = run_sampling.beside or [shown]
+    copies = _copies_by_speed(scene, CopiesJob(vehicle, road, tuple(compared_speeds), run_sampling), report_progress)
     at_shown = statistically_linear(on_road, road, shown)
-    linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
+    linear_runs = NonlinearRide(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
     by_speed |= {field_name: linear_runs.quantity_by_speed(field_name) for field_name in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
@@ -133,19 +137,19 @@ def linearised_result(
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
     motion = _motion_of_equivalents(vehicle, road, speeds, replaced)
-    with_assumptions(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
-    if not error:
+    with_assumptions(labelled, assumptions(scene, vehicle, motion, gains_replace_curves=not vehicle.lifts))
+    if not estimate_error:
         return labelled
     known = (
         {}
         if vehicle.lifts
         else {speed: _equivalent_at_speed(on_road, road, speed, speeds, replaced) for speed in copies}
     )
-    return with_error_of_copies(labelled, vehicle, road, known, copies, sampling.seed)
+    return with_error_of_copies(labelled, vehicle, road, known, copies, run_sampling.seed)
 
 
 @dataclass(frozen=True)
-class CopiesBySpeed:
+class CopiesJob:
     """Job for worker processes (see ``models.ensemble.runner``) whose path i is all Monte Carlo copies at the i-th
     speed (m/s).
     """
@@ -153,11 +157,11 @@ class CopiesBySpeed:
     vehicle: SpatialVehicle
     road: Excitation
     speeds: tuple[float, ...]
-    sampling: Sampling
+    sampling: RunSampling
 
-    def __call__(self, paths: range) -> Arrays:
+    def __call__(self, speed_indices: range) -> Arrays:
         """Returns the fields of ``Copies`` as arrays, with the speed as their first axis."""
-        copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in paths]
+        copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in speed_indices]
         return {
             name: np.array([getattr(copies_at_speed, name) for copies_at_speed in copies_of_speeds])
             for name in Copies.__dataclass_fields__
@@ -172,72 +176,79 @@ class CopiesBySpeed:
         return {}
 
 
-def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
+def _copies_by_speed(scene: RideScene, copies_job: CopiesJob, report_study_progress: Progress) -> dict[float, Copies]:
     """Compute Monte Carlo copies by the scene's worker processes; returns them by speed (m/s)."""
 
-    def report_progress(state: Done) -> None:
-        progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
+    def report_progress(finished_blocks: Done) -> None:
+        report_study_progress(
+            f"Monte Carlo at {finished_blocks.done} of {finished_blocks.paths} speeds",
+            0.3 + 0.4 * finished_blocks.done / finished_blocks.paths,
+        )
 
-    with Crew.of(scene, default_workers=1).at_work(len(job.speeds)) as pool:
-        arrays = run_paths(job, len(job.speeds), None, pool, Blocks(1), report_progress)
+    with Crew.of(scene, default_workers=1).at_work(len(copies_job.speeds)) as pool:
+        arrays = run_paths(copies_job, len(copies_job.speeds), None, pool, Blocks(1), report_progress)
     return {
         speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
         for speed, names, moments, step, duration, settling in zip(
-            job.speeds, *(arrays[name] for name in Copies.__dataclass_fields__), strict=True
+            copies_job.speeds, *(arrays[name] for name in Copies.__dataclass_fields__), strict=True
         )
     }
 
 
 def _equivalent_at_speed(
-    vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
+    vehicle: SpatialVehicle,
+    road: Excitation,
+    speed: float,
+    speeds: np.ndarray,
+    linearised_vehicles: list[StatisticallyLinear],
 ) -> StatisticallyLinear:
-    """Returns the statistically linearised vehicle at a speed (m/s), from ``equivalents`` if it is
+    """Returns the statistically linearised vehicle at a speed (m/s), from ``linearised_vehicles`` if it is
     one of ``speeds``.
     """
     matching = np.flatnonzero(np.isclose(speeds, speed))
-    return equivalents[matching[0]] if len(matching) else statistically_linear(vehicle, road, speed)
+    return linearised_vehicles[matching[0]] if len(matching) else statistically_linear(vehicle, road, speed)
 
 
 def _motion_of_equivalents(
-    vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
-) -> Spectral:
+    vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, linearised_vehicles: list[StatisticallyLinear]
+) -> SpectralMotion:
     """Returns the Gaussian motion of the parts of statistically linearised vehicles; springs move about their mean
     travels.
     """
-    known = dict(zip(speeds.tolist(), equivalents, strict=True))
+    known = dict(zip(speeds.tolist(), linearised_vehicles, strict=True))
     chosen = checked_speeds(speeds)
     means = {
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
-        for name in equivalents[0].springs
+        for name in linearised_vehicles[0].springs
     }
-    return Spectral(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
+    return SpectralMotion(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
 
 
 def engine_result(
     scene: RideScene,
     engine: str,
     vehicle: SpatialVehicle,
-    sampling: Sampling,
-    error: bool = False,
-    table: np.ndarray | None = None,
+    run_sampling: RunSampling,
+    estimate_error: bool = False,
+    road_heights: np.ndarray | None = None,
 ) -> Result:
     """Run the vehicle in an engine over a random road, at the speed of ``Sampling.shown``; the result's detail is
-    ``Ride``.
+    ``EngineRide``.
 
-    error : whether the error of the steps is estimated, by runs in longer steps on the same road; table : a road in
-    place of the drawn one, as ``RoadPath.wheel_heights_and_rates`` has it.
+    estimate_error : whether the error of the steps is estimated, by runs in longer steps on the same road; road_heights
+    : a road in place of the drawn one, as ``RoadPath.wheel_heights_and_rates`` has it.
     """
     assert scene.speeds is not None
-    speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    path = road_path(road, speed, min(sampling.step or LONGEST_STEP, longest_resolving_step(vehicle, speed)))
+    speed, road = run_sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
+    path = road_path(road, speed, min(run_sampling.step or LONGEST_TIME_STEP, longest_resolving_step(vehicle, speed)))
     start_time, row_interval, skipped = (
         time.process_time(),
-        max(1, round(2.0 * LONGEST_STEP / path.step)),
-        sampling.skipped,
+        max(1, round(2.0 * LONGEST_TIME_STEP / path.step)),
+        run_sampling.skipped,
     )
-    if table is None:
-        table = path.wheel_heights_and_rates(int(np.ceil(sampling.driven / path.step)), sampling.seed)
-    ride = ride_over(engine, vehicle, path, table, skipped=skipped, stride=row_interval)
+    if road_heights is None:
+        road_heights = path.wheel_heights_and_rates(int(np.ceil(run_sampling.driven / path.step)), run_sampling.seed)
+    ride = ride_over_heights(engine, vehicle, path, road_heights, skipped_time=skipped, steps_per_output=row_interval)
     labelled = result(
         scene,
         {"output_value": Channel(("time", "output"), ride.outputs)},
@@ -255,10 +266,10 @@ def engine_result(
     )
     recorded_rows, watched = ride.rows, watched_vehicle(linearise(vehicle, speed), vehicle, speed)
     motion = MotionInRun(
-        watched, ride.run.positions[recorded_rows], ride.run.rates[recorded_rows], table[2 * recorded_rows]
+        watched, ride.run.positions[recorded_rows], ride.run.rates[recorded_rows], road_heights[2 * recorded_rows]
     )
     with_assumptions(labelled, assumptions(scene, vehicle, motion))
-    return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
+    return _with_error_of_steps(labelled, engine, vehicle, path, road_heights, skipped) if estimate_error else labelled
 
 
 RUNGE_KUTTA_ORDER, STEPS_BETWEEN_ROWS = 4, 16
@@ -268,44 +279,51 @@ REPEATED_SHARE, FIRST_ROW_SHARE = 0.9, 0.1
 
 
 def _with_error_of_steps(
-    run: Result, engine: str, vehicle: SpatialVehicle, path: RoadPath, table: np.ndarray, skipped: float
+    run_result: Result,
+    engine: str,
+    vehicle: SpatialVehicle,
+    road_path: RoadPath,
+    road_heights: np.ndarray,
+    skipped_time: float,
 ) -> Result:
     """Returns the result with the errors of its outputs, estimated by runs in longer time steps on the same road."""
-    names, units = [str(name) for name in run["output"]], run["unit"].tolist()
-    steps = len(table) // 2
-    first = STEPS_BETWEEN_ROWS * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / STEPS_BETWEEN_ROWS)
+    names, units = [str(name) for name in run_result["output"]], run_result["unit"].tolist()
+    steps = len(road_heights) // 2
+    first = STEPS_BETWEEN_ROWS * int(min(skipped_time / road_path.step, FIRST_ROW_SHARE * steps) / STEPS_BETWEEN_ROWS)
 
-    def series(ride: Ride, begin_time: float) -> Series:
+    def series(ride: EngineRide, begin_time: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
         return Series(begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
-    def rerun(step_factor: float, share: float) -> Series:
+    def rerun(step_factor: float, run_share: float) -> Series:
         longer, stride = (
-            replace(path, half_step=step_factor * path.half_step),
+            replace(road_path, half_step=step_factor * road_path.half_step),
             max(1, round(STEPS_BETWEEN_ROWS / step_factor) if step_factor <= 2.0 else 8),
         )
-        count = int(REPEATED_SHARE * share * steps / step_factor)
-        read = table[:: round(step_factor)] if step_factor >= 1.0 else _road_at_half_spacing(table)
-        begin = first * path.step
-        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, stride=stride)
+        count = int(REPEATED_SHARE * run_share * steps / step_factor)
+        read = road_heights[:: round(step_factor)] if step_factor >= 1.0 else _road_at_half_spacing(road_heights)
+        begin = first * road_path.step
+        ride = ride_over_heights(
+            engine, vehicle, longer, read[: 2 * count + 1], skipped_time=begin, steps_per_output=stride
+        )
         return series(ride, begin)
 
     outputs = outputs_at_other_steps(
-        engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, STEPS_BETWEEN_ROWS)
+        engine, vehicle, road_path, road_heights, run_result.detail.run, np.arange(first, steps + 1, STEPS_BETWEEN_ROWS)
     )
-    fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
-    return with_estimated_errors(run, fine, rerun, RUNGE_KUTTA_ORDER, path.step)
+    fine = series(outputs, first * road_path.step)._replace(units=dict(zip(names, units, strict=True)))
+    return with_estimated_errors(run_result, fine, rerun, RUNGE_KUTTA_ORDER, road_path.step)
 
 
-def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
+def _road_at_half_spacing(road_heights: np.ndarray) -> np.ndarray:
     """Returns road heights at half the spacing, interpolated linearly."""
-    halved = np.repeat(table, 2, axis=0)[:-1]
-    halved[1::2] = (table[:-1] + table[1:]) / 2.0
+    halved = np.repeat(road_heights, 2, axis=0)[:-1]
+    halved[1::2] = (road_heights[:-1] + road_heights[1:]) / 2.0
     return halved
 
 
 @dataclass(frozen=True)
-class Ride:
+class EngineRide:
     """A ride in an engine: states at every time step (``run``), and outputs (m, p) at ``times`` (m,) in s from the
     first output on.
 
@@ -320,24 +338,24 @@ class Ride:
     outputs: np.ndarray
     rows: np.ndarray
 
-    def output_values(self, name: str) -> np.ndarray:
+    def output_values(self, output_name: str) -> np.ndarray:
         """Returns the values (m,) of an output, by its name."""
-        return self.outputs[:, self.names.index(name)]
+        return self.outputs[:, self.names.index(output_name)]
 
     @property
-    def interval(self) -> float:
+    def output_interval(self) -> float:
         """Time (s) between rows of outputs."""
         return float(self.times[1] - self.times[0])
 
-    def densities(self, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    def densities(self, highest_frequency: float) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (f,) in Hz, and one-sided power spectral densities (f, p) of the outputs by Welch's method.
 
-        They end at ``highest`` (Hz), and begin where windows of 4 s no longer leak.
+        They end at ``highest_frequency`` (Hz), and begin where windows of 4 s no longer leak.
         """
         from scipy.signal import welch
 
-        f, density = welch(self.outputs, 1 / self.interval, nperseg=round(4 / self.interval), axis=0)
-        shown = (f > 0.4) & (f <= highest)
+        f, density = welch(self.outputs, 1 / self.output_interval, nperseg=round(4 / self.output_interval), axis=0)
+        shown = (f > 0.4) & (f <= highest_frequency)
         return f[shown], density[shown]
 
 
@@ -347,58 +365,79 @@ def drive_over_road(
     road: RoadPath,
     duration: float,
     *,
-    seed: int = 0,
-    skipped: float = 0.0,
-    stride: int = 1,
-) -> Ride:
+    road_seed: int = 0,
+    skipped_time: float = 0.0,
+    steps_per_output: int = 1,
+) -> EngineRide:
     """Simulate a ride in an engine over a random road, from rest for about ``duration`` (s). Outputs begin after
-    ``skipped`` (s) and are ``stride`` steps apart.
+    ``skipped_time`` (s) and are ``steps_per_output`` steps apart.
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
-    table = road.wheel_heights_and_rates(int(np.ceil(duration / road.step)), seed)
-    return ride_over(engine, vehicle, road, table, skipped=skipped, stride=stride)
+    table = road.wheel_heights_and_rates(int(np.ceil(duration / road.step)), road_seed)
+    return ride_over_heights(engine, vehicle, road, table, skipped_time=skipped_time, steps_per_output=steps_per_output)
 
 
-def ride_over(
-    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, stride: int = 1
-) -> Ride:
-    """Simulate a ride in an engine over the road heights in ``table``, otherwise as ``drive_over_road``."""
+def ride_over_heights(
+    engine: str,
+    vehicle: SpatialVehicle,
+    road: RoadPath,
+    road_heights: np.ndarray,
+    *,
+    skipped_time: float = 0.0,
+    steps_per_output: int = 1,
+) -> EngineRide:
+    """Simulate a ride in an engine over the road heights in ``road_heights``, otherwise as ``drive_over_road``."""
     check_rates(vehicle, road.excitation)
-    steps = len(table) // 2
-    model = _engine_model(engine, vehicle, road, table)
+    steps = len(road_heights) // 2
+    model = _engine_model(engine, vehicle, road, road_heights)
     run = model.run()
-    recorded_steps = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, stride)
-    return _outputs_at_steps(model, vehicle, road, table, run, recorded_steps)
+    recorded_steps = np.arange(int(np.ceil(skipped_time / road.step - 1e-9)), steps + 1, steps_per_output)
+    return _outputs_at_steps(model, vehicle, road, road_heights, run, recorded_steps)
 
 
-def _engine_model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> SpatialModel:
-    settings = Settings(INTEGRATORS[engine], road.step, len(table) // 2 * road.step)
-    return build(engine, vehicle, settings, road.speed, table)
+def _engine_model(engine: str, vehicle: SpatialVehicle, road: RoadPath, road_heights: np.ndarray) -> SpatialModel:
+    settings = Settings(INTEGRATORS[engine], road.step, len(road_heights) // 2 * road.step)
+    return build(engine, vehicle, settings, road.speed, road_heights)
 
 
 def outputs_at_other_steps(
-    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, step_numbers: np.ndarray
-) -> Ride:
-    """Computes the outputs of an engine's run at other steps, ``step_numbers`` (m,)."""
-    return _outputs_at_steps(_engine_model(engine, vehicle, road, table), vehicle, road, table, run, step_numbers)
+    engine: str,
+    vehicle: SpatialVehicle,
+    road: RoadPath,
+    road_heights: np.ndarray,
+    trajectory: Trajectory,
+    step_indices: np.ndarray,
+) -> EngineRide:
+    """Computes the outputs of an engine's run at other steps, ``step_indices`` (m,)."""
+    return _outputs_at_steps(
+        _engine_model(engine, vehicle, road, road_heights), vehicle, road, road_heights, trajectory, step_indices
+    )
 
 
 def _outputs_at_steps(
-    model: SpatialModel,
+    engine_model: SpatialModel,
     vehicle: SpatialVehicle,
     road: RoadPath,
-    table: np.ndarray,
-    run: Trajectory,
-    step_numbers: np.ndarray,
-) -> Ride:
-    """Computes the outputs of a run at the steps ``step_numbers`` (m,) with a built model."""
+    road_heights: np.ndarray,
+    trajectory: Trajectory,
+    step_indices: np.ndarray,
+) -> EngineRide:
+    """Computes the outputs of a run at the steps ``step_indices`` (m,) with a built model."""
     linear = linearise(vehicle, road.speed)
     accelerations = np.array(
-        [model.acceleration(i * road.step, run.positions[i], run.rates[i], table[2 * i]) for i in step_numbers]
+        [
+            engine_model.acceleration(i * road.step, trajectory.positions[i], trajectory.rates[i], road_heights[2 * i])
+            for i in step_indices
+        ]
     )
     rows = np.column_stack(
-        [accelerations, run.rates[step_numbers], run.positions[step_numbers], table[2 * step_numbers]]
+        [
+            accelerations,
+            trajectory.rates[step_indices],
+            trajectory.positions[step_indices],
+            road_heights[2 * step_indices],
+        ]
     )
     outputs = rows @ np.array([factors_of_output(output) for output in linear.outputs]).T
     bent = {spring.name for spring in vehicle.springs if spring.is_nonlinear}
@@ -414,7 +453,9 @@ def _outputs_at_steps(
             )
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
-    return Ride(linear.names, run, step_numbers * road.step - step_numbers[0] * road.step, outputs, step_numbers)
+    return EngineRide(
+        linear.names, trajectory, step_indices * road.step - step_indices[0] * road.step, outputs, step_indices
+    )
 
 
 def factors_of_output(output: Output) -> np.ndarray:

@@ -114,7 +114,7 @@ def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear
     return lambda speed: only
 
 
-def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad:
+def road_of(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) -> TwoTrackRoad:
     """Returns the scene's road of two tracks. The level holds at half_track of [road], by default half the front
     track.
     """
@@ -129,7 +129,7 @@ def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad
         )
     level = road.level if road.iso8608 is None else level_of_class(road.iso8608)
     return road_of_level(
-        half_track_of(scene, wheels), level, corners=(road.corner_mean, road.corner_roll), cutoff=road.cutoff
+        half_track_of(scene, wheel_positions), level, corners=(road.corner_mean, road.corner_roll), cutoff=road.cutoff
     )
 
 
@@ -144,23 +144,23 @@ def fitted_road(scene: RideScene) -> "FittedRoad":
     return fit_road(read_tracks(path, road.track_width, first_station=road.first, last_station=road.last))
 
 
-def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
+def half_track_of(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) -> float:
     """Distance (m) of the road's tracks from the centre line."""
     if scene.road.file is not None:
         return scene.road.track_width / 2.0
-    return scene.road.half_track or half_track(wheels) or ONE_TRACK_OFFSET
+    return scene.road.half_track or half_track(wheel_positions) or ONE_TRACK_OFFSET
 
 
 def excitation_of(
-    scene: RideScene, wheels: tuple[WheelPosition, ...], case: tuple[str, str] | None = None
+    scene: RideScene, wheel_positions: tuple[WheelPosition, ...], correlation_case: tuple[str, str] | None = None
 ) -> Excitation:
-    """Returns the road's excitation of the wheels with the scene's effects; ``case`` : correlations left to right and
-    front to rear, by default the scene's.
+    """Returns the road's excitation of the wheels with the scene's effects; ``correlation_case`` : correlations left to
+    right and front to rear, by default the scene's.
     """
-    left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
-    placed = placed_wheels(scene, wheels)
+    left_right, front_rear = correlation_case or (scene.road.left_right, scene.road.front_rear)
+    placed = placed_wheels(scene, wheel_positions)
     try:
-        heights = road_excitation(road_of(scene, wheels), placed, left_right, front_rear)
+        heights = road_excitation(road_of(scene, wheel_positions), placed, left_right, front_rear)
     except InputError as error:
         if error.file:
             raise
@@ -184,23 +184,27 @@ def scene_errors(scene: RideScene) -> Iterator[None]:
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed) from None
 
 
-def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
+def placed_wheels(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
     """Returns the wheels with the lateral positions at which they meet the road: at their own y, or in the tracks of
     the first axle's wheels.
 
     A vehicle without a width runs on one of the tracks where the road is given by the level of a track.
     """
-    if not any(wheel.y for wheel in wheels):
-        return wheels_on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
+    if not any(wheel.y for wheel in wheel_positions):
+        return (
+            wheels_on_track(wheel_positions, half_track_of(scene, wheel_positions))
+            if scene.road.q_mean is None
+            else wheel_positions
+        )
     if scene.road.wheels == "own":
-        return wheels
-    if half_track(wheels) == 0.0:
+        return wheel_positions
+    if half_track(wheel_positions) == 0.0:
         raise InputError(scene.file, "road.wheels", "tracks", "the first axle has no two tracks in which to run")
-    return wheels_in_tracks(wheels)
+    return wheels_in_tracks(wheel_positions)
 
 
-def wheels_in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
+def wheels_in_tracks(wheel_positions: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
     """Returns the wheels moved laterally into the track of the first axle's outermost wheel on the same side."""
-    first = [wheel.y for wheel in wheels if wheel.axle == 0]
+    first = [wheel.y for wheel in wheel_positions if wheel.axle == 0]
     tracks = {1.0: max(first), -1.0: min(first)}
-    return tuple(replace(wheel, y=tracks[copysign(1.0, wheel.y)] if wheel.y else 0.0) for wheel in wheels)
+    return tuple(replace(wheel, y=tracks[copysign(1.0, wheel.y)] if wheel.y else 0.0) for wheel in wheel_positions)

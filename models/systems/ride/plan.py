@@ -61,7 +61,7 @@ def describe(scene: RideScene) -> str:
     replaced = any(spring.is_nonlinear for spring in vehicle.springs) and not (
         vehicle.lifts or scene.vehicle.small_motion
     )
-    assumed = assumption_lines(assumptions(scene, vehicle, replaced=replaced))
+    assumed = assumption_lines(assumptions(scene, vehicle, gains_replace_curves=replaced))
     return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in lines), *effect_lines(scene), *assumed])
 
 
@@ -77,9 +77,9 @@ FRONT_REAR_TEXTS = {
 }
 
 
-def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[str, str]:
+def noise_sharing_text(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) -> tuple[str, str]:
     """Texts on the correlation of the road under left and right wheels, and under the axles."""
-    road, placed = scene.road, placed_wheels(scene, wheels)
+    road, placed = scene.road, placed_wheels(scene, wheel_positions)
     y_text = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
     if len({wheel.y for wheel in placed}) == 1:
         y_text = f"{placed[0].y:g} m for all: one track"

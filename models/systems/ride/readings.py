@@ -58,39 +58,43 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
     return {name: float(np.sqrt(isotropic / plain) - 1.0) for name, plain, isotropic in pairs if plain > 0}
 
 
-def largest_gap(sweep: Sweep, reference: Sweep) -> float:
+def largest_deviation_difference(sweep: Sweep, reference_sweep: Sweep) -> float:
     """Largest difference of standard deviations between two sweeps, where both are finite, divided by the output's
     largest standard deviation on any road.
     """
-    finite = np.isfinite(reference.deviation) & np.isfinite(sweep.deviation)
+    finite = np.isfinite(reference_sweep.deviation) & np.isfinite(sweep.deviation)
     known, compared_deviations = (
-        np.where(finite, compared_sweep.deviation, 0.0) for compared_sweep in (reference, sweep)
+        np.where(finite, compared_sweep.deviation, 0.0) for compared_sweep in (reference_sweep, sweep)
     )
     largest = known.max(axis=(0, 1))  # an output may be zero on one of the roads
     return float(np.max(np.abs(compared_deviations - known) / np.where(largest > 0, largest, 1.0)))
 
 
-def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str]) -> np.ndarray:
+def largest_deviation_errors(
+    sweep: Sweep, case_index: int, true_deviations: np.ndarray, output_names: list[str]
+) -> np.ndarray:
     """Largest relative error (outputs,) over the speeds of the standard deviations in a case of a sweep, compared with
     true standard deviations (speeds, outputs).
 
     NaN for an output that the sweep's vehicle does not have.
     """
-    errors = np.full(len(names), np.nan)
-    for i, name in enumerate(names):
+    errors = np.full(len(output_names), np.nan)
+    for i, name in enumerate(output_names):
         if name in sweep.outputs:
-            deviation = sweep.deviation[case, :, sweep.outputs.index(name)]
-            are_known = np.isfinite(deviation) & np.isfinite(truth[:, i]) & (truth[:, i] > 0)
-            gaps = deviation[are_known] / truth[are_known, i] - 1.0
+            deviation = sweep.deviation[case_index, :, sweep.outputs.index(name)]
+            are_known = np.isfinite(deviation) & np.isfinite(true_deviations[:, i]) & (true_deviations[:, i] > 0)
+            gaps = deviation[are_known] / true_deviations[are_known, i] - 1.0
             errors[i] = gaps[np.argmax(np.abs(gaps))] if len(gaps) else np.nan
     return errors
 
 
-def quasi_stationary_gaps(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> np.ndarray:
+def quasi_stationary_errors(
+    varying_speed_deviations: VaryingSpeed, quasi_stationary_deviations: np.ndarray
+) -> np.ndarray:
     """Errors (instants, outputs) of quasi-stationary standard deviations along a drive, divided by each output's
     largest standard deviation in the drive; 0 where an output does not move.
     """
-    are_known = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
-    known = np.where(are_known, drive.deviation, 0.0)
+    are_known = np.isfinite(quasi_stationary_deviations) & np.isfinite(varying_speed_deviations.deviation)
+    known = np.where(are_known, varying_speed_deviations.deviation, 0.0)
     largest = known.max(axis=0)
-    return (np.where(are_known, quasi_stationary, 0.0) - known) / np.where(largest > 0, largest, 1.0)
+    return (np.where(are_known, quasi_stationary_deviations, 0.0) - known) / np.where(largest > 0, largest, 1.0)

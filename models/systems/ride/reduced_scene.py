@@ -17,7 +17,7 @@ class ReducedScene:
     degrees of freedom, and nonlinear spring laws that are replaced by gains (``linearised_laws``).
     """
 
-    ride: RideScene
+    ride_scene: RideScene
     vehicle: SpatialVehicle
     massless: frozenset[str] = frozenset()
     rigid: frozenset[str] = frozenset()
@@ -25,41 +25,43 @@ class ReducedScene:
     linearised_laws: frozenset[str] = frozenset()
 
     @classmethod
-    def complete(cls, ride: RideScene) -> "ReducedScene":
+    def complete(cls, ride_scene: RideScene) -> "ReducedScene":
         """Returns a ride scene with its complete vehicle, from which nothing is left out."""
-        return cls(ride, vehicle_of(ride))
+        return cls(ride_scene, vehicle_of(ride_scene))
 
     @property
     def limits(self) -> Limits:
         """Massless bodies, rigid springs and locked degrees of freedom by which the vehicle is reduced."""
         return Limits(self.massless, self.rigid, self.locked)
 
-    def reduced_further(self, **names: Iterable[object]) -> "ReducedScene":
+    def reduced_further(self, **names_by_set: Iterable[object]) -> "ReducedScene":
         """Returns the scene with names added to its sets of left-out effects, for example massless = ["wheel"]."""
-        return replace(self, **{key: getattr(self, key) | set(added_names) for key, added_names in names.items()})
+        return replace(
+            self, **{key: getattr(self, key) | set(added_names) for key, added_names in names_by_set.items()}
+        )
 
-    def on_road(self, **changes: object) -> "ReducedScene":
+    def on_road(self, **road_changes: object) -> "ReducedScene":
         """Returns the reduced scene with other values of keys of [road]."""
-        road = self.ride.road.model_copy(update=changes)
-        return replace(self, ride=self.ride.model_copy(update={"road": road}))
+        road = self.ride_scene.road.model_copy(update=road_changes)
+        return replace(self, ride_scene=self.ride_scene.model_copy(update={"road": road}))
 
-    def without_tables(self, *names: str) -> "ReducedScene":
+    def without_tables(self, *table_names: str) -> "ReducedScene":
         """Returns the reduced scene without some of its tables [effects.NAME]."""
-        ride = without_own(self.ride, *names)
-        return replace(self, ride=ride, vehicle=vehicle_of(ride))
+        ride = without_own(self.ride_scene, *table_names)
+        return replace(self, ride_scene=ride, vehicle=vehicle_of(ride))
 
     def excitation(self) -> Excitation:
         """Returns the road's excitation of the wheels; axles that meet the same heights at the same time share one
         filter.
         """
-        road = excitation_of(self.ride, wheels(self.vehicle))
+        road = excitation_of(self.ride_scene, wheels(self.vehicle))
         if road.independent or any(road.lengths):
             return road
         return replace(road, heights=(sum(road.heights),), lengths=(0.0,))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
-class Effect:
+class OmissibleEffect:
     """An effect of a ride scene that can be left out. without : function that leaves it out; says : text on what
     leaving it out means.
 
@@ -79,7 +81,7 @@ class Effect:
     has_table: bool = False
 
 
-def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
+def refusal_reason(omitted_effects: Iterable[OmissibleEffect]) -> str:
     """Returns the reason why some effects may not be left out together, with the remedy; empty where they may."""
     omitted_effects = tuple(omitted_effects)
     names = {effect.name for effect in omitted_effects}
@@ -93,11 +95,11 @@ def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
     return ""
 
 
-def reduced_without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
+def reduced_without(reduced_scene: ReducedScene, omitted_effects: Iterable[OmissibleEffect]) -> ReducedScene:
     """Returns the scene without some effects. Effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:
-        scene = scene.without_tables(*tables)
+        reduced_scene = reduced_scene.without_tables(*tables)
     for effect in omitted_effects:
-        scene = scene if effect.has_table else effect.without(scene)
-    return scene
+        reduced_scene = reduced_scene if effect.has_table else effect.without(reduced_scene)
+    return reduced_scene

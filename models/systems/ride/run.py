@@ -17,16 +17,22 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED_LAW_ACCURACY, MATRIX_ACCURACY, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, needs_run_in_time, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, checked_speeds, watched_deviations
+from models.systems.ride.watched import (
+    JUDGED_SPEEDS,
+    MotionAlongDrive,
+    SpectralMotion,
+    checked_speeds,
+    watched_deviations,
+)
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
 if TYPE_CHECKING:
-    from models.systems.ride.nonlinear import Progress, Sampling
+    from models.systems.ride.nonlinear import Progress, RunSampling
 
-AS_WRITTEN = "as in the scene"
+CORRELATIONS_AS_WRITTEN = "as in the scene"
 """Name of the scene's correlation of the road in a result."""
-ANY_SPEED = 1.0
+ARBITRARY_SPEED = 1.0
 """Speed (m/s) at which a vehicle of a drive at varying speed is linearised: its matrices do not depend on the speed."""
 QUASI_STATIONARY_SPEEDS = 90
 """Number of constant speeds, from standstill on, between which quasi-stationary deviations of a drive are
@@ -43,7 +49,7 @@ class SweepPoints:
     """
 
     speeds: Sequence[float] | None = None
-    correlations: Mapping[str, tuple[str, str] | None] = field(default_factory=lambda: {AS_WRITTEN: None})
+    correlations: Mapping[str, tuple[str, str] | None] = field(default_factory=lambda: {CORRELATIONS_AS_WRITTEN: None})
 
 
 def run(
@@ -51,37 +57,41 @@ def run(
     engine: str = "",
     *,
     vehicle: SpatialVehicle | None = None,
-    points: SweepPoints | None = None,
-    sampling: "Sampling | None" = None,
+    sweep_points: SweepPoints | None = None,
+    sampling: "RunSampling | None" = None,
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
 ) -> Result:
     """Run a ride scene by covariances of the linear vehicle of an engine, or in time. Raises InputError, Refused or
     RunFailed.
 
-    vehicle, points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and tyres that
-    may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one random road.
+    vehicle, sweep_points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and
+    tyres that may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one
+    random road.
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
     are always checked.
 
-    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, for an engine in time, a ``Ride``.
+    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``NonlinearRide`` or, for an engine in time, a
+    ``EngineRide``.
     """
     engine = engine or "reference"
     with scene_errors(scene):
         if scene.drive is not None:
             return _drive_deviations(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or needs_run_in_time(scene)):
-            return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
+            return _deviations_by_speed(
+                scene, engine, vehicle or vehicle_of(scene), sweep_points or SweepPoints(), error
+            )
         from models.systems.ride import nonlinear
 
-        vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
+        vehicle, sampling = vehicle_of(scene), sampling or nonlinear.RunSampling()
         if engine == "reference":
             return nonlinear.linearised_result(scene, vehicle, sampling, progress, error)
         return nonlinear.engine_result(scene, engine, vehicle, sampling, error)
 
 
 def _deviations_by_speed(
-    scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, sweep_points: SweepPoints, estimate_error: bool
 ) -> Result:
     """Result with standard deviations (correlation, speed, output) at constant speeds. Assumptions are checked on the
     scene's road, or on the last road if the scene's is not among them.
@@ -89,9 +99,9 @@ def _deviations_by_speed(
     from models.ride.sweep import variance_sweep
 
     assert scene.speeds is not None
-    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in points.correlations.items()}
+    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in sweep_points.correlations.items()}
     start_time, linear = time.process_time(), linear_vehicle(vehicle, engine)
-    swept = variance_sweep(linear, roads, points.speeds or scene.speeds.all(), scene.weighting)
+    swept = variance_sweep(linear, roads, sweep_points.speeds or scene.speeds.all(), scene.weighting)
     labelled = result(
         scene,
         {"deviation": Channel(("correlation", "speed", "output"), swept.deviation)},
@@ -106,11 +116,11 @@ def _deviations_by_speed(
         seconds=time.process_time() - start_time,
         detail=swept,
     )
-    road = roads.get(AS_WRITTEN, [*roads.values()][-1])
+    road = roads.get(CORRELATIONS_AS_WRITTEN, [*roads.values()][-1])
     with_assumptions(
-        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, checked_speeds(swept.speeds), {}))
+        labelled, assumptions(scene, vehicle, SpectralMotion(vehicle, linear, road, checked_speeds(swept.speeds), {}))
     )
-    if not error:
+    if not estimate_error:
         return labelled
     matrix_accuracy = (
         MATRIX_ACCURACY
@@ -120,7 +130,7 @@ def _deviations_by_speed(
     return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, matrix_accuracy)
 
 
-def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
+def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, estimate_error: bool) -> Result:
     """Result with standard deviations (time, output) along a drive, and with the quasi-stationary deviations that
     constant driving at each speed would give.
     """
@@ -129,13 +139,13 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
 
     assert scene.drive is not None
     start_time, weightings = time.process_time(), scene.weighting
-    linear, road = linear_vehicle(vehicle, engine)(ANY_SPEED), excitation_of(scene, wheels(vehicle))
+    linear, road = linear_vehicle(vehicle, engine)(ARBITRARY_SPEED), excitation_of(scene, wheels(vehicle))
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY_SPEEDS)
     quasi_stationary_deviations = quasi_stationary(linear, road, speeds, weightings=weightings)
 
-    def deviations_along(stride: int) -> np.ndarray:
-        kept_speeds = np.unique([*range(0, len(speeds), stride), len(speeds) - 1])
+    def deviations_along(steps_per_row: int) -> np.ndarray:
+        kept_speeds = np.unique([*range(0, len(speeds), steps_per_row), len(speeds) - 1])
         return np.column_stack(
             [
                 np.interp(drive.speed, speeds[kept_speeds], column)
@@ -161,10 +171,10 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
         seconds=time.process_time() - start_time,
         detail=drive,
     )
-    spectral = Spectral(
+    spectral = SpectralMotion(
         vehicle, lambda _: linear, road, checked_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
     )
     with_assumptions(
         labelled, assumptions(scene, vehicle, MotionAlongDrive(watched_deviations(vehicle, drive.deviation), spectral))
     )
-    return with_error_of_drive(labelled, scene, linear, road, deviations_along) if error else labelled
+    return with_error_of_drive(labelled, scene, linear, road, deviations_along) if estimate_error else labelled

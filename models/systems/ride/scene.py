@@ -20,7 +20,7 @@ FrontRearCorrelation = Literal["delayed", "uncorrelated", "equal"]
 WheelTracks = Literal["own", "tracks"]
 
 
-class RideVehicle(Strict):
+class RideVehicleTable(Strict):
     """[vehicle]: a vehicle file, and the operating point about which the vehicle is linearised."""
 
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
@@ -29,7 +29,7 @@ class RideVehicle(Strict):
     accept: list[Query] = accepted_queries_field()
 
 
-class Road(Strict):
+class RideRoadTable(Strict):
     """[road]: random road of two tracks, made of a mean and a roll process, with published values or fitted to a
     measured road.
     """
@@ -54,15 +54,15 @@ class Road(Strict):
     wheels: WheelTracks = Field(default="own", description="each at its own y, or in the front wheels' tracks")
 
 
-class Drive(Strict):
+class DriveTable(Strict):
     """[drive]: a speed that varies over time, linear between points."""
 
     time: list[float] = Field(description="times in s, rising")
     speed: list[float] = Field(description="speeds in m/s at these times, 0 for standstill")
 
-    def profile(self, file: str = "") -> SpeedProfile:
+    def profile(self, scene_path: str = "") -> SpeedProfile:
         """Returns the speed over time of the drive. Raises InputError for times that do not rise or negative speeds."""
-        return SpeedProfile(self.time, self.speed, file)
+        return SpeedProfile(self.time, self.speed, scene_path)
 
 
 class RideScene(SceneFile):
@@ -72,10 +72,10 @@ class RideScene(SceneFile):
 
     system: Literal["ride"] = "ride"
     study: str = Field(default="ride", description="the study that runs the scene")
-    vehicle: RideVehicle
-    road: Road = Road()
+    vehicle: RideVehicleTable
+    road: RideRoadTable = RideRoadTable()
     speeds: Speeds | None = Field(default=None, description="constant speeds")
-    drive: Drive | None = Field(default=None, description="a speed that varies")
+    drive: DriveTable | None = Field(default=None, description="a speed that varies")
     weighting: dict[str, Literal["Wk", "Wd"]] = Field(default_factory=dict, description="ISO 2631-1, output by output")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
@@ -88,18 +88,18 @@ class RideScene(SceneFile):
             raise InputError(self.file, "drive", None, "effects are chosen at constant speeds: give [speeds]")
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> RideScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> RideScene:
     """Build a checked ride scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(RideScene, table, file, folder)
+    scene = checked(RideScene, scene_tables, scene_path, scene_folder)
     if (scene.speeds is None) == (scene.drive is None):
-        raise InputError(file, "speeds", None, "give either the table speeds or the table drive, and not both")
+        raise InputError(scene_path, "speeds", None, "give either the table speeds or the table drive, and not both")
     if scene.speeds is not None:
-        check_speeds(file, scene.speeds)
+        check_speeds(scene_path, scene.speeds)
     if scene.drive is not None:
-        scene.drive.profile(file)
-    _check_road(file, scene.road)
+        scene.drive.profile(scene_path)
+    _check_road(scene_path, scene.road)
     return with_effect_tables(scene)
 
 
@@ -109,30 +109,39 @@ KEYS_REPLACED_BY_FILE = ("level", "iso8608", "q_mean", "q_roll", "corner_mean", 
 """Keys of [road] whose values are fitted where a measured road file is given."""
 
 
-def _check_road(file: str, road: Road) -> None:
-    foreign = KEYS_OF_ROAD_FILE if road.file is None else KEYS_REPLACED_BY_FILE
+def _check_road(scene_path: str, road_table: RideRoadTable) -> None:
+    foreign = KEYS_OF_ROAD_FILE if road_table.file is None else KEYS_REPLACED_BY_FILE
     for name in foreign:
-        if name in road.model_fields_set:
-            allowed = "has no meaning without road.file" if road.file is None else "is fitted to road.file: drop it"
-            raise InputError(file, f"road.{name}", getattr(road, name), allowed)
-    _check_intensities(file, road)
+        if name in road_table.model_fields_set:
+            allowed = (
+                "has no meaning without road.file" if road_table.file is None else "is fitted to road.file: drop it"
+            )
+            raise InputError(scene_path, f"road.{name}", getattr(road_table, name), allowed)
+    _check_intensities(scene_path, road_table)
     for name in ("corner_mean", "corner_roll"):
-        if road.cutoff is not None and road.cutoff <= getattr(road, name):
-            allowed = f"must be above road.{name}, {getattr(road, name):g} rad/m"
-            raise InputError(file, "road.cutoff", road.cutoff, allowed)
+        if road_table.cutoff is not None and road_table.cutoff <= getattr(road_table, name):
+            allowed = f"must be above road.{name}, {getattr(road_table, name):g} rad/m"
+            raise InputError(scene_path, "road.cutoff", road_table.cutoff, allowed)
 
 
-def _check_intensities(file: str, road: Road) -> None:
-    given_intensities = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
+def _check_intensities(scene_path: str, road_table: RideRoadTable) -> None:
+    given_intensities = [name for name in ("q_mean", "q_roll") if getattr(road_table, name) is not None]
     if len(given_intensities) == 1:
         missing_intensity = "q_roll" if given_intensities == ["q_mean"] else "q_mean"
         raise InputError(
-            file, f"road.{missing_intensity}", None, f"is missing: it belongs to road.{given_intensities[0]}"
+            scene_path, f"road.{missing_intensity}", None, f"is missing: it belongs to road.{given_intensities[0]}"
         )
-    if given_intensities and not road.q_mean and not road.q_roll:
-        raise InputError(file, "road.q_mean", road.q_mean, "is 0, and road.q_roll, too: this is no road")
+    if given_intensities and not road_table.q_mean and not road_table.q_roll:
+        raise InputError(scene_path, "road.q_mean", road_table.q_mean, "is 0, and road.q_roll, too: this is no road")
     for name in ("level", "iso8608", "half_track") if given_intensities else ():
-        if name in road.model_fields_set:
-            raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
-    if road.iso8608 is not None and "level" in road.model_fields_set:
-        raise InputError(file, "road.level", road.level, f"is that of class {road.iso8608} already: drop one of them")
+        if name in road_table.model_fields_set:
+            raise InputError(
+                scene_path, f"road.{name}", getattr(road_table, name), "is not read beside q_mean and q_roll"
+            )
+    if road_table.iso8608 is not None and "level" in road_table.model_fields_set:
+        raise InputError(
+            scene_path,
+            "road.level",
+            road_table.level,
+            f"is that of class {road_table.iso8608} already: drop one of them",
+        )

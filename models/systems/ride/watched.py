@@ -27,7 +27,7 @@ JUDGED_SPEEDS = 5
 class WatchedMotion(Protocol):
     """Protocol of the motion of a vehicle's parts in a run; motions have the names of ``watched_outputs``."""
 
-    def motion_of_part(self, name: str) -> np.ndarray | Gaussian:
+    def motion_of_part(self, motion_name: str) -> np.ndarray | Gaussian:
         """Returns the values of a part's motion at every row of the run, or its Gaussian statistics."""
         ...
 
@@ -52,17 +52,17 @@ def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
     return tuple(watched_list)
 
 
-def watched_vehicle(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
+def watched_vehicle(linear_vehicle: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
     """Returns a linear vehicle, of any engine, with the outputs of ``watched_outputs`` and the slip angles (rad) at a
     speed (m/s).
     """
     watched = replace(vehicle, outputs=watched_outputs(vehicle))
     rows = linearise(watched, speed).outputs if vehicle.limits else outputs(watched, Kinematics(watched))
-    return replace(linear, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
+    return replace(linear_vehicle, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
 
 
-def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
-    named = {row.name: row for row in rows}
+def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[Output, ...], speed: float) -> Iterator[Output]:
+    named = {row.name: row for row in outputs}
     for force in vehicle.side_forces:
         side, roll, yaw = (named[f"{quantity_name} {force.name}"] for quantity_name in ("side velocity", "roll", "yaw"))
         displacement = force.roll_steer * roll.displacement_factors + yaw.displacement_factors
@@ -85,7 +85,7 @@ def checked_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Spectral:
+class SpectralMotion:
     """Gaussian motion of a vehicle's parts from covariances at constant speeds (m/s). ``means`` (speeds,) : of motions
     whose mean is not the rest position, by name.
     """
@@ -96,10 +96,10 @@ class Spectral:
     speeds: Sequence[float]
     means: Mapping[str, np.ndarray]
 
-    def motion_of_part(self, name: str) -> Gaussian:
+    def motion_of_part(self, motion_name: str) -> Gaussian:
         """Returns the Gaussian statistics of a part's motion at every speed."""
-        mean = self.means.get(name, np.zeros(len(self.speeds)))
-        return Gaussian(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
+        mean = self.means.get(motion_name, np.zeros(len(self.speeds)))
+        return Gaussian(mean, self._deviations[motion_name], [f"at {speed:g} m/s" for speed in self.speeds])
 
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
@@ -123,22 +123,22 @@ class MotionAlongDrive:
     """
 
     deviations: Mapping[str, np.ndarray]
-    speed_by_speed: Spectral
+    speed_by_speed: SpectralMotion
 
-    def motion_of_part(self, name: str) -> Gaussian:
+    def motion_of_part(self, motion_name: str) -> Gaussian:
         """Returns the Gaussian statistics of a part's motion at every instant of the drive, or at some speeds."""
-        if name in self.deviations:
-            deviation = self.deviations[name]
+        if motion_name in self.deviations:
+            deviation = self.deviations[motion_name]
             return Gaussian(np.zeros(len(deviation)), deviation)
-        return self.speed_by_speed.motion_of_part(name)
+        return self.speed_by_speed.motion_of_part(motion_name)
 
 
-def watched_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
+def watched_deviations(vehicle: SpatialVehicle, output_deviations: np.ndarray) -> dict[str, np.ndarray]:
     """Returns those columns of the standard deviations (rows, outputs) of a vehicle's outputs that are motions of
     ``watched_outputs``, by name.
     """
     names_of_outputs = {replace(output, name=""): output.name for output in watched_outputs(vehicle)}
-    pairs = zip(vehicle.outputs, deviation.T, strict=False)  # weighted ones come last
+    pairs = zip(vehicle.outputs, output_deviations.T, strict=False)  # weighted ones come last
     return {
         names_of_outputs[unnamed]: values
         for output, values in pairs
@@ -157,8 +157,8 @@ class MotionInRun:
     rates: np.ndarray
     heights: np.ndarray
 
-    def motion_of_part(self, name: str) -> np.ndarray:
+    def motion_of_part(self, motion_name: str) -> np.ndarray:
         """Returns the values of a part's motion at every row of the run."""
-        row = {output.name: output for output in self.watched_vehicle.outputs}[name]
+        row = {output.name: output for output in self.watched_vehicle.outputs}[motion_name]
         road = np.concatenate([row.road_factors, row.road_rate_factors])
         return self.positions @ row.displacement_factors + self.rates @ row.rate_factors + self.heights @ road

@@ -29,7 +29,7 @@ def describe(scene: SingleTrackScene) -> str:
     return "\n".join([scene.title, *lines_of_text, *assumption_lines(assumptions(scene))])
 
 
-def _axle_text(axle: object) -> str:
+def _axle_text(axle_table: object) -> str:
     """Text on the tyres of an axle: cornering stiffness, friction, sharpness of the bend between them."""
-    stiffness, friction, sharpness = (getattr(axle, name) for name in ("stiffness", "friction", "sharpness"))
+    stiffness, friction, sharpness = (getattr(axle_table, name) for name in ("stiffness", "friction", "sharpness"))
     return f"cornering stiffness {stiffness:.4g} of the load per rad, friction {friction:.4g}, bend {sharpness:.3g}"

@@ -52,11 +52,11 @@ IDENTIFIED_PARAMETERS = (
 """Parameters of the race car that are identified from the measurement, each as "scene key=lower:upper bound"."""
 
 
-def write_plain_table(source_path: Path, target_path: Path) -> Path:
+def write_plain_table(race_file_path: Path, table_path: Path) -> Path:
     """Write the race car's measurement as a table that scenes can read. Outliers are removed, columns are low-passed
     against aliasing, and one of DECIMATION_FACTOR samples is written.
     """
-    raw = _raw_columns(source_path)
+    raw = _raw_columns(race_file_path)
     period = float(np.median(np.diff(raw["t"])))
     columns = {name: (unit, raw[column][::DECIMATION_FACTOR]) for name, (column, unit) in RACE_COLUMNS.items()}
     for name, (column, unit) in list(RACE_COLUMNS.items())[1:]:
@@ -65,29 +65,29 @@ def write_plain_table(source_path: Path, target_path: Path) -> Path:
         filled = np.interp(raw["t"], raw["t"][known], cleaned[known])
         columns[name] = (
             unit,
-            low_passed(filled[:, None], period, 0.25 / period, str(source_path), column)[::DECIMATION_FACTOR, 0],
+            low_passed(filled[:, None], period, 0.25 / period, str(race_file_path), column)[::DECIMATION_FACTOR, 0],
         )
-    write_table(target_path, columns)
-    return target_path
+    write_table(table_path, columns)
+    return table_path
 
 
-def _raw_columns(source_path: Path) -> dict[str, np.ndarray]:
+def _raw_columns(race_file_path: Path) -> dict[str, np.ndarray]:
     """Read the columns of the race car's measurement, gzipped or not. Raises InputError where a column is missing or
     times do not rise.
     """
-    with gzip.open(source_path, "rt") if source_path.suffix == ".gz" else source_path.open() as file:
+    with gzip.open(race_file_path, "rt") if race_file_path.suffix == ".gz" else race_file_path.open() as file:
         head, *rows = list(csv.reader(file))
     for column, _ in RACE_COLUMNS.values():
         if column not in head:
-            raise InputError(source_path, column, None, "no such column in the race's file", tuple(head))
+            raise InputError(race_file_path, column, None, "no such column in the race's file", tuple(head))
     try:
         table = np.array(rows, float)
     except ValueError as error:
-        raise InputError(source_path, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
+        raise InputError(race_file_path, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
     raw = {column: table[:, head.index(column)] for column, _ in RACE_COLUMNS.values()}
     falls = np.flatnonzero(~(np.diff(raw["t"]) > 0.0))
     if len(falls):
         raise InputError(
-            source_path, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
+            race_file_path, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
         )
     return raw

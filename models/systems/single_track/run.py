@@ -19,7 +19,7 @@ from models.core.smoothing import low_passed
 from models.measured.drive import MeasuredDrive, read_drive
 from models.systems.single_track.assumptions import assumptions
 from models.systems.single_track.equations import march, motion_reports
-from models.systems.single_track.scene import SensorTable, SingleTrackScene
+from models.systems.single_track.scene import SensorErrorTable, SingleTrackScene
 
 SETTLING_DURATION = 1.0
 """Time (s) for which the first sample's steer angle and speed act before the drive, so that the drive begins in a
@@ -75,7 +75,7 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
 
 
 def _with_step_error(
-    run: Result, scene: SingleTrackScene, inputs_of_samples: np.ndarray, drive: MeasuredDrive
+    run_result: Result, scene: SingleTrackScene, input_samples: np.ndarray, measured_drive: MeasuredDrive
 ) -> Result:
     """Returns the result with the error of Heun's steps from sample to sample. It is estimated by steps of a half and
     of a quarter of that length, with inputs (n, 3) interpolated linearly between samples.
@@ -83,84 +83,84 @@ def _with_step_error(
     Raises RunFailed, whose ``partial`` is the result, where steps are too long for the tyres, as with stiff tyres in a
     slow drive.
     """
-    period = float(drive.times[1] - drive.times[0])
-    half, quarter = (_sensed_in_finer_steps(scene, inputs_of_samples, period, parts) for parts in (2, 4))
+    period = float(measured_drive.times[1] - measured_drive.times[0])
+    half, quarter = (_sensed_in_finer_steps(scene, input_samples, period, parts) for parts in (2, 4))
     estimates = {}
     for name, finer in quarter.items():
-        fine, values = half[name], np.asarray(run[name])
+        fine, values = half[name], np.asarray(run_result[name])
         order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), HEUN_ORDER)
         error = root_mean_square(fine - values) / (1.0 - 0.5**order)
         estimates[name] = estimate_rescaled(
-            Estimate(error, run.data[name].attrs["units"], 0.0, order, period), reference_size(values), period
+            Estimate(error, run_result.data[name].attrs["units"], 0.0, order, period), reference_size(values), period
         )
     return with_stated_errors(
-        run, estimates, "steps of a half and a quarter of the drive's sampling period", "s between samples"
+        run_result, estimates, "steps of a half and a quarter of the drive's sampling period", "s between samples"
     )
 
 
 def _sensed_in_finer_steps(
-    scene: SingleTrackScene, inputs_of_samples: np.ndarray, sample_period: float, parts_per_sample: int
+    scene: SingleTrackScene, input_samples: np.ndarray, sample_period: float, steps_per_sample: int
 ) -> dict[str, np.ndarray]:
-    """ESTIMATED_CHANNELS at the samples (n,), computed with ``parts_per_sample`` time steps between two samples."""
-    row_positions = np.linspace(0.0, len(inputs_of_samples) - 1.0, parts_per_sample * (len(inputs_of_samples) - 1) + 1)
+    """ESTIMATED_CHANNELS at the samples (n,), computed with ``steps_per_sample`` time steps between two samples."""
+    row_positions = np.linspace(0.0, len(input_samples) - 1.0, steps_per_sample * (len(input_samples) - 1) + 1)
     between = np.column_stack(
-        [np.interp(row_positions, np.arange(len(inputs_of_samples)), column) for column in inputs_of_samples.T]
+        [np.interp(row_positions, np.arange(len(input_samples)), column) for column in input_samples.T]
     )
-    motion, table = simulated_motion(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
-    sensed = sensor_channels(scene.sensors, inputs_of_samples, motion[::parts_per_sample], table[::parts_per_sample, 0])
+    motion, table = simulated_motion(scene, np.ascontiguousarray(between), sample_period / steps_per_sample)
+    sensed = sensor_channels(scene.sensors, input_samples, motion[::steps_per_sample], table[::steps_per_sample, 0])
     return {name: np.asarray(sensed[name].values) for name in ESTIMATED_CHANNELS}
 
 
-def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
+def equation_inputs(measured_drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
     """Steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2) of a measured drive, shape (n, 3): low-passed,
     with the steer angle corrected for the sensor's errors.
     """
-    period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
-    steer, speed = drive.steer, drive.speed
+    period, sensors = float(measured_drive.times[1] - measured_drive.times[0]), scene.sensors
+    steer, speed = measured_drive.steer, measured_drive.speed
     if scene.drive.low_pass:
         filtered = low_passed(
             np.column_stack([steer, speed]), period, scene.drive.low_pass, scene.file, "drive.low_pass"
         )
         steer, speed = filtered.T
     if sensors.steer_delay:
-        steer = np.interp(drive.times - sensors.steer_delay, drive.times, steer)
+        steer = np.interp(measured_drive.times - sensors.steer_delay, measured_drive.times, steer)
     steer = sensors.steer_ratio * steer + sensors.steer_offset
     return np.ascontiguousarray(np.column_stack([steer, speed, np.gradient(speed, period)]))
 
 
 def simulated_motion(
-    scene: SingleTrackScene, inputs: np.ndarray, sample_period: float
+    scene: SingleTrackScene, input_samples: np.ndarray, sample_period: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lateral velocity (m/s) and yaw rate (rad/s), shape (n, 2), and ``motion_reports`` (n, 7), for inputs
     ``sample_period`` (s) apart. The motion begins in the steady turn of the first sample.
     """
     parts = scene.car(), scene.front.axle(), scene.rear.axle()
-    settling = np.repeat(inputs[:1], max(2, round(SETTLING_DURATION / sample_period)), axis=0)
+    settling = np.repeat(input_samples[:1], max(2, round(SETTLING_DURATION / sample_period)), axis=0)
     first = march(*parts, settling, sample_period, (0.0, 0.0))[-1]
-    motion = march(*parts, inputs, sample_period, (float(first[0]), float(first[1])))
+    motion = march(*parts, input_samples, sample_period, (float(first[0]), float(first[1])))
     bad = ~(np.abs(motion[:, 1]) < LARGEST_YAW_RATE)
     if bad.any():
         row = int(bad.argmax())
         why = "the car turns faster than any car: check units and signs of the drive, and the tyres"
         raise RunFailed("reference", why, sample_period * row, motion[max(row - 1, 0)])
-    return motion, motion_reports(*parts, inputs, motion)
+    return motion, motion_reports(*parts, input_samples, motion)
 
 
 def sensor_channels(
-    sensors: SensorTable, inputs: np.ndarray, motion: np.ndarray, lateral_acceleration: np.ndarray
+    sensor_errors: SensorErrorTable, input_samples: np.ndarray, motion: np.ndarray, lateral_acceleration: np.ndarray
 ) -> dict[str, Channel]:
     """Readings of the car's sensors, offsets included, by the channel names of a measurement.
 
-    inputs (n, 3) : see ``equation_inputs``; motion (n, 2) : lateral velocity (m/s), yaw rate (rad/s);
+    input_samples (n, 3) : see ``equation_inputs``; motion (n, 2) : lateral velocity (m/s), yaw rate (rad/s);
     lateral_acceleration (n,) : of the centre of mass (m/s^2).
     """
-    slip = np.arctan2(motion[:, 0], inputs[:, 1]) + sensors.side_slip_offset
-    acceleration = sensors.acceleration_ratio * lateral_acceleration + sensors.acceleration_offset
+    slip = np.arctan2(motion[:, 0], input_samples[:, 1]) + sensor_errors.side_slip_offset
+    acceleration = sensor_errors.acceleration_ratio * lateral_acceleration + sensor_errors.acceleration_offset
     return {
-        "yaw rate": Channel("time", motion[:, 1] + sensors.yaw_rate_offset, "rad/s", "left positive"),
+        "yaw rate": Channel("time", motion[:, 1] + sensor_errors.yaw_rate_offset, "rad/s", "left positive"),
         "lateral acceleration": Channel("time", acceleration, "m/s^2", "of the centre of mass, left positive"),
         "side slip": Channel("time", slip, "rad", "of the centre of mass, left positive"),
         "lateral velocity": Channel("time", motion[:, 0], "m/s", "of the centre of mass, left positive"),
-        "wheels steer": Channel("time", inputs[:, 0], "rad", "angle of the front wheels"),
-        "forward acceleration": Channel("time", inputs[:, 2], "m/s^2", "rate of the measured speed"),
+        "wheels steer": Channel("time", input_samples[:, 0], "rad", "angle of the front wheels"),
+        "forward acceleration": Channel("time", input_samples[:, 2], "m/s^2", "rate of the measured speed"),
     }

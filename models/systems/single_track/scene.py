@@ -8,7 +8,7 @@ from pydantic import Field
 
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
-from models.systems.single_track.equations import Axle, Car
+from models.systems.single_track.equations import AxleTyres, SingleTrackCar
 
 LARGEST_SHARPNESS = 20.0
 """Largest exponent of the bend between cornering stiffness and friction."""
@@ -41,12 +41,12 @@ class AxleTable(Strict):
     lift: float = quantity("N s^2/m^2", "by which the air lifts the axle, or presses it", default=0.0, signed=True)
     rise: float = Field(default=0.0, ge=0.0, le=0.5, description="share of the stiffness that is left beyond the bend")
 
-    def axle(self) -> Axle:
+    def axle(self) -> AxleTyres:
         """Returns the axle's parameters in the form that the compiled equations use."""
-        return Axle(self.stiffness, self.friction, self.sharpness, self.side, self.lift, self.rise)
+        return AxleTyres(self.stiffness, self.friction, self.sharpness, self.side, self.lift, self.rise)
 
 
-class DriveTable(Strict):
+class MeasuredDriveTable(Strict):
     """[drive]: the measured steer angle and speed that drive the car."""
 
     file: str = Field(description="CSV with time, steer (of the front wheels, left positive) and speed, with units")
@@ -56,7 +56,7 @@ class DriveTable(Strict):
     )
 
 
-class SensorTable(Strict):
+class SensorErrorTable(Strict):
     """[sensors]: errors of the sensors, by which readings differ from the motion of the car."""
 
     steer_ratio: float = quantity("", "steer angle of the wheels by the measured one", default=1.0)
@@ -76,16 +76,16 @@ class SingleTrackScene(SceneFile):
     vehicle: CarTable
     front: AxleTable
     rear: AxleTable
-    drive: DriveTable
-    sensors: SensorTable = SensorTable()
+    drive: MeasuredDriveTable
+    sensors: SensorErrorTable = SensorErrorTable()
 
-    def car(self) -> Car:
+    def car(self) -> SingleTrackCar:
         """Returns the car's parameters in the form that the compiled equations use."""
-        return Car(*self.vehicle.model_dump().values())
+        return SingleTrackCar(*self.vehicle.model_dump().values())
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> SingleTrackScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> SingleTrackScene:
     """Build a checked single-track scene from the nested tables of a scene file. Raises InputError for unknown keys and
     for values outside their ranges.
     """
-    return checked(SingleTrackScene, table, file, folder)
+    return checked(SingleTrackScene, scene_tables, scene_path, scene_folder)

@@ -28,15 +28,15 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
 
 
 def _extreme_of_patches(
-    patch_value: Callable[[PatchReport], float], largest: bool = True
+    patch_value: Callable[[PatchReport], float], take_largest: bool = True
 ) -> Callable[[Result], Watched]:
     """Returns the function that computes, for each wheel, the largest (or least) of a patch's values at every position
     of a result.
     """
-    worst = max if largest else min
+    worst = max if take_largest else min
 
-    def watched(run: Result) -> Watched:
-        placed = run.detail.placed
+    def watched(run_result: Result) -> Watched:
+        placed = run_result.detail.placements
         return {
             f"{wheel} wheel": np.array([worst(map(patch_value, getattr(position, wheel))) for position in placed])
             for wheel in WHEEL_NAMES
@@ -46,8 +46,10 @@ def _extreme_of_patches(
 
 
 def _half_space_assumption() -> Assumption:
-    def share(patch: PatchReport) -> float:
-        return max(0.5 * patch.length * patch.curvature_x, 0.5 * patch.width * patch.curvature_y)
+    def share(patch_report: PatchReport) -> float:
+        return max(
+            0.5 * patch_report.length * patch_report.curvature_x, 0.5 * patch_report.width * patch_report.curvature_y
+        )
 
     return Assumption(
         "half-space",
@@ -65,15 +67,19 @@ def _profile_bounds_assumption(scene: WheelRailScene) -> Assumption:
     """
     side = scene.profiles.wheel_on_rail(scene.wheelset.radius)
 
-    def free(patch: PatchReport) -> float:
-        ends = patch.y - side.rail.y[0], side.rail.y[-1] - patch.y, side.wheel.y[-1] - patch.wheel_centre
-        return float(1e3 * (min(ends) - 0.5 * patch.width))
+    def free(patch_report: PatchReport) -> float:
+        ends = (
+            patch_report.y - side.rail.y[0],
+            side.rail.y[-1] - patch_report.y,
+            side.wheel.y[-1] - patch_report.wheel_centre,
+        )
+        return float(1e3 * (min(ends) - 0.5 * patch_report.width))
 
     return Assumption(
         "within the profiles",
         "contacts lie within the profiles",
         "use longer profiles or smaller positions",
-        _extreme_of_patches(free, largest=False),
+        _extreme_of_patches(free, take_largest=False),
         "mm from the end",
         lower_limit=0.0,
     )
@@ -91,8 +97,12 @@ def _elastic_assumption() -> Assumption:
 
 
 def _small_creepage_assumption() -> Assumption:
-    def largest(patch: PatchReport) -> float:
-        return max(abs(patch.xi_x), abs(patch.xi_y), 0.5 * max(patch.length, patch.width) * abs(patch.spin))
+    def largest(patch_report: PatchReport) -> float:
+        return max(
+            abs(patch_report.xi_x),
+            abs(patch_report.xi_y),
+            0.5 * max(patch_report.length, patch_report.width) * abs(patch_report.spin),
+        )
 
     return Assumption(
         "small creepage",

@@ -35,10 +35,10 @@ def describe(scene: WheelRailScene) -> str:
     return "\n".join([scene.title, *lines_of_text, *assumption_lines(assumptions(scene, rolling))])
 
 
-def case_text(yaw: float, friction: float) -> str:
+def case_text(yaw_per_metre: float, friction: float) -> str:
     """Text on a case: its yaw, and whether the wheelset rolls with friction or is only pressed on the rails.
 
-    yaw : mrad per mm of lateral displacement; friction : coefficient.
+    yaw_per_metre : mrad per mm of lateral displacement; friction : coefficient.
     """
-    yaw_text = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
+    yaw_text = f"yaw {yaw_per_metre:g} mrad for each mm" if yaw_per_metre else "no yaw"
     return f"{yaw_text}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")

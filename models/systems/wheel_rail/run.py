@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.rail.contact_table import PatchReport, WheelsetContact, WheelsetPlacement, rolling_radius_difference
 from models.systems.wheel_rail.assumptions import WHEEL_NAMES, assumptions
-from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
+from models.systems.wheel_rail.scene import LARGEST_CELL_COUNT, WheelRailScene
 
 INPUTS_OF_DEEP_CONTACT = ("distance", "load")
 """Inputs that the contact theories refuse where the contact grows beyond the computed surroundings of the profiles."""
@@ -57,11 +57,11 @@ PATCH_QUANTITIES: dict[str, tuple[str, float, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class ContactsOfCase:
-    """Contacts of a case. placed : contacts of the wheelset at each position where they were computed; failures :
+    """Contacts of a case. placements : contacts of the wheelset at each position where they were computed; failures :
     reasons for the positions that failed, by lateral displacement (mm); seconds : processor time of each position.
     """
 
-    placed: list[WheelsetPlacement] = field(default_factory=list)
+    placements: list[WheelsetPlacement] = field(default_factory=list)
     failures: dict[float, str] = field(default_factory=dict)
     seconds: list[float] = field(default_factory=list)
 
@@ -70,24 +70,25 @@ def run(
     scene: WheelRailScene,
     engine: str = "",
     case: str = "",
-    progress: Callable[[float, float], Any] = lambda shift, share: None,
+    report_progress: Callable[[float, float], Any] = lambda shift, share: None,
     *,
     error: bool = False,
 ) -> Result:
     """Compute a case, by default the first, at every position of the wheelset; the detail is its ``ContactsOfCase``.
 
     Channels of positions lie over the shift, those of patches over shift, wheel and patch, the patch with the largest
-    load first; not a number where there is no further patch. Positions that fail are doubts. progress : called before
-    each shift with the shift (mm) and the completed share; error : whether every other position is computed on half the
-    cells, too, from which the error of the cells is estimated. Raises InputError for files that are no profiles.
+    load first; not a number where there is no further patch. Positions that fail are doubts. report_progress : called
+    before each shift with the shift (mm) and the completed share; error : whether every other position is computed on
+    half the cells, too, from which the error of the cells is estimated. Raises InputError for files that are no
+    profiles.
     """
     name = case or next(iter(scene.cases))
     contact, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, ContactsOfCase()
     for i, shift in enumerate(scene.positions.values().tolist()):
-        progress(1e3 * shift, i / scene.positions.count)
+        report_progress(1e3 * shift, i / scene.positions.count)
         start_time = time.process_time()
         try:
-            contacts.placed.append(contact.at(shift, yaw * shift))
+            contacts.placements.append(contact.at(shift, yaw * shift))
         except (InputError, RunFailed) as failure:
             deep = isinstance(failure, InputError) and failure.place in INPUTS_OF_DEEP_CONTACT
             contacts.failures[1e3 * shift] = (
@@ -99,10 +100,10 @@ def run(
             )
         contacts.seconds.append(time.process_time() - start_time)
     labelled = with_assumptions(_labelled_result(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
-    return _with_error(labelled, scene, contact) if error and contacts.placed else labelled
+    return _with_error(labelled, scene, contact) if error and contacts.placements else labelled
 
 
-def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) -> Result:
+def _with_error(run_result: Result, scene: WheelRailScene, wheelset_contact: WheelsetContact) -> Result:
     """Returns the result with the error that the finite cells cause, as the root mean square over both wheels and every
     other position.
 
@@ -110,36 +111,40 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
     refer to the root mean square.
     """
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
-    for placed in run.detail.placed[::ERROR_POSITION_STRIDE]:
+    for placed in run_result.detail.placements[::ERROR_POSITION_STRIDE]:
         with suppress(InputError, RunFailed):
-            coarse.append(replace(contact, cell_factor=2.0 * contact.cell_factor).at(placed.shift, placed.yaw))
+            coarse.append(
+                replace(wheelset_contact, cell_factor=2.0 * wheelset_contact.cell_factor).at(placed.shift, placed.yaw)
+            )
             fine.append(placed)
     if not coarse:
-        return not_estimated(run, "no position is found on half the cells")
+        return not_estimated(run_result, "no position is found on half the cells")
     of_fine, of_coarse = (np.array([wheel_sums(placed) for placed in placements]) for placements in (fine, coarse))
     errors, sizes = (np.sqrt(np.mean(values**2, axis=(0, 1))) for values in (of_fine - of_coarse, of_fine))
     estimates = {
-        name: grid_error(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
+        name: grid_error(float(error), float(size), unit, scene.method.cells, 1.0, LARGEST_CELL_COUNT)
         for (name, unit), error, size in zip(WHEEL_QUANTITIES.items(), errors, sizes, strict=True)
     }
-    return with_stated_errors(run, estimates, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
+    return with_stated_errors(
+        run_result, estimates, f"half the cells at {len(fine)} of {len(run_result.detail.placements)} positions"
+    )
 
 
-def wheel_sums(placement: WheelsetPlacement) -> np.ndarray:
+def wheel_sums(wheelset_placement: WheelsetPlacement) -> np.ndarray:
     """Normal force (N), area (m^2), creep forces fx and fy (N), each summed over a wheel's patches, and its largest
     pressure (Pa). Shape (2, 5): right wheel, left wheel.
     """
     return np.array(
         [
             [*(sum(getattr(patch, name) for patch in wheel) for name in ("normal", "area", "fx", "fy")), peak]
-            for wheel in (placement.right, placement.left)
+            for wheel in (wheelset_placement.right, wheelset_placement.left)
             for peak in [max(patch.peak for patch in wheel)]
         ]
     )
 
 
-def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase) -> Result:
-    positions = [position_quantities(placed) for placed in contacts.placed]
+def _labelled_result(scene: WheelRailScene, case_name: str, contacts_of_case: ContactsOfCase) -> Result:
+    positions = [position_quantities(placed) for placed in contacts_of_case.placements]
     most_patches = max((len(position[wheel]) for position in positions for wheel in WHEEL_NAMES), default=0)
     missing = dict.fromkeys(PATCH_QUANTITIES, np.nan)
     rows = [
@@ -160,29 +165,37 @@ def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase)
         )
         for key, (unit, _, _) in PATCH_QUANTITIES.items()
     }
-    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts.failures.items()]
-    return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
+    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts_of_case.failures.items()]
+    return result(
+        scene,
+        channels,
+        axes,
+        seconds=sum(contacts_of_case.seconds),
+        doubts=doubts,
+        detail=contacts_of_case,
+        case=case_name,
+    )
 
 
-def patches_by_force(placement: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
+def patches_by_force(wheelset_placement: WheelsetPlacement, right_or_left: str) -> tuple[PatchReport, ...]:
     """Contact patches of one wheel ("right" or "left"), sorted by normal force, largest first."""
-    return tuple(sorted(getattr(placement, wheel), key=lambda patch: -patch.normal))
+    return tuple(sorted(getattr(wheelset_placement, right_or_left), key=lambda patch: -patch.normal))
 
 
-def position_quantities(placement: WheelsetPlacement) -> dict[str, Any]:
+def position_quantities(wheelset_placement: WheelsetPlacement) -> dict[str, Any]:
     """Channels of the wheelset at a position (POSITION_UNITS) and of every patch of both wheels (PATCH_QUANTITIES), by
     name.
     """
     return {
-        "shift": 1e3 * placement.shift,
-        "yaw": 1e3 * placement.yaw,
-        "roll": 1e3 * placement.roll,
-        "spin_speed": placement.spin_speed,
-        "radius_difference": 1e3 * rolling_radius_difference(placement),
+        "shift": 1e3 * wheelset_placement.shift,
+        "yaw": 1e3 * wheelset_placement.yaw,
+        "roll": 1e3 * wheelset_placement.roll,
+        "spin_speed": wheelset_placement.spin_speed,
+        "radius_difference": 1e3 * rolling_radius_difference(wheelset_placement),
         **{
             wheel: [
                 {key: factor * getattr(patch, name) for key, (_, factor, name) in PATCH_QUANTITIES.items()}
-                for patch in patches_by_force(placement, wheel)
+                for patch in patches_by_force(wheelset_placement, wheel)
             ]
             for wheel in WHEEL_NAMES
         },

@@ -13,9 +13,9 @@ from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 from models.rail.contact_table import CELLS_PER_STRIP, WheelsetContact
 from models.rail.laid_profiles import Profiles
-from models.systems.contact.scene import Bodies
+from models.systems.contact.scene import WheelRailBodies
 
-MOST_CELLS = 300
+LARGEST_CELL_COUNT = 300
 """Most cells along each axis of a patch in the computation of creep forces."""
 
 
@@ -27,7 +27,7 @@ class WheelsetOnRails(Strict):
     speed: float = quantity("m/s", "of the wheelset along the track", default=2.0)
 
 
-class Positions(Strict):
+class LateralPositions(Strict):
     """[positions]: lateral displacements of the wheelset, evenly spaced, positive to the right."""
 
     start: float = quantity("m", "first displacement", default=0.0, signed=True)
@@ -39,7 +39,7 @@ class Positions(Strict):
         return np.linspace(self.start, self.stop, self.count)
 
 
-class Case(Strict):
+class WheelRailCase(Strict):
     """[cases.NAME]: yaw of the wheelset, and friction if it rolls."""
 
     yaw: float = quantity("rad/m", "yaw for each metre of displacement", default=0.0, signed=True)
@@ -48,11 +48,14 @@ class Case(Strict):
     )
 
 
-class Method(Strict):
+class PatchCells(Strict):
     """[method]: number of cells with which contacts are computed."""
 
     cells: int = Field(
-        default=CELLS_PER_STRIP, ge=9, le=MOST_CELLS, description="along each axis of a patch, more on normal pressures"
+        default=CELLS_PER_STRIP,
+        ge=9,
+        le=LARGEST_CELL_COUNT,
+        description="along each axis of a patch, more on normal pressures",
     )
 
 
@@ -61,14 +64,14 @@ class WheelRailScene(SceneFile):
 
     system: Literal["wheel-rail"] = "wheel-rail"
     study: str = Field(default="manchester", description="the study that runs the scene")
-    bodies: Bodies = Bodies()
+    bodies: WheelRailBodies = WheelRailBodies()
     profiles: Profiles = Profiles()
     wheelset: WheelsetOnRails = WheelsetOnRails()
-    positions: Positions = Positions()
-    method: Method = Method()
-    cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
+    positions: LateralPositions = LateralPositions()
+    method: PatchCells = PatchCells()
+    cases: dict[str, WheelRailCase] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
-    def contact(self, case: Case) -> WheelsetContact:
+    def contact(self, rail_case: WheelRailCase) -> WheelsetContact:
         """Returns the contact problem of the wheelset on the track in a case; raises InputError for files that are no
         profiles.
         """
@@ -77,7 +80,7 @@ class WheelRailScene(SceneFile):
             side,
             self.wheelset.load,
             self.wheelset.speed,
-            case.friction,
+            rail_case.friction,
             MaterialPair(self.bodies.wheel, self.bodies.rail),
             CELLS_PER_STRIP / self.method.cells,
         )
@@ -100,16 +103,16 @@ LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
 """Largest yaw of the wheelset (rad) and largest coefficient of friction that a scene may have."""
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelRailScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> WheelRailScene:
     """Build a checked wheel-rail scene from the nested tables of a scene file. Raises InputError for unknown keys and
     for values outside their ranges.
     """
-    scene = checked(WheelRailScene, table, file, folder)
+    scene = checked(WheelRailScene, scene_tables, scene_path, scene_folder)
     for key_path, (least, most_allowed, unit) in PLAUSIBLE_RANGES.items():
         owner, key = key_path.split(".")
         value = getattr(getattr(scene, owner), key)
         if not least <= value <= most_allowed:
-            raise InputError(file, key_path, value, f"must be from {least:g} to {most_allowed:g} {unit}")
+            raise InputError(scene_path, key_path, value, f"must be from {least:g} to {most_allowed:g} {unit}")
     for name, case in scene.cases.items():
         largest = float(np.abs(case.yaw * scene.positions.values()).max())
         if largest > LARGEST_YAW:
@@ -117,10 +120,12 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
                 f"turns the wheelset by {largest:.3g} rad, more than {LARGEST_YAW:g}: the yaw is in rad for each metre "
                 "of displacement"
             )
-            raise InputError(file, f"cases.{name}.yaw", case.yaw, refusal)
+            raise InputError(scene_path, f"cases.{name}.yaw", case.yaw, refusal)
         if case.friction > LARGEST_FRICTION:
-            raise InputError(file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
+            raise InputError(
+                scene_path, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}"
+            )
     profiles = scene.profiles
     if profiles.smoothing and not any(Path(name).suffix for name in (profiles.wheel, profiles.rail)):
-        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
+        raise InputError(scene_path, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
     return scene.model_copy(update={"profiles": profiles.with_full_paths(scene)})

@@ -70,34 +70,36 @@ def branch_assumptions(wheelset: Wheelset) -> list[Assumption]:
     )
 
 
-def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
+def sums_by_wheel(contact_records: Array, patch_values: Array) -> dict[str, Array]:
     """Sums a quantity of contact patches, shape (n, patches), over the patches of each wheel; (n,) by wheel."""
-    patches_per_wheel = contacts.shape[1] // 2
+    patches_per_wheel = contact_records.shape[1] // 2
     return {
-        "right wheel": values[:, :patches_per_wheel].sum(axis=1),
-        "left wheel": values[:, patches_per_wheel:].sum(axis=1),
+        "right wheel": patch_values[:, :patches_per_wheel].sum(axis=1),
+        "left wheel": patch_values[:, patches_per_wheel:].sum(axis=1),
     }
 
 
-def _watch_of_path(watch: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
-    """Returns a function of a result that applies ``watch`` to its path; the result's detail is a path or a limit
-    cycle.
+def _watch_of_path(values_of_path: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
+    """Returns a function of a result that applies ``values_of_path`` to its path; the result's detail is a path or a
+    limit cycle.
     """
 
-    def of_result(run: Result) -> Watched:
-        return watch(run.detail if isinstance(run.detail, WheelsetPath) else run.detail.path())
+    def of_result(run_result: Result) -> Watched:
+        return values_of_path(
+            run_result.detail if isinstance(run_result.detail, WheelsetPath) else run_result.detail.path()
+        )
 
     return of_result
 
 
-def _watch_of_patches(watch: Callable[[Array], Array]) -> Callable[[Result], Watched]:
-    """Returns a function of a result that gives, for each wheel and time, the largest magnitude of ``watch`` among its
-    loaded patches, 0 where no patch is loaded.
+def _watch_of_patches(values_of_contacts: Callable[[Array], Array]) -> Callable[[Result], Watched]:
+    """Returns a function of a result that gives, for each wheel and time, the largest magnitude of
+    ``values_of_contacts`` among its loaded patches, 0 where no patch is loaded.
     """
 
-    def of_path(path: WheelsetPath) -> Watched:
-        patches_per_wheel, load = path.contacts.shape[1] // 2, path.contacts["load"]
-        values = np.where(load > 0.0, np.abs(watch(path.contacts)), 0.0)
+    def of_path(wheelset_path: WheelsetPath) -> Watched:
+        patches_per_wheel, load = wheelset_path.contacts.shape[1] // 2, wheelset_path.contacts["load"]
+        values = np.where(load > 0.0, np.abs(values_of_contacts(wheelset_path.contacts)), 0.0)
         return {
             "right wheel": values[:, :patches_per_wheel].max(axis=1),
             "left wheel": values[:, patches_per_wheel:].max(axis=1),
@@ -147,9 +149,9 @@ def _half_space_assumption() -> Assumption:
     penetration to the shorter semi-axis is about the ratio of that semi-axis to its radius.
     """
 
-    def watched(contacts: Array) -> Array:
-        short = np.minimum(contacts["a"], contacts["b"])
-        return contacts["depth"] / np.where(short > 0.0, short, np.inf)
+    def watched(contact_records: Array) -> Array:
+        short = np.minimum(contact_records["a"], contact_records["b"])
+        return contact_records["depth"] / np.where(short > 0.0, short, np.inf)
 
     return Assumption(
         "half-space",
@@ -162,9 +164,9 @@ def _half_space_assumption() -> Assumption:
 
 
 def _elastic_assumption() -> Assumption:
-    def watched(contacts: Array) -> Array:
-        area = np.pi * contacts["a"] * contacts["b"]
-        return 1.5e-6 * contacts["load"] / np.where(area > 0.0, area, np.inf)
+    def watched(contact_records: Array) -> Array:
+        area = np.pi * contact_records["a"] * contact_records["b"]
+        return 1.5e-6 * contact_records["load"] / np.where(area > 0.0, area, np.inf)
 
     return Assumption(
         "elastic",
@@ -189,8 +191,8 @@ def _slow_slip_assumption(equations: Equations) -> Assumption:
 
 
 def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
-    def watched(path: WheelsetPath) -> Watched:
-        contacts = path.contacts
+    def watched(wheelset_path: WheelsetPath) -> Watched:
+        contacts = wheelset_path.contacts
         creep, limit = np.hypot(contacts["fx"], contacts["fy"]), contacts["load"]
         used = bound_shares(creep, wheelset.friction * limit)
         return {"patches": used.max(axis=1)}
@@ -206,9 +208,13 @@ def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
 
 
 def _travel_assumption(wheelset: Wheelset) -> Assumption:
-    def watched(path: WheelsetPath) -> Watched:
-        travel_along, travel_up = (1e3 * wheelset.half_spacing * path.states[:, k] for k in (YAW, ROLL))
-        return {"along": np.abs(travel_along), "across": 1e3 * np.abs(path.states[:, Y]), "vertical": np.abs(travel_up)}
+    def watched(wheelset_path: WheelsetPath) -> Watched:
+        travel_along, travel_up = (1e3 * wheelset.half_spacing * wheelset_path.states[:, k] for k in (YAW, ROLL))
+        return {
+            "along": np.abs(travel_along),
+            "across": 1e3 * np.abs(wheelset_path.states[:, Y]),
+            "vertical": np.abs(travel_up),
+        }
 
     return Assumption(
         "suspension",
@@ -221,8 +227,8 @@ def _travel_assumption(wheelset: Wheelset) -> Assumption:
 
 
 def _climbing_assumption(wheelset: Wheelset) -> Assumption:
-    def watched(path: WheelsetPath) -> Watched:
-        flange_share = bound_shares(path.contacts["flange_force"], path.contacts["load"])
+    def watched(wheelset_path: WheelsetPath) -> Watched:
+        flange_share = bound_shares(wheelset_path.contacts["flange_force"], wheelset_path.contacts["load"])
         return {"right wheel": flange_share[:, 0], "left wheel": flange_share[:, 1]}
 
     return Assumption(
@@ -235,12 +241,14 @@ def _climbing_assumption(wheelset: Wheelset) -> Assumption:
     )
 
 
-def _flange_deflection_assumption(wheelset: Wheelset, watch: Callable[[Result], Watched] | None = None) -> Assumption:
+def _flange_deflection_assumption(
+    wheelset: Wheelset, values_of_result: Callable[[Result], Watched] | None = None
+) -> Assumption:
     return Assumption(
         "on the tread",
         "the wheels roll on their cones, and a flange's rail gives way by a few mm at most",
         "name the effect profiles, which have flanges of their own",
-        watch or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
+        values_of_result or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
         "m",
         upper_limit=wheelset.flange_clearance + LARGEST_FLANGE_DEFLECTION,
     )
@@ -254,10 +262,10 @@ def _profile_bounds_assumption(wheelset: Wheelset) -> Assumption:
     side = wheelset.profiles.wheel_on_rail(wheelset.radius)
     tip, outer = float(side.wheel.y[np.argmax(side.wheel.z)]), float(side.wheel.y[-1])
 
-    def watched(path: WheelsetPath) -> Watched:
-        contacts = path.contacts
+    def watched(wheelset_path: WheelsetPath) -> Watched:
+        contacts = wheelset_path.contacts
         load, half = contacts["load"], contacts["b"]
-        wheel, rail = np.abs(_along_axle(path)) - side.wheelset.arm, np.abs(_across_track(path))
+        wheel, rail = np.abs(_along_axle(wheelset_path)) - side.wheelset.arm, np.abs(_across_track(wheelset_path))
         ends = {
             "flange's tip": wheel - tip - CLIMBING_DISTANCE,
             "wheel's face": outer - wheel - half,
@@ -275,13 +283,17 @@ def _profile_bounds_assumption(wheelset: Wheelset) -> Assumption:
     )
 
 
-def _along_axle(path: WheelsetPath) -> Array:
+def _along_axle(wheelset_path: WheelsetPath) -> Array:
     """Positions (n, patches) of the contacts along the axle, from its middle, in m."""
-    roll, yaw, contacts = path.states[:, ROLL, None], path.states[:, YAW, None], path.contacts
+    roll, yaw, contacts = (
+        wheelset_path.states[:, ROLL, None],
+        wheelset_path.states[:, YAW, None],
+        wheelset_path.contacts,
+    )
     x, y, z = (contacts[name] for name in "xyz")
     return np.asarray(np.cos(roll) * (np.cos(yaw) * y - np.sin(yaw) * x) + np.sin(roll) * z)
 
 
-def _across_track(path: WheelsetPath) -> Array:
+def _across_track(wheelset_path: WheelsetPath) -> Array:
     """Lateral positions (n, patches) of the contacts, from the middle of the track, in m, positive to the right."""
-    return np.asarray(path.states[:, Y, None] + path.contacts["y"])
+    return np.asarray(wheelset_path.states[:, Y, None] + wheelset_path.contacts["y"])

@@ -41,9 +41,9 @@ class Conicities:
     source: str
     wavelengths: tuple[float, ...]
 
-    def save_table(self, path: Path) -> None:
+    def save_table(self, table_path: Path) -> None:
         """Write the rolling radius differences as a table that ``read_rolling_radii`` reads."""
-        write_table(path, {"y": ("m", self.table.displacements), "dr": ("m", self.table.differences)})
+        write_table(table_path, {"y": ("m", self.table.displacements), "dr": ("m", self.table.differences)})
 
 
 def reports_conicity(scene: WheelsetScene) -> bool:
@@ -130,11 +130,11 @@ def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
         raise InputError(table or scene.file, "conicity.amplitudes", amplitude, why)
 
 
-def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
+def conicity_numbers(conicity_result: Result) -> dict[str, Any]:
     """Equivalent conicity by EN 15302 and by the first harmonic at each amplitude (m), with the centre of the wave (m),
     as numbers for a JSON file; None where there is no wave.
     """
-    rows: tuple[ConicityRow, ...] = run_of_scene.detail.rows
+    rows: tuple[ConicityRow, ...] = conicity_result.detail.rows
     return {
         "conicity": [
             {name: value if math.isfinite(value) else None for name, value in asdict(row).items() if name != "period"}

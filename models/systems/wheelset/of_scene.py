@@ -53,16 +53,16 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
     return extended_by_effects(_checked_wheelset(values | override, scene.file, "wheelset.override"), scene)
 
 
-def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset:
+def _checked_wheelset(parameter_values: dict[str, Any], named_file: str, named_table: str) -> Wheelset:
     """Build a wheelset from its parameters by name. An InputError names the file and the table of the wrong value."""
     try:
-        return Wheelset(**values)
+        return Wheelset(**parameter_values)
     except InputError as error:
-        key_path = ".".join(key for key in (table, error.place.partition(".")[2]) if key)
-        raise InputError(file, key_path, error.value, error.allowed) from None
+        key_path = ".".join(key for key in (named_table, error.place.partition(".")[2]) if key)
+        raise InputError(named_file, key_path, error.value, error.allowed) from None
 
 
-def implementation(engine: str) -> type[Equations]:
+def equations_class(engine: str) -> type[Equations]:
     """Returns the class of the equations of motion in "reference", "exudyn" or "mujoco"; no other engine is
     imported.
     """
@@ -72,14 +72,14 @@ def implementation(engine: str) -> type[Equations]:
 
 def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
     """Equations of motion of the scene's wheelset, with its law of creep, at a speed (m/s)."""
-    return implementation(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
+    return equations_class(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
 
 
 @lru_cache(32)
 def _initial_state(
-    engine: str, wheelset: Wheelset, speed: float, law: Any, cells: int, lateral_shift: float, yaw: float
+    engine: str, wheelset: Wheelset, speed: float, creep_law: Any, cell_count: int, lateral_shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
-    equations = implementation(engine)(wheelset, speed, law, cells)
+    equations = equations_class(engine)(wheelset, speed, creep_law, cell_count)
     state = equations.displaced_state(lateral_shift)
     state[YAW] = yaw
     return equations, state

@@ -33,16 +33,22 @@ from models.systems.wheelset.assumptions import assumptions, branch_assumptions,
 from models.systems.wheelset.of_scene import (
     SPEED_SHARES,
     equations_and_start,
+    equations_class,
     equations_of,
-    implementation,
     path_speeds,
     wheelset_of,
 )
 from models.systems.wheelset.scene import WheelsetScene
 from models.systems.wheelset.stated_error import FEWEST_CELLS, with_error, with_error_of_cycles
 
-STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {"normal": ("load", "N"), "fx": ("fx", "N"), "fy": ("fy", "N"), "mz": ("mz", "N m"), "power": ("power", "W")}
+STATE_CHANNELS = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
+CONTACT_CHANNELS = {
+    "normal": ("load", "N"),
+    "fx": ("fx", "N"),
+    "fy": ("fy", "N"),
+    "mz": ("mz", "N m"),
+    "power": ("power", "W"),
+}
 """Channels of every path: states with their index, quantities of the contact patches with their field, and units."""
 SPEED: SoughtQuantity = "speed"
 AMPLITUDE: SoughtQuantity = "amplitude"
@@ -72,47 +78,56 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
     speed = path_speeds(scene)[0] if speed is None else speed
     equations_and_start(scene, engine, speed)  # kept: its seconds are none of the path
     start_time = time.process_time()
-    motion = path(scene, engine, speed)
+    motion = simulated_path(scene, engine, speed)
     labelled = path_result(scene, engine, speed, motion, seconds=time.process_time() - start_time)
-    return with_error(labelled, scene, lambda changed_scene: path(changed_scene, engine, speed)) if error else labelled
+    return (
+        with_error(labelled, scene, lambda changed_scene: simulated_path(changed_scene, engine, speed))
+        if error
+        else labelled
+    )
 
 
-def path_result(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **result_fields: Any) -> Result:
+def path_result(
+    scene: WheelsetScene, engine: str, speed: float, wheelset_path: WheelsetPath, **result_fields: Any
+) -> Result:
     """Returns the result of a simulated motion at a speed (m/s), with the assumptions that the motion breaks."""
     equations, _ = equations_and_start(scene, engine, speed)
-    return with_assumptions(_labelled_result(scene, engine, motion, **result_fields), assumptions(equations))
+    return with_assumptions(_labelled_result(scene, engine, wheelset_path, **result_fields), assumptions(equations))
 
 
-def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
+def simulated_path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
     """Simulate the wheelset at a speed (m/s) from the scene's initial displacement and yaw; states at every step."""
     equations, start = equations_and_start(scene, engine, speed)
     return equations.run(start, scene.run.duration, scene.run.step)
 
 
-def _labelled_result(scene: WheelsetScene, engine: str, motion: WheelsetPath, **result_fields: Any) -> Result:
-    steps, time_axis = len(motion.times) - 1, Channel("time", motion.times, "s")
-    channels = {name: Channel("time", motion.states[:, k], unit) for name, (k, unit) in STATES.items()}
+def _labelled_result(scene: WheelsetScene, engine: str, wheelset_path: WheelsetPath, **result_fields: Any) -> Result:
+    steps, time_axis = len(wheelset_path.times) - 1, Channel("time", wheelset_path.times, "s")
+    channels = {name: Channel("time", wheelset_path.states[:, k], unit) for name, (k, unit) in STATE_CHANNELS.items()}
     channels |= {
-        name: Channel(("time", "patch"), motion.contacts[field], unit) for name, (field, unit) in CONTACTS.items()
+        name: Channel(("time", "patch"), wheelset_path.contacts[field], unit)
+        for name, (field, unit) in CONTACT_CHANNELS.items()
     }
     counts = {"steps": steps, "force calls": 4 * steps}
-    return result(scene, channels, {"time": time_axis}, engine=engine, counts=counts, detail=motion, **result_fields)
+    return result(
+        scene, channels, {"time": time_axis}, engine=engine, counts=counts, detail=wheelset_path, **result_fields
+    )
 
 
-def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
+def over_speeds(results_by_engine: Mapping[str, Mapping[Any, Result]]) -> Result:
     """Join results by engine and speed (m/s) to one result over engine, speed and time."""
     by_engine = {
         engine: joined_result(join_results(path, "speed"), results_by_speed_text(path))
-        for engine, path in paths.items()
+        for engine, path in results_by_engine.items()
     }
     joined = joined_result(join_results(by_engine, "engine"), by_engine)
     joined.data["speed"].attrs["units"] = "m/s"
     return joined
 
 
-def results_by_speed_text(results: Mapping[Any, Result]) -> dict[str, Result]:
+def results_by_speed_text(results_by_speed: Mapping[Any, Result]) -> dict[str, Result]:
     """Results of one engine with their speeds as text keys, such as "20 m/s"."""
-    return {f"{speed:g} m/s": result for speed, result in results.items()}
+    return {f"{speed:g} m/s": result for speed, result in results_by_speed.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +143,17 @@ class LinearisedMotion:
     no_critical_reason: str
 
     @property
-    def hunting(self) -> np.ndarray:
+    def hunting_eigenvalue(self) -> np.ndarray:
         """Eigenvalue (speeds,) in 1/s of the least damped oscillation, the hunting motion."""
         return hunting_eigenvalue(self.values)
 
 
-def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
+def linearised_result(scene: WheelsetScene, engine: str, *, estimate_error: bool = False) -> Result:
     """Compute eigenvalues over the scene's speeds with linear creep; the result's detail is ``LinearisedMotion``.
 
-    error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
+    estimate_error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
     """
-    kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
+    kind, wheelset, speeds = equations_class(engine), wheelset_of(scene), scene.speeds.all()
     linear = LinearisedMotion(
         speeds,
         root_locus(kind, wheelset, speeds),
@@ -151,9 +166,9 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
     }
     labelled = result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
     with_assumptions(labelled, linear_motion_assumptions(wheelset))
-    left = hunting_uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
+    left = hunting_uncertainty(kind, wheelset, float(speeds[-1])) if estimate_error else math.nan
     if math.isfinite(left):
-        estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
+        estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting_eigenvalue[-1]), 4.0, 1.0)
         with_stated_errors(
             labelled,
             {"hunting eigenvalue": estimate_of_hunting},
@@ -164,15 +179,15 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
 
 
 def branch_result(
-    scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: None, *, error: bool = False
+    scene: WheelsetScene, report_progress: Callable[[int], Any] = lambda count: None, *, estimate_error: bool = False
 ) -> Result:
     """Compute the branch of limit cycles by the reference's equations, in the order of rising amplitude, within the
     scene's speeds; the result's detail is the list of orbits.
 
     Where no branch begins because the wheelset is unstable at all speeds, the cycles are those that motions reach at
     these speeds. Why the branch ends or never begins is a doubt. The scene's worker processes compute linearisations.
-    progress : called after each cycle with the number of cycles; error : whether one cycle is also solved on half the
-    cells, from which the error of the cells is estimated.
+    report_progress : called after each cycle with the number of cycles; estimate_error : whether one cycle is also
+    solved on half the cells, from which the error of the cells is estimated.
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
@@ -180,7 +195,7 @@ def branch_result(
         try:
             for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)
-                progress(len(orbits))
+                report_progress(len(orbits))
         except NoCriticalSpeed as no_speed:
             why, unknown = [f"no branch begins: the wheelset {no_speed.allowed}"], AMPLITUDE
             reached = block_results(
@@ -195,14 +210,14 @@ def branch_result(
     }
     labelled = result(scene, channels, {}, engine="reference", doubts=why, detail=orbits)
     with_assumptions(labelled, branch_assumptions(equations.wheelset))
-    if error and orbits:
+    if estimate_error and orbits:
         middle = len(orbits) // 2
         coarse = _cycle_on_half_the_cells(scene, orbits[middle], unknown)
         with_error_of_cycles(labelled, orbits, {} if coarse is None else {middle: coarse}, unknown, scene.contact.cells)
     return labelled
 
 
-def _cycle_on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: SoughtQuantity) -> Orbit | None:
+def _cycle_on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, sought_quantity: SoughtQuantity) -> Orbit | None:
     """Returns the limit cycle solved on half the cells, in twice the time step; None where there is no solution."""
     if scene.contact.cells < FEWEST_CELLS:
         return None
@@ -210,7 +225,7 @@ def _cycle_on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: 
     try:
         return solved_orbit(
             guess_from_orbit(coarse, replace(limit_cycle.equations, cells=coarser_cells(scene.contact.cells))),
-            unknown,
+            sought_quantity,
             precise=False,
         )
     except RunFailed:
@@ -229,23 +244,23 @@ def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
     )
 
 
-def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
+def cycle_speed(scene: WheelsetScene, limit_cycles: Sequence[Orbit]) -> float:
     """Returns 1.1 times the speed (m/s) at which the branch begins, at most the scene's last speed; without a branch
     that last speed.
     """
     last_speed = float(scene.speeds.all().max())
-    return min(last_speed, round(SPEED_SHARES[1] * orbits[0].speed, 2)) if orbits else last_speed
+    return min(last_speed, round(SPEED_SHARES[1] * limit_cycles[0].speed, 2)) if limit_cycles else last_speed
 
 
 def cycles_of_engines(
-    scene: WheelsetScene, engines: Sequence[str], speed: float, *, error: bool = False
+    scene: WheelsetScene, engines: Sequence[str], speed: float, *, estimate_error: bool = False
 ) -> tuple[dict[str, Result], dict[str, str]]:
     """Solve the limit cycle at a speed (m/s) in every engine. Returns the results over one period by engine, and the
     reasons of failures by engine.
 
     Each engine starts from a guess that is deliberately off. Details of the results are the orbits. Both are empty
-    where the motion dies out. error : whether each cycle is also solved on half the cells, from which the error of the
-    cells is estimated.
+    where the motion dies out. estimate_error : whether each cycle is also solved on half the cells, from which the
+    error of the cells is estimated.
     """
     results, failed = dict[str, Result](), dict[str, str]()
     first = _attained_in_engine(scene, speed)
@@ -255,17 +270,17 @@ def cycles_of_engines(
         try:
             guess = guess_from_orbit(first, equations_of(scene, engine, speed))
             orbit = refined_orbit(solved_orbit(guess, AMPLITUDE, precise=False), AMPLITUDE)
-            results[engine] = _one_period_result(scene, engine, orbit, error)
+            results[engine] = _one_period_result(scene, engine, orbit, estimate_error)
         except RunFailed as failure:
             failed[engine] = str(failure)
     return results, failed
 
 
-def _one_period_result(scene: WheelsetScene, engine: str, limit_cycle: Orbit, error: bool) -> Result:
+def _one_period_result(scene: WheelsetScene, engine: str, limit_cycle: Orbit, estimate_error: bool) -> Result:
     """Returns the result of a limit cycle over one period; its detail is the orbit."""
     labelled = with_assumptions(_labelled_result(scene, engine, limit_cycle.path()), assumptions(limit_cycle.equations))
     period = Result(over_speeds({engine: {limit_cycle.speed: labelled}}).data, limit_cycle)
-    if not error:
+    if not estimate_error:
         return period
     coarse = _cycle_on_half_the_cells(scene, limit_cycle, AMPLITUDE)
     return with_error_of_cycles(

@@ -22,13 +22,13 @@ LARGEST_SHIFT, LARGEST_YAW = 0.02, 0.05
 """Largest lateral displacement (m) and yaw (rad) at the start: beyond, a wheelset does not stand on its rails."""
 WHEELS_OF_SCENE = {"reach", "spacing", "right_radius", "left_radius", "left_wheel", "left_rail"}
 """Keys of [conicity] that describe the wheels and rails, which a table of rolling radius differences replaces."""
-MOST_DISPLACEMENTS = 1000
+LARGEST_DISPLACEMENT_COUNT = 1000
 """Most lateral displacements on one side at which profiles are put on their rails; each takes some hundredths of a
 second.
 """
 RADIUS_RANGE = (0.1, 1.5)
 """Smallest and largest rolling radius (m) that a scene may have, wider than that of railway wheels."""
-MOST_CELLS = 200
+LARGEST_CELL_COUNT = 200
 """Most cells of FASTSIM along each strip of the contact patch."""
 
 
@@ -39,14 +39,14 @@ class WheelsetTable(Strict):
     override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
 
 
-class Creep(Strict):
+class CreepLawTable(Strict):
     """[contact]: the law of creep forces in simulated motions; eigenvalues and critical speed use the linear law."""
 
     law: Literal["linear", "fastsim"] = Field(default="fastsim", description="Kalker's linear theory, or FASTSIM")
-    cells: int = Field(default=11, ge=3, le=MOST_CELLS, description="of FASTSIM, along each strip")
+    cells: int = Field(default=11, ge=3, le=LARGEST_CELL_COUNT, description="of FASTSIM, along each strip")
 
 
-class RunTable(Strict):
+class WheelsetRunTable(Strict):
     """[run]: initial displacement and yaw, duration, time step and speeds of the simulated motions."""
 
     duration: float = quantity("s", "length of a path", default=2.0)
@@ -89,23 +89,23 @@ class WheelsetScene(SceneFile):
     study: str = Field(default="wheelset", description="the study that runs the scene")
     wheelset: WheelsetTable = WheelsetTable()
     profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
-    contact: Creep = Creep()
+    contact: CreepLawTable = CreepLawTable()
     speeds: Speeds = Field(description="table with a range of speeds, or a list of them")
-    run: RunTable = RunTable()
+    run: WheelsetRunTable = WheelsetRunTable()
     conicity: ConicityTable | None = Field(default=None, description="equivalent conicity, of these wheels")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelsetScene:
+def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: Path = Path()) -> WheelsetScene:
     """Build a checked wheelset scene from the nested tables of a scene file. Raises InputError for unknown keys and for
     values outside their ranges.
     """
-    scene = checked(WheelsetScene, table, file, folder)
+    scene = checked(WheelsetScene, scene_tables, scene_path, scene_folder)
     _check_speeds(scene)
     _check_run(scene)
     _check_conicity(scene)
     if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
-        raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
+        raise InputError(scene_path, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
     return with_effect_tables(scene)
 
 
@@ -147,9 +147,9 @@ def _check_conicity(scene: WheelsetScene) -> None:
             raise InputError(scene.file, f"conicity.{key}", getattr(conicity_table, key), allowed)
     if not (
         conicity_table.reach <= LARGEST_SHIFT
-        and conicity_table.reach / MOST_DISPLACEMENTS <= conicity_table.spacing <= conicity_table.reach / 4.0
+        and conicity_table.reach / LARGEST_DISPLACEMENT_COUNT <= conicity_table.spacing <= conicity_table.reach / 4.0
     ):
-        allowed = f"must be from 1/{MOST_DISPLACEMENTS} to 1/4 of reach, and reach at most {LARGEST_SHIFT:g} m"
+        allowed = f"must be from 1/{LARGEST_DISPLACEMENT_COUNT} to 1/4 of reach, and reach at most {LARGEST_SHIFT:g} m"
         raise InputError(scene.file, "conicity.spacing", conicity_table.spacing, allowed)
     for key in ("right_radius", "left_radius"):
         radius = getattr(conicity_table, key)

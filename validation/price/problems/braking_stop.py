@@ -22,7 +22,7 @@ from models.brake.pressure import Chambers, by_valves, resting_chambers
 from models.brake.quarter import braked
 from models.brake.surfaces import Stretch, road
 from models.core.errors import RunFailed
-from models.systems.braking.march import BrakedVehicle, on_tyres
+from models.systems.braking.march import BrakedVehicle, braked_vehicle_on_tyres
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import stacked_tables
 from validation.braking.quarter_stops import FRONT_WHEEL, FrictionChange, FrictionCurve, stop_by_scheme
@@ -158,7 +158,7 @@ class BrakingStop:
         """Valve commands (n,), one per sample, of a run with the controller; the last one is repeated EXTRA_SAMPLES
         times."""
         tape = RecordingController(CONTROLLERS["slip_bang_bang"](1), [])
-        vehicle = on_tyres(
+        vehicle = braked_vehicle_on_tyres(
             FRONT_WHEEL.plane, self._tables, self._brakes, self._chambers, self._road, substeps=REPLAY_SUBSTEPS
         )
         vehicle.run(tape, self.speed)

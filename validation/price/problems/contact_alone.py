@@ -13,7 +13,7 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.contact.theories import beyond_friction
-from models.systems.contact.work_precision import THEORIES_COMPARED, TheorySettings, force_of
+from models.systems.contact.work_precision import THEORIES_COMPARED, TheorySettings, tangential_force_of
 from validation.contact.contact_set import read_contacts
 
 CONTACT_SPACING = 23
@@ -101,7 +101,9 @@ class ContactAlone:
         )
 
     def _run(self, theory: TheorySettings, cells: int) -> ContactResult:
-        forces = np.array([force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
+        forces = np.array(
+            [tangential_force_of(theory.rolled(case, cells)(case.motion)) / case.friction_limit for case in self._cases]
+        )
         linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
         return ContactResult(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")

@@ -11,7 +11,7 @@ import numpy as np
 from models.contact.accuracy import coarser_cells
 from models.contact.theories import RollingContact
 from models.core.discretisation import errors_of, finite_rms
-from models.systems.contact.run import CELL_POWER, run
+from models.systems.contact.run import ERROR_ORDER_OF_CELLS, run
 from models.systems.contact.scene import ContactScene, build
 from validation.stated_errors.sample import Sample, random_samples
 
@@ -62,7 +62,7 @@ def _sample_of_contact(scene: ContactScene) -> Sample:
     truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most_cells)) for motion in motions])
     gap = np.column_stack([run_["fx"], run_["fy"], run_["mz"]]) - truth
     true = {"force": finite_rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": finite_rms(gap[:, 2])}
-    power = CELL_POWER[scene.method.name] or 0
+    power = ERROR_ORDER_OF_CELLS[scene.method.name] or 0
     name = f"{scene.method.name} on {cells} cells, {len(motions)} motions"
     calls = len(motions) * float(cells) ** power
     return Sample(name, "", errors_of(run_), true, calls, calls * (coarser_cells(cells) / cells) ** power)

@@ -14,7 +14,7 @@ from models.core.result import Result
 from models.core.trajectory import Trajectory
 from models.engines.free_vehicle import ENGINES, FreeModel
 from models.multibody.forces import CELLS
-from models.systems.handling.run import Drive, drive_run, principal_series, run
+from models.systems.handling.run import SimulatedDrive, drive_run, principal_series, run
 from models.systems.handling.scene import HandlingScene, build
 from validation.stated_errors.sample import Sample, random_samples
 
@@ -68,7 +68,7 @@ def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
     return Sample(scene.title, engine, errors, _true_errors(scene, drive, engine, stated_run), calls[0], sum(calls[1:]))
 
 
-def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result: Result) -> dict[str, float]:
+def _true_errors(scene: HandlingScene, drive: SimulatedDrive, engine: str, stated_result: Result) -> dict[str, float]:
     """True root mean square error of every channel whose error is stated, by a finer run."""
     manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": FINER_CELLS * scene.tyres.cells})})

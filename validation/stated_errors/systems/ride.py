@@ -18,9 +18,15 @@ from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import RoadPath
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, varying_speed
 from models.road.excitation import Excitation
-from models.systems.ride.nonlinear import RUNGE_KUTTA_ORDER, Sampling, engine_result, linearised_result, ride_over
+from models.systems.ride.nonlinear import (
+    RUNGE_KUTTA_ORDER,
+    RunSampling,
+    engine_result,
+    linearised_result,
+    ride_over_heights,
+)
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
-from models.systems.ride.run import ANY_SPEED, run
+from models.systems.ride.run import ARBITRARY_SPEED, run
 from models.systems.ride.scene import RideScene, build
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -143,7 +149,7 @@ def _sample_of_drive(generator: np.random.Generator, sample_number: int) -> Samp
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
     fine = varying_speed(
-        linear_vehicle(vehicle)(ANY_SPEED),
+        linear_vehicle(vehicle)(ARBITRARY_SPEED),
         road,
         profile,
         instants=result.times,
@@ -163,8 +169,8 @@ def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sam
     many more copies and shorter steps. Both contain random scatter."""
     speed = float(generator.uniform(5.0, 35.0))
     scene = _random_scene(generator, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
-    vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=sample_number)
-    result = linearised_result(scene, vehicle, sampling, lambda text, share: None, error=True)
+    vehicle, sampling = vehicle_of(scene), RunSampling(beside=[speed], copies=100, lasting=6.0, seed=sample_number)
+    result = linearised_result(scene, vehicle, sampling, lambda text, share: None, estimate_error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
     fine = copies_in_time(
         vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + sample_number, longest_step=run.step / 4.0
@@ -197,7 +203,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     tables |= {} if bent else {"effects": {"lift_off": {}}}
     scene = _random_scene(generator, file, "loaded", **tables)
     vehicle, engine = _varied_vehicle(generator, vehicle_of(scene)), str(generator.choice(ENGINES))
-    sampling = Sampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
+    sampling = RunSampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
     road = excitation_of(scene, wheels(vehicle))
     path = _road_path_of_run(scene, engine, vehicle, sampling, road, speed)
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half_step=path.half_step / FINER_STEPS)
@@ -208,7 +214,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
         result = failure.partial
     rows = result.detail.rows * FINER_STEPS
     stride, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
-    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, stride=stride)
+    fine = ride_over_heights("mujoco", vehicle, finer, table, skipped_time=begin, steps_per_output=stride)
     gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     calls = RUNGE_KUTTA_ORDER * steps + len(rows)
@@ -218,11 +224,11 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
 
 
 def _road_path_of_run(
-    scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: RunSampling, road: Excitation, speed: float
 ) -> RoadPath:
     """Road path with the step that ``in_engine`` uses."""
     from models.ride.nonlinear_copies import longest_resolving_step
     from models.ride.road_path import road_path
-    from models.systems.ride.nonlinear import LONGEST_STEP
+    from models.systems.ride.nonlinear import LONGEST_TIME_STEP
 
-    return road_path(road, speed, min(sampling.step or LONGEST_STEP, longest_resolving_step(vehicle, speed)))
+    return road_path(road, speed, min(sampling.step or LONGEST_TIME_STEP, longest_resolving_step(vehicle, speed)))

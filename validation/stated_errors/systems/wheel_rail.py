@@ -48,7 +48,7 @@ def _sample_of_position(scene: WheelRailScene) -> Sample | None:
     estimates, case = errors_of(stated_run), next(iter(scene.cases.values()))
     contact = scene.contact(case)
     fine = replace(contact, cell_factor=contact.cell_factor / FINER_CELLS)
-    placed = stated_run.detail.placed
+    placed = stated_run.detail.placements
     gaps = np.array(
         [
             wheel_sums(wheelset_place) - wheel_sums(fine.at(wheelset_place.shift, wheelset_place.yaw))

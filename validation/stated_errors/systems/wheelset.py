@@ -65,7 +65,7 @@ def _random_scene(generator: np.random.Generator) -> tuple[WheelsetScene, str, f
 
 
 def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
-    marched, march = list[float](), system.path
+    marched, march = list[float](), system.simulated_path
 
     def counted(other_scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
         path = march(other_scene, engine, speed)
@@ -95,7 +95,7 @@ def _true_errors(
     if scene.contact.law == "linear":
         return true
     cells = min(FINER_CELLS * scene.contact.cells, MOST_CELLS)
-    of_cells = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0, cells=cells))))
+    of_cells = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0, cell_count=cells))))
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 

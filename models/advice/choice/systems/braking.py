@@ -13,7 +13,7 @@ from models.core.errors import RunFailed
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 
 ENGINE, WINDOWED = "reference", False
 
@@ -28,7 +28,7 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
         start_time = time.process_time()
         drive = run(scene, engine, procedure=name, error=error)
         seconds += time.process_time() - start_time
-        path, stop = drive.detail, Stop(drive.detail)
+        path, stop = drive.detail, StopHistory(drive.detail)
         if len(path.times) < 3:
             raise RunFailed("braking", f"{name} ends before it has begun", float(path.times[-1]))
         for key, value in {**stop.vehicle_results(), **stop.wheel_results()}.items():

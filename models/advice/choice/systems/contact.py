@@ -6,7 +6,7 @@ from typing import Any
 
 from models.advice.choice.answer import Quantity, RunQuantities
 from models.core.errors import InputError
-from models.systems.contact.run import creepages, run
+from models.systems.contact.run import run, swept_creepages
 from models.systems.contact.scene import ContactScene
 
 ENGINE, WINDOWED = "reference", False
@@ -24,7 +24,7 @@ def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -
 
 def steps(scene: ContactScene) -> int:
     """Number of creepages, as nothing is marched in time."""
-    return len(creepages(scene))
+    return len(swept_creepages(scene))
 
 
 def divisible_steps(scene: ContactScene) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 from models.advice.choice.answer import Quantity, RunQuantities
 from models.core.errors import InputError
 from models.systems.measured.clock import FEWEST_SAMPLES
-from models.systems.measured.run import Examination, read_files, run
+from models.systems.measured.run import RecordingAnalysis, read_files, run
 from models.systems.measured.scene import MeasuredScene
 
 ENGINE, WINDOWED = "mujoco", True
@@ -28,7 +28,7 @@ def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) 
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
     result = run(scene, engine, error=error)
-    exam: Examination = result.detail
+    exam: RecordingAnalysis = result.detail
     assert exam.outcome is not None
     forces = [answer for answer in exam.outcome.answers if answer.quantity != "acceleration"]
     quantities = {answer.name: Quantity(answer.unit, (exam.outcome.samples(answer),)) for answer in forces}

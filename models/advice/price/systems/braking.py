@@ -15,7 +15,7 @@ from models.systems.braking.march import BrakingPath
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import Stop
+from models.systems.braking.stop_report import StopHistory
 
 METHOD_NAME = "exact wheel"
 SUBSTEPS_TRIED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
@@ -24,7 +24,7 @@ FIRST_REFERENCE_SUBSTEPS, REFERENCE_RUNGS = 8, 8
 """Number of steps within a sample on the reference's first rung, and the number of its rungs."""
 USUAL_QUANTITY = "stopping_distance"
 QUANTITIES: dict[str, tuple[Any, str]] = {
-    "stopping_distance": (lambda path: Stop(path).way[-1], "m"),
+    "stopping_distance": (lambda path: StopHistory(path).way[-1], "m"),
     "stopping_time": (lambda path: path.times[-1], "s"),
     "aside": (lambda path: path.states[-1, 0, 1], "m"),
     "yaw": (lambda path: path.states[-1, 0, 2], "rad"),

@@ -15,8 +15,8 @@ from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.tables import RowBlock, table_blocks
 from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES, OUTPUT_COLUMNS, solved_rows
-from models.systems.contact.run import run, table_contacts
-from models.systems.contact.scene import ContactScene, Method
+from models.systems.contact.run import inputs_of_table_contacts, run
+from models.systems.contact.scene import ContactMethod, ContactScene
 
 PRICED_ROWS = 1000
 """Number of rows of a table, the first ones, in which the price is computed."""
@@ -95,7 +95,7 @@ class PricedContact:
         """None: no other family of methods computes the same contact theory."""
         return None
 
-    def _method(self, march_name: str, cells: int) -> Method:
+    def _method(self, march_name: str, cells: int) -> ContactMethod:
         update = {"cells": cells, **({"march": march_name} if march_name in MARCHES_OF_THEORY["fastsim"] else {})}
         return self.scene.method.model_copy(update=update)
 
@@ -106,7 +106,7 @@ class PricedContact:
             contact = run(self.scene.model_copy(update={"method": method}), error=False)
             values = np.column_stack([contact[name] for name in self.channels])
         else:
-            answered = solved_rows(self.rows, partial(table_contacts, self.scene), method, False)["forces"]
+            answered = solved_rows(self.rows, partial(inputs_of_table_contacts, self.scene), method, False)["forces"]
             values = answered[:, [OUTPUT_COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
@@ -144,7 +144,7 @@ def _sound_rows(scene: ContactScene) -> RowBlock:
     file = scene.cases_file()
     for block in islice(table_blocks(file, (BY_AXES, BY_CURVATURES), PRICED_ROWS), 1):
         coarse = scene.method.model_copy(update={"cells": CELLS_TRIED[0]})
-        wrong = solved_rows(block, partial(table_contacts, scene), coarse, False)["wrong"]
+        wrong = solved_rows(block, partial(inputs_of_table_contacts, scene), coarse, False)["wrong"]
         sound = np.setdiff1d(np.arange(len(block.lines)), wrong)
         if len(sound):
             columns = {name: column[sound] for name, column in block.values.items()}

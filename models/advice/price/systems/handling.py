@@ -20,7 +20,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
 from models.multibody.numbers import Handling
-from models.systems.handling.run import Drive, build, drive_of_fixed_steps, drive_result, drive_run
+from models.systems.handling.run import SimulatedDrive, build_in_engine, drive_of_fixed_steps, drive_result, drive_run
 from models.systems.handling.scene import HandlingScene
 
 SEARCHED_DURATION = 1.0
@@ -51,14 +51,14 @@ class PricedHandling(MeshedScene):
     speed: float
     handling: Handling
 
-    def run(self, engine: str, cells: int, step: float, duration: float) -> Drive:
+    def run(self, engine: str, cells: int, step: float, duration: float) -> SimulatedDrive:
         """Simulate the manoeuvre in an engine with this number of contact cells and this step (s)."""
         return drive_run(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
-    def exact(self, cells: int, step: float, duration: float) -> Drive:
+    def exact(self, cells: int, step: float, duration: float) -> SimulatedDrive:
         """Simulate the manoeuvre by the solver DOP853 with the engine's accelerations, as an accurate reference."""
         handling = _with_cells(self.handling, cells)
-        model, start = build(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
+        model, start = build_in_engine(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
         solved = solve_ivp(
             lambda t, y: np.concatenate((y[n:], model.acceleration(t, y[:n], y[n:]))),
@@ -73,7 +73,7 @@ class PricedHandling(MeshedScene):
             raise RunFailed(self.reference_engine, solved.message)
         return drive_of_fixed_steps(handling, Trajectory(times, solved.y.T), self.reference_engine)
 
-    def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
+    def read(self, run: SimulatedDrive) -> tuple[np.ndarray, np.ndarray, int]:
         """Times (n,) in s and values (n, k) of the quantity along a manoeuvre, and the number of force calls; the
         assumptions of the run are judged.
         """

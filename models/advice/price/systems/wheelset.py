@@ -10,13 +10,13 @@ from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds, wheelset_of
-from models.systems.wheelset.run import CONTACTS, STATES, path, path_result
+from models.systems.wheelset.run import CONTACT_CHANNELS, STATE_CHANNELS, path_result, simulated_path
 from models.systems.wheelset.scene import WheelsetScene
 
 SEARCHED_DURATION = 0.25
 """Longest part (s) of a path over which settings are searched."""
 USUAL_QUANTITY = "y"
-QUANTITIES = {**STATES, **CONTACTS}
+QUANTITIES = {**STATE_CHANNELS, **CONTACT_CHANNELS}
 """Quantities that can be priced: state index or contact field, and unit, by name."""
 
 
@@ -37,7 +37,7 @@ class PricedWheelset(MeshedScene):
         """Compute the wheelset's path at every speed in an engine, with this number of contact cells and this step
         (s).
         """
-        return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
+        return [simulated_path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
     def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
         """The wheelset's path at every speed by the solver DOP853, as an accurate reference."""
@@ -51,10 +51,10 @@ class PricedWheelset(MeshedScene):
         for speed, wheelset_run in zip(self.speeds, run, strict=True):
             path_result(self.scene, self.reference_engine, speed, wheelset_run)
         name, times = self.quantity, run[0].times
-        if name in STATES:
-            columns = [wheelset_run.states[:, [STATES[name][0]]] for wheelset_run in run]
+        if name in STATE_CHANNELS:
+            columns = [wheelset_run.states[:, [STATE_CHANNELS[name][0]]] for wheelset_run in run]
         else:
-            columns = [wheelset_run.contacts[CONTACTS[name][0]] for wheelset_run in run]
+            columns = [wheelset_run.contacts[CONTACT_CHANNELS[name][0]] for wheelset_run in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:

@@ -5,24 +5,32 @@ from typing import Any
 from models.core.scene_effects import Entry, Table
 
 
-def _control_effect(key: str, neutral: float, usual_value: float, description: str, **entry_fields: Any) -> Entry:
-    """Returns an effect that is present where a key of [control] has a value other than ``neutral``.
+def _control_effect(
+    control_key: str, neutral_value: float, usual_value: float, description: str, **entry_fields: Any
+) -> Entry:
+    """Returns an effect that is present where a key of [control] has a value other than ``neutral_value``.
 
     usual_value : value of the key when the effect is added to a scene.
     """
 
     def is_present(scene: Any) -> bool:
-        return bool(getattr(scene.control, key) != neutral)
+        return bool(getattr(scene.control, control_key) != neutral_value)
 
-    def leave_out(table: Table, scene: Any) -> None:
-        table["control"].pop(key, None)
+    def leave_out(scene_tables: Table, scene: Any) -> None:
+        scene_tables["control"].pop(control_key, None)
 
-    def put_in(table: Table, scene: Any) -> None:
-        table.setdefault("control", {})[key] = usual_value
+    def put_in(scene_tables: Table, scene: Any) -> None:
+        scene_tables.setdefault("control", {})[control_key] = usual_value
 
     cost = "a product per call"
     return Entry(
-        description, f"control.{key}", cost, is_present=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
+        description,
+        f"control.{control_key}",
+        cost,
+        is_present=is_present,
+        leave_out=leave_out,
+        put_in=put_in,
+        **entry_fields,
     )
 
 

@@ -15,42 +15,47 @@ NOISE_KEYS, CONVERTER_KEYS, SCALE_KEYS = ("noise",), ("bits", "range"), ("gain",
 """Keys of a sensor's white noise, of its analogue-digital converter, and of its wrong calibration."""
 
 
-def _differs_from_default(table: Any, keys: tuple[str, ...]) -> bool:
+def _differs_from_default(scene_table: Any, key_names: tuple[str, ...]) -> bool:
     """Whether any of some keys of a scene's table differs from its default."""
-    return any(getattr(table, key) != type(table).model_fields[key].default for key in keys)
+    return any(getattr(scene_table, key) != type(scene_table).model_fields[key].default for key in key_names)
 
 
 def _sensor_effect(
-    signal_kind: str, keys: tuple[str, ...], description: str, cost: str, count_name: str, usual_value: dict[str, float]
+    signal_kind: str,
+    key_names: tuple[str, ...],
+    description: str,
+    cost: str,
+    counted_item: str,
+    usual_value: dict[str, float],
 ) -> Entry:
     """Returns an effect of sensors at the port, present where keys of [port.signals] or [port.pressures] differ from
     those of a perfect sensor.
     """
 
     def is_present(scene: Any) -> bool:
-        return scene.port is not None and _differs_from_default(getattr(scene.port, signal_kind), keys)
+        return scene.port is not None and _differs_from_default(getattr(scene.port, signal_kind), key_names)
 
-    def leave_out(table: Table, scene: Any) -> None:
-        for key in (*keys, *(("seed",) if keys == NOISE_KEYS else ())):
-            table["port"][signal_kind].pop(key, None)
+    def leave_out(scene_tables: Table, scene: Any) -> None:
+        for key in (*key_names, *(("seed",) if key_names == NOISE_KEYS else ())):
+            scene_tables["port"][signal_kind].pop(key, None)
 
-    def put_in(table: Table, scene: Any) -> None:
-        table.setdefault("port", {}).setdefault(signal_kind, {}).update(usual_value)
+    def put_in(scene_tables: Table, scene: Any) -> None:
+        scene_tables.setdefault("port", {}).setdefault(signal_kind, {}).update(usual_value)
 
-    counts = {"asked": 1, count_name: 4}
-    key_path = f"port.{signal_kind}.{keys[0]}"
+    counts = {"asked": 1, counted_item: 4}
+    key_path = f"port.{signal_kind}.{key_names[0]}"
     return Entry(
         description, key_path, cost, counts, ("port",), is_present=is_present, leave_out=leave_out, put_in=put_in
     )
 
 
 def _brake_effect(
-    keys: tuple[str, ...],
+    key_names: tuple[str, ...],
     removed_keys: tuple[str, ...],
     description: str,
     key_path: str,
     cost: str,
-    count_name: str,
+    counted_item: str,
     usual_value: Any,
 ) -> Entry:
     """Returns an effect of the brakes, present where keys of [brakes.AXLE] differ from their defaults. Leaving it out
@@ -58,47 +63,47 @@ def _brake_effect(
     """
 
     def is_present(scene: Any) -> bool:
-        return any(_differs_from_default(getattr(scene.brakes, axle), keys) for axle in AXLE_KEYS)
+        return any(_differs_from_default(getattr(scene.brakes, axle), key_names) for axle in AXLE_KEYS)
 
-    def leave_out(table: Table, scene: Any) -> None:
-        for axle in {*AXLE_KEYS} & {*table["brakes"]}:
+    def leave_out(scene_tables: Table, scene: Any) -> None:
+        for axle in {*AXLE_KEYS} & {*scene_tables["brakes"]}:
             for key in removed_keys:
-                table["brakes"][axle].pop(key, None)
+                scene_tables["brakes"][axle].pop(key, None)
 
-    def put_in(table: Table, scene: Any) -> None:
+    def put_in(scene_tables: Table, scene: Any) -> None:
         for axle in AXLE_KEYS[:2]:
             plain = getattr(scene.brakes, axle).model_dump(exclude_none=True)
-            brake = table.setdefault("brakes", {}).setdefault(axle, plain)
+            brake = scene_tables.setdefault("brakes", {}).setdefault(axle, plain)
             brake.update(usual_value(axle, brake))
 
     return Entry(
-        description, key_path, cost, {count_name: 4}, is_present=is_present, leave_out=leave_out, put_in=put_in
+        description, key_path, cost, {counted_item: 4}, is_present=is_present, leave_out=leave_out, put_in=put_in
     )
 
 
-def _without_reservoir(table: Table, scene: Any) -> None:
+def _without_reservoir(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: remove the reservoir and its volume, so that the supply pressure is constant."""
     for key in ("reservoir", "volume"):
-        table["pressure"].pop(key, None)
+        scene_tables["pressure"].pop(key, None)
 
 
-def _without_slow_apply(table: Table, scene: Any) -> None:
+def _without_slow_apply(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: remove slow filling, so that valves apply, hold and release. The controller loses its parameter
     ``slow`` and applies in steps.
     """
-    del table["pressure"]["slow"]
-    table.get("controller", {}).get("parameters", {}).pop("slow", None)
+    del scene_tables["pressure"]["slow"]
+    scene_tables.get("controller", {}).get("parameters", {}).pop("slow", None)
 
 
-def _with_slow_apply(table: Table, scene: Any) -> None:
+def _with_slow_apply(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: let valves fill slowly, too, with eight times the time constant."""
     fill = 0.15 if scene.pressure is None else scene.pressure.fill
-    table.setdefault("pressure", {})["slow"] = 8.0 * fill
+    scene_tables.setdefault("pressure", {})["slow"] = 8.0 * fill
 
 
-def _with_delay(table: Table, scene: Any) -> None:
+def _with_delay(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: set the delay of the valves to two samples."""
-    table.setdefault("pressure", {})["delay"] = 2.0 * scene.run.sample
+    scene_tables.setdefault("pressure", {})["delay"] = 2.0 * scene.run.sample
 
 
 def _has_two_surfaces(scene: Any) -> bool:
@@ -109,34 +114,34 @@ def _has_two_surfaces(scene: Any) -> bool:
     )
 
 
-def _on_one_surface(table: Table, scene: Any) -> None:
+def _on_one_surface(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: replace the road by a single surface, the one left of the line at the start."""
     first = scene.road.stretches[0].left
-    table["road"] = {"stretches": [{"left": first}]}
-    for procedure in table["procedures"].values():
+    scene_tables["road"] = {"stretches": [{"left": first}]}
+    for procedure in scene_tables["procedures"].values():
         if "right" in procedure:
             procedure["right"] = first
 
 
-def _add_surface(table: Table, scene: Any) -> None:
+def _add_surface(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: append a stretch of road 10 m after the beginning of the last stretch; ice after dry, else dry."""
     last_stretch = scene.road.stretches[-1]
-    stretches = table.setdefault("road", {}).setdefault("stretches", [{"left": "ice"}])
+    stretches = scene_tables.setdefault("road", {}).setdefault("stretches", [{"left": "ice"}])
     stretches.append({"x": last_stretch.x + 10.0, "left": "ice" if last_stretch.left == "dry" else "dry"})
 
 
-def _without_suspension(table: Table, scene: Any) -> None:
+def _without_suspension(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: replace the suspended vehicle by a plane vehicle with the same masses, axles and wheels."""
     from models.systems.braking.of_scene import vehicle_of
 
-    table["vehicle"] = {"override": vehicle_of(scene).model_dump()}
+    scene_tables["vehicle"] = {"override": vehicle_of(scene).model_dump()}
 
 
-def _with_trailer(table: Table, scene: Any) -> None:
+def _with_trailer(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: add the unladen trailer CHOSEN_TRAILER."""
     from models.brake.trailer import CHOSEN_TRAILER
 
-    table["trailer"] = CHOSEN_TRAILER.model_dump(exclude_unset=True)
+    scene_tables["trailer"] = CHOSEN_TRAILER.model_dump(exclude_unset=True)
 
 
 def _tows_bodies(scene: Any) -> bool:

@@ -13,25 +13,29 @@ from models.core.scene_effects import Entry, Table
 
 
 def _theory_effect(
-    description: str, theory: str, cost: str, count_name: str, method_without: Callable[[Any], dict[str, str]]
+    description: str,
+    theory_name: str,
+    cost: str,
+    counted_item: str,
+    method_without_theory: Callable[[Any], dict[str, str]],
 ) -> Entry:
-    """Returns the effect of a theory beyond FASTSIM. ``method_without`` returns the scene's [method] without this
-    theory, except the key cells.
+    """Returns the effect of a theory beyond FASTSIM. ``method_without_theory`` returns the scene's [method] without
+    this theory, except the key cells.
     """
 
-    def leave_out(table: Table, scene: Any) -> None:
-        cells = {key: value for key, value in table["method"].items() if key == "cells"}
-        table["method"] = cells | method_without(scene)
+    def leave_out(scene_tables: Table, scene: Any) -> None:
+        cells = {key: value for key, value in scene_tables["method"].items() if key == "cells"}
+        scene_tables["method"] = cells | method_without_theory(scene)
 
     return Entry(
         description,
         "method.name",
         cost,
-        {count_name: 1},
+        {counted_item: 1},
         **BOUND_BY_CONSTANT_FRICTION,
-        is_present=lambda scene: scene.method.name == theory,
+        is_present=lambda scene: scene.method.name == theory_name,
         leave_out=leave_out,
-        put_in=_naming_theory(theory),
+        put_in=_naming_theory(theory_name),
     )
 
 
@@ -45,23 +49,23 @@ def _method_without_half_space(scene: Any) -> dict[str, str]:
     return {"name": "fastsim" if scene.profiles is None else "simplified"}
 
 
-def _naming_theory(name: str) -> Callable[[Table, Any], None]:
+def _naming_theory(theory_name: str) -> Callable[[Table, Any], None]:
     """Returns a function that edits a scene so that its [method] names the theory."""
 
-    def put_in(table: Table, scene: Any) -> None:
-        table["method"] = {"name": name}
+    def put_in(scene_tables: Table, scene: Any) -> None:
+        scene_tables["method"] = {"name": theory_name}
 
     return put_in
 
 
-def _without_slip(table: Table, scene: Any) -> None:
+def _without_slip(scene_tables: Table, scene: Any) -> None:
     if scene.profiles is not None:
         allowed = "cannot be left out on profiles: the linear theory needs an ellipse"
         raise InputError(scene.file, "method.name", scene.method.name, allowed)
-    table["method"] = {"name": "linear"}
+    scene_tables["method"] = {"name": "linear"}
 
 
-def _without_profiles(table: Table, scene: Any) -> None:
+def _without_profiles(scene_tables: Table, scene: Any) -> None:
     allowed = "can only give way to an ellipse: name ellipse, curvatures or radii"
     raise InputError(scene.file, "profiles", None, allowed)
 
@@ -71,11 +75,11 @@ def _spin_is_swept(scene: Any) -> bool:
     return scene.sweep is not None and scene.sweep.of == "spin"
 
 
-def _without_spin(table: Table, scene: Any) -> None:
+def _without_spin(scene_tables: Table, scene: Any) -> None:
     if _spin_is_swept(scene):
         allowed = "is what this scene asks for: sweep another creepage to leave it out"
         raise InputError(scene.file, "sweep.of", "spin", allowed)
-    table["creepage"].pop("spin")
+    scene_tables["creepage"].pop("spin")
 
 
 NEEDS_SATURATION = ("saturation",)

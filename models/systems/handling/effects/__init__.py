@@ -11,27 +11,31 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _manoeuvre_effect(key: str, description: str, cost: str, work_counts: dict[str, int], usual_value: Any) -> Entry:
+def _manoeuvre_effect(
+    manoeuvre_key: str, description: str, cost: str, work_counts: dict[str, int], usual_value: Any
+) -> Entry:
     """Returns an effect that is present where a key of any manoeuvre has a value; it is left out of all manoeuvres, or
     put into all.
     """
 
     def is_present(scene: Any) -> bool:
-        values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
+        values = [getattr(manoeuvre, manoeuvre_key) for manoeuvre in scene.manoeuvres.values()]
         acts = any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
-        return acts or (key in MEASURED_CONTROLS and _is_measured_drive(scene))
+        return acts or (manoeuvre_key in MEASURED_CONTROLS and _is_measured_drive(scene))
 
-    def leave_out(table: dict[str, Any], scene: Any) -> None:
-        if key in MEASURED_CONTROLS and _is_measured_drive(scene):
-            raise InputError(scene.file, key, None, "belongs to the measured drive: leave out manoeuvres.NAME.measured")
-        for manoeuvre in table["manoeuvres"].values():
-            manoeuvre.pop(key, None)
+    def leave_out(scene_tables: dict[str, Any], scene: Any) -> None:
+        if manoeuvre_key in MEASURED_CONTROLS and _is_measured_drive(scene):
+            raise InputError(
+                scene.file, manoeuvre_key, None, "belongs to the measured drive: leave out manoeuvres.NAME.measured"
+            )
+        for manoeuvre in scene_tables["manoeuvres"].values():
+            manoeuvre.pop(manoeuvre_key, None)
 
-    def put_in(table: dict[str, Any], scene: Any) -> None:
-        for manoeuvre in table["manoeuvres"].values():
-            manoeuvre[key] = usual_value
+    def put_in(scene_tables: dict[str, Any], scene: Any) -> None:
+        for manoeuvre in scene_tables["manoeuvres"].values():
+            manoeuvre[manoeuvre_key] = usual_value
 
-    key_path = f"manoeuvres.NAME.{key}"
+    key_path = f"manoeuvres.NAME.{manoeuvre_key}"
     return Entry(description, key_path, cost, work_counts, is_present=is_present, leave_out=leave_out, put_in=put_in)
 
 
@@ -39,22 +43,22 @@ CAR_ALONE, CAR_WITH_CARAVAN = "r19_free", "r19_caravan"
 """Names of two shipped vehicles: a car, and the same car with a caravan."""
 
 
-def without_trailer(table: Table, scene: Any) -> None:
+def without_trailer(scene_tables: Table, scene: Any) -> None:
     """Replace the shipped car with caravan by the shipped car alone. Raises InputError for another vehicle file, which
     its user must change.
     """
     if scene.vehicle.file != CAR_WITH_CARAVAN:
         allowed = "has bodies with a hitch: name a vehicle file without them"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
-    table["vehicle"]["file"] = CAR_ALONE
+    scene_tables["vehicle"]["file"] = CAR_ALONE
 
 
-def with_trailer(table: Table, scene: Any) -> None:
+def with_trailer(scene_tables: Table, scene: Any) -> None:
     """Replace the shipped car by the shipped car with caravan. Raises InputError for another vehicle file."""
     if scene.vehicle.file != CAR_ALONE:
         allowed = "has no trailer: add a body with a hitch, and its wheels, to that file"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
-    table.setdefault("vehicle", {})["file"] = CAR_WITH_CARAVAN
+    scene_tables.setdefault("vehicle", {})["file"] = CAR_WITH_CARAVAN
 
 
 MEASURED_CONTROLS = ("steer", "brake", "drive")
@@ -66,9 +70,9 @@ def _is_measured_drive(scene: Any) -> bool:
     return any(manoeuvre.measured for manoeuvre in scene.manoeuvres.values())
 
 
-def _without_measured_drive(table: dict[str, Any], scene: Any) -> None:
+def _without_measured_drive(scene_tables: dict[str, Any], scene: Any) -> None:
     """Replace measured drives by rolling straight ahead from the same speed for the same time."""
-    for manoeuvre in table["manoeuvres"].values():
+    for manoeuvre in scene_tables["manoeuvres"].values():
         manoeuvre.pop("measured", None)
         manoeuvre.pop("stretch", None)
 

@@ -30,14 +30,14 @@ def _selected_effect(
         named = word == usual_value if key != "frame" else word != value_without
         return named and not (entry_fields.get("needs") and scene.road is None)
 
-    def leave_out(table: Table, scene: Any) -> None:
+    def leave_out(scene_tables: Table, scene: Any) -> None:
         if value_without is None:
-            del table[name][key]
+            del scene_tables[name][key]
         else:
-            table.setdefault(name, {})[key] = value_without
+            scene_tables.setdefault(name, {})[key] = value_without
 
-    def put_in(table: Table, scene: Any) -> None:
-        table.setdefault(name, {})[key] = usual_value
+    def put_in(scene_tables: Table, scene: Any) -> None:
+        scene_tables.setdefault(name, {})[key] = usual_value
 
     return Entry(
         description,
@@ -51,7 +51,7 @@ def _selected_effect(
     )
 
 
-def _keep_road(table: Table, scene: Any) -> None:
+def _keep_road(scene_tables: Table, scene: Any) -> None:
     """Raise InputError: the road can be left out only if files replace it."""
     raise InputError(scene.file, "road", None, "can only give way to forces.file and angles.file: name them")
 

@@ -16,6 +16,6 @@ class Parameters(Strict):
     """[effects.lift_off]: no settings."""
 
 
-def extend(vehicle: SpatialVehicle, p: Any) -> SpatialVehicle:
+def extend(vehicle: SpatialVehicle, parameters: Any) -> SpatialVehicle:
     """Returns the vehicle with tyres that only push, by the law of ``models.systems.pitch_plane.effects.lift_off``."""
     return vehicle.with_tyres(pushes_only=True)

@@ -9,56 +9,60 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _transducer_effect(key: str, description: str, cost: str, usual_value: dict[str, Any], **counts: int) -> Entry:
+def _transducer_effect(
+    fault_key: str, description: str, cost: str, usual_value: dict[str, Any], **work_counts: int
+) -> Entry:
     """Returns an effect of virtual transducers that is present where a key of [virtual.faults] has a value. Measured
     files cannot have it, as their faults are their own.
     """
     why = "for files have the faults that they have"
 
     def is_present(scene: Any) -> bool:
-        fault = getattr(scene.virtual.faults, key) if scene.virtual is not None else None
+        fault = getattr(scene.virtual.faults, fault_key) if scene.virtual is not None else None
         return any(fault.values()) if isinstance(fault, Mapping) else fault is not None
 
-    def put_in(table: Table, scene: Any) -> None:
-        if "virtual" not in table:
-            raise InputError(scene.file, f"virtual.faults.{key}", None, f"needs a table [virtual], {why}")
-        table["virtual"].setdefault("faults", {})[key] = usual_value
+    def put_in(scene_tables: Table, scene: Any) -> None:
+        if "virtual" not in scene_tables:
+            raise InputError(scene.file, f"virtual.faults.{fault_key}", None, f"needs a table [virtual], {why}")
+        scene_tables["virtual"].setdefault("faults", {})[fault_key] = usual_value
 
-    faulty = {name.replace("_", " "): count for name, count in counts.items()}
+    faulty = {name.replace("_", " "): count for name, count in work_counts.items()}
     needs = ("virtual_measurement",)
     return Entry(
-        description, f"virtual.faults.{key}", cost, faulty, needs, why=why, is_present=is_present, put_in=put_in
+        description, f"virtual.faults.{fault_key}", cost, faulty, needs, why=why, is_present=is_present, put_in=put_in
     )
 
 
-def _stabiliser_effect(method: str, description: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
+def _stabiliser_effect(
+    stabiliser_method: str, description: str, cost: str, counted_item: str, needed_modules: tuple[str, ...] = ()
+) -> Entry:
     """Returns the effect of a stabiliser method. Without it roll and pitch are not stabilised, as the other method
     costs more.
     """
 
-    def leave_out(table: Table, scene: Any) -> None:
-        table.setdefault("stabilise", {})["method"] = "none"
+    def leave_out(scene_tables: Table, scene: Any) -> None:
+        scene_tables.setdefault("stabilise", {})["method"] = "none"
 
     return Entry(
         description,
         "stabilise.method",
         cost,
-        {count: 2},
-        modules=modules,
-        usual_value=method,
-        is_present=lambda scene: scene.stabilise.method == method,
+        {counted_item: 2},
+        modules=needed_modules,
+        usual_value=stabiliser_method,
+        is_present=lambda scene: scene.stabilise.method == stabiliser_method,
         leave_out=leave_out,
     )
 
 
-def _without_clock_errors(table: Table, scene: Any) -> None:
+def _without_clock_errors(scene_tables: Table, scene: Any) -> None:
     """Edit a scene: remove offset and drift of the files' clocks."""
-    for file in table["files"]:
+    for file in scene_tables["files"]:
         file.pop("offset", None)
         file.pop("drift", None)
 
 
-def _keep_road(table: Table, scene: Any) -> None:
+def _keep_road(scene_tables: Table, scene: Any) -> None:
     """Raise InputError, as the virtual measurement can be left out only if measured files replace it."""
     raise InputError(scene.file, "virtual", None, "can only give way to [[files]] that were measured: name them")
 

@@ -21,7 +21,7 @@ from models.systems.pitch_plane.sampling import (
     SEED_FIELD,
     check_rate,
     instant_numbers,
-    read_samples,
+    sample_and_hold,
     within_range,
 )
 
@@ -68,15 +68,18 @@ class Parameters(Strict):
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
-def channels_of_sensors(parameters: Parameters) -> list[tuple[str, ...]]:
+def channels_of_sensors(sensor_parameters: Parameters) -> list[tuple[str, ...]]:
     """Names of the three channels of each sensor, in the scene's order: ax1, ay1, az1, then ax2 and so on."""
-    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(parameters.sensors))]
+    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(sensor_parameters.sensors))]
 
 
-def readings_of(result: Result, parameters: Parameters) -> np.ndarray:
+def readings_of(result: Result, sensor_parameters: Parameters) -> np.ndarray:
     """Returns the readings (n, sensors, 3) in m/s^2 of the accelerometers in a result."""
     return np.stack(
-        [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(parameters)],
+        [
+            np.column_stack([result[channel] for channel in channels])
+            for channels in channels_of_sensors(sensor_parameters)
+        ],
         axis=1,
     )
 
@@ -87,28 +90,35 @@ class Accelerometers:
 
     parameters: Parameters
 
-    def __call__(self, assembly: Assembly, run: Trajectory, model: Model) -> Channels:
+    def __call__(self, vehicle_assembly: Assembly, trajectory: Trajectory, engine_model: Model) -> Channels:
         """Returns three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
-        p, number = self.parameters, instant_numbers(run.times, self.parameters.sampling_rate)
-        row = read_samples(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, RATE_KEY)
-        values = self._readings(assembly, run, model, np.unique(row))[number]
+        p, number = self.parameters, instant_numbers(trajectory.times, self.parameters.sampling_rate)
+        row = sample_and_hold(
+            trajectory.times, np.arange(len(trajectory.times)), p.sampling_rate, vehicle_assembly.scene, RATE_KEY
+        )
+        values = self._readings(vehicle_assembly, trajectory, engine_model, np.unique(row))[number]
         return {
             channel: ("m/s^2", f"accelerometer {sensor}, specific force along the chassis' {axis}", values[:, i, j])
             for i, (sensor, channels) in enumerate(zip(p.sensors, channels_of_sensors(p), strict=True))
             for j, (axis, channel) in enumerate(zip("xyz", channels, strict=True))
         }
 
-    def _readings(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
-        """Readings (samples, sensors, 3) in m/s^2 at ``rows``, the run's rows at the sampling times."""
+    def _readings(
+        self, vehicle_assembly: Assembly, trajectory: Trajectory, engine_model: Model, sample_rows: np.ndarray
+    ) -> np.ndarray:
+        """Readings (samples, sensors, 3) in m/s^2 at ``sample_rows``, the run's rows at the sampling times."""
         from models.sensors.sensor_array import reading_on_bracket, sensor_readings
 
-        p, y = self.parameters, run.states[rows]
+        p, y = self.parameters, trajectory.states[sample_rows]
         accelerations = np.array(
-            [model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows]
+            [
+                engine_model.acceleration(trajectory.times[row], trajectory.positions[row], trajectory.rates[row])
+                for row in sample_rows
+            ]
         )
         sensor_positions = np.array(list(p.positions().values()))
         values = sensor_readings(
-            sensor_positions, y[:, 3], y[:, 7], accelerations[:, 2], accelerations[:, 3], assembly.parameters.g
+            sensor_positions, y[:, 3], y[:, 7], accelerations[:, 2], accelerations[:, 3], vehicle_assembly.parameters.g
         )
         for i, sensor in enumerate(p.sensors.values()):
             if sensor.bracket is not None:
@@ -119,15 +129,17 @@ class Accelerometers:
         return values + p.deviation * noise.reshape(values.shape)
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with accelerometer readings among its channels."""
-    check_rate(assembly.scene, RATE_KEY, p.sampling_rate)
+    check_rate(vehicle_assembly.scene, RATE_KEY, parameters.sampling_rate)
     axes = {
         f"{sensor}, {axis}": channel
-        for sensor, channels in zip(p.sensors, channels_of_sensors(p), strict=True)
+        for sensor, channels in zip(parameters.sensors, channels_of_sensors(parameters), strict=True)
         for axis, channel in zip("xyz", channels, strict=True)
     }
-    range_assumption = within_range("accelerometers", axes, "m/s^2", p.range or USUAL_RANGE)
+    range_assumption = within_range("accelerometers", axes, "m/s^2", parameters.range or USUAL_RANGE)
     return replace(
-        assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, range_assumption)
+        vehicle_assembly,
+        sensors=(*vehicle_assembly.sensors, Accelerometers(parameters)),
+        assumptions=(*vehicle_assembly.assumptions, range_assumption),
     )

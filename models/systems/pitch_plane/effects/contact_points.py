@@ -29,23 +29,23 @@ class Parameters(Strict):
     """[effects.contact_points]: no settings."""
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with the motion of the contact points among its channels."""
-    if assembly.mode == "force-body":
+    if vehicle_assembly.mode == "force-body":
         raise InputError(
-            assembly.scene.file,
+            vehicle_assembly.scene.file,
             "effects.contact_points",
             None,
             "contact points move vertically: use frame = 'inertial' for the wheel forces",
         )
-    return replace(assembly, outputs=(*assembly.outputs, contact_points))
+    return replace(vehicle_assembly, outputs=(*vehicle_assembly.outputs, contact_points))
 
 
-def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+def contact_points(vehicle_assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
     """Channels zeta1, zeta2 (m, positive down) of the contact points over a run. At the start the tyres are at rest
     under the first force.
     """
-    p, signal = assembly.parameters, assembly.input
+    p, signal = vehicle_assembly.parameters, vehicle_assembly.input
     forces = signal.parts[0] if isinstance(signal, Stacked) else signal
     assert isinstance(forces, Sampled | Smooth)
     pieces = forces.polynomials()
@@ -61,45 +61,53 @@ def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) ->
 
 
 def compression(
-    force_pieces: np.ndarray, force_period: float, stiffness: float, damping: float, times: np.ndarray
+    force_polynomials: np.ndarray,
+    force_sample_period: float,
+    tyre_stiffness: float,
+    tyre_damping: float,
+    times: np.ndarray,
 ) -> np.ndarray:
     """Tyre compression e (n,) in m that solves d e' + k e = f at times (n,) in s, exact where the force f is a
     polynomial between samples.
 
-    force_pieces : (powers, periods), the force (N) in the time since each sample, lowest power first.
+    force_polynomials : (powers, periods), the force (N) in the time since each sample, lowest power first.
     On each piece e = P(t) + (e_0 - P(0)) exp(-t / tau) with tau = d / k and the particular solution
     P = (f - tau f' + tau^2 f'' - ...) / k, which ends because f is a polynomial.
     """
-    tau = damping / stiffness
-    particular = _particular_solution(force_pieces, tau) / stiffness
-    piece = np.clip(np.floor(times / force_period + 1e-9).astype(int), 0, force_pieces.shape[1] - 1)
-    since = np.maximum(times - piece * force_period, 0.0)
+    tau = tyre_damping / tyre_stiffness
+    particular = _particular_solution(force_polynomials, tau) / tyre_stiffness
+    piece = np.clip(np.floor(times / force_sample_period + 1e-9).astype(int), 0, force_polynomials.shape[1] - 1)
+    since = np.maximum(times - piece * force_sample_period, 0.0)
     steady_part = sum(particular[power, piece] * since**power for power in range(len(particular)))
     if tau == 0.0:
         return np.asarray(steady_part)
-    starts = _start_compressions(particular, force_pieces[0, 0] / stiffness, force_period, tau)
+    starts = _start_compressions(particular, force_polynomials[0, 0] / tyre_stiffness, force_sample_period, tau)
     return steady_part + (starts - particular[0])[piece] * np.exp(-since / tau)
 
 
-def _particular_solution(force_pieces: np.ndarray, tau: float) -> np.ndarray:
-    """Coefficients of the particular solution f - tau f' + tau^2 f'' - ..., shape as ``force_pieces``; tau in s."""
-    total, derivative = np.zeros_like(force_pieces), force_pieces.copy()
-    for order in range(len(force_pieces)):
-        total += (-tau) ** order * derivative
+def _particular_solution(force_polynomials: np.ndarray, time_constant: float) -> np.ndarray:
+    """Coefficients of the particular solution f - tau f' + tau^2 f'' - ..., shape as ``force_polynomials``; tau in
+    s.
+    """
+    total, derivative = np.zeros_like(force_polynomials), force_polynomials.copy()
+    for order in range(len(force_polynomials)):
+        total += (-time_constant) ** order * derivative
         derivative = np.vstack(
-            [derivative[1:] * np.arange(1, len(force_pieces))[:, None], np.zeros_like(force_pieces[:1])]
+            [derivative[1:] * np.arange(1, len(force_polynomials))[:, None], np.zeros_like(force_polynomials[:1])]
         )
     return total
 
 
-def _start_compressions(particular: np.ndarray, first: float, sample_period: float, tau: float) -> np.ndarray:
+def _start_compressions(
+    particular_solution: np.ndarray, first_compression: float, sample_period: float, time_constant: float
+) -> np.ndarray:
     """Tyre compression (m) at the start of each polynomial piece, equal to the compression at the end of the piece
     before.
     """
-    powers = sample_period ** np.arange(len(particular))
-    gained = powers @ particular - particular[0] * math.exp(-sample_period / tau)
-    starts = np.empty(particular.shape[1])
-    starts[0] = first
+    powers = sample_period ** np.arange(len(particular_solution))
+    gained = powers @ particular_solution - particular_solution[0] * math.exp(-sample_period / time_constant)
+    starts = np.empty(particular_solution.shape[1])
+    starts[0] = first_compression
     for i in range(len(starts) - 1):
-        starts[i + 1] = gained[i] + starts[i] * math.exp(-sample_period / tau)
+        starts[i + 1] = gained[i] + starts[i] * math.exp(-sample_period / time_constant)
     return starts

@@ -27,9 +27,11 @@ class Parameters(Strict):
     path: int = PATH_FIELD
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with noise added to both wheel forces."""
-    signal = assembly.input
+    signal = vehicle_assembly.input
     assert isinstance(signal, Sampled | Smooth)
-    noisy = signal.values + p.deviation * normal_samples(p.seed, p.path, len(signal.values), 2)
-    return replace(assembly, input=replace(signal, values=noisy))
+    noisy = signal.values + parameters.deviation * normal_samples(
+        parameters.seed, parameters.path, len(signal.values), 2
+    )
+    return replace(vehicle_assembly, input=replace(signal, values=noisy))

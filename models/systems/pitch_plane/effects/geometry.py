@@ -12,11 +12,11 @@ def named(scene: Any) -> bool:
     return bool(scene.vehicle.geometry == "exact")
 
 
-def leave_out(table: dict[str, Any], scene: Any) -> None:
+def leave_out(scene_tables: dict[str, Any], scene: Any) -> None:
     """Edit a scene so that the equations are linear in the pitch."""
-    table.setdefault("vehicle", {})["geometry"] = "linear"
+    scene_tables.setdefault("vehicle", {})["geometry"] = "linear"
 
 
-def put_in(table: dict[str, Any], scene: Any) -> None:
+def put_in(scene_tables: dict[str, Any], scene: Any) -> None:
     """Edit a scene so that its geometry is "exact"."""
-    table.setdefault("vehicle", {})["geometry"] = "exact"
+    scene_tables.setdefault("vehicle", {})["geometry"] = "exact"

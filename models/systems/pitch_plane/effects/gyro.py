@@ -42,16 +42,18 @@ class Gyro:
 
     parameters: Any
 
-    def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+    def __call__(self, vehicle_assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
         """Returns the channel ``gyro``: the gyro's reading of the pitch rate (rad/s), positive nose up."""
-        reading = noisy_reading(self.parameters, GYRO, times, states[:, 7], assembly.scene, RATE_KEY)
+        reading = noisy_reading(self.parameters, GYRO, times, states[:, 7], vehicle_assembly.scene, RATE_KEY)
         return {"gyro": ("rad/s", "pitch rate as a gyro reads it, nose up", reading)}
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with a gyro's reading among its channels."""
-    check_rate(assembly.scene, RATE_KEY, p.sampling_rate)
-    range_assumption = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL_RANGE)
+    check_rate(vehicle_assembly.scene, RATE_KEY, parameters.sampling_rate)
+    range_assumption = within_range("gyro", {"gyro": "gyro"}, "rad/s", parameters.range or USUAL_RANGE)
     return replace(
-        assembly, outputs=(*assembly.outputs, Gyro(p)), assumptions=(*assembly.assumptions, range_assumption)
+        vehicle_assembly,
+        outputs=(*vehicle_assembly.outputs, Gyro(parameters)),
+        assumptions=(*vehicle_assembly.assumptions, range_assumption),
     )

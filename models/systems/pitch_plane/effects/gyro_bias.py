@@ -40,10 +40,10 @@ class BiasedGyro:
     gyro: Gyro
     parameters: Any
 
-    def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+    def __call__(self, vehicle_assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
         """Returns the channels ``gyro``, the reading with its bias, and ``gyro_bias``, the bias alone (both rad/s)."""
         p, rate = self.parameters, self.gyro.parameters.sampling_rate
-        unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
+        unit, meaning, read = self.gyro(vehicle_assembly, times, states)["gyro"]
         number = instant_numbers(times, rate)
         drift = bias_path(
             int(number[-1]) + 1,
@@ -57,7 +57,9 @@ class BiasedGyro:
         return {"gyro": (unit, meaning, read + drift), "gyro_bias": ("rad/s", "bias of the gyro", drift)}
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with its gyro replaced by a gyro with a bias."""
-    biased = tuple(BiasedGyro(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
-    return replace(assembly, outputs=biased)
+    biased = tuple(
+        BiasedGyro(output, parameters) if isinstance(output, Gyro) else output for output in vehicle_assembly.outputs
+    )
+    return replace(vehicle_assembly, outputs=biased)

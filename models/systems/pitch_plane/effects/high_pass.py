@@ -26,8 +26,10 @@ class Parameters(Strict):
     damping_ratio: float = quantity("1", "damping ratio of the high-pass", default=0.7, zero=True)
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the force-excited vehicle with the rotational spring and damper to the ground that are equivalent to the
     high-pass.
     """
-    return assembly.with_spring(PitchSpring("chassis", *pitch_spring(assembly.parameters, p.cut_off, p.damping_ratio)))
+    return vehicle_assembly.with_spring(
+        PitchSpring("chassis", *pitch_spring(vehicle_assembly.parameters, parameters.cut_off, parameters.damping_ratio))
+    )

@@ -31,7 +31,7 @@ from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
 
 if TYPE_CHECKING:
-    from models.systems.pitch_plane.pitch_filter import Measurement, PitchEstimate
+    from models.systems.pitch_plane.pitch_filter import PitchEstimate, PitchMeasurement
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_and_pitch")
@@ -95,19 +95,19 @@ class Parameters(Strict):
     smoother: bool = Field(False, description="use all measurements for every time, later ones too")
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the force-excited vehicle with a moment that pulls its pitch towards the filter's estimate."""
-    guide = guide_of(assembly, p)
-    _check_innovations(assembly, p, guide)
-    _check_bandwidth(assembly, p, guide)
-    stiffness, damping = pitch_spring(assembly.parameters, p.bandwidth, p.damping_ratio)
+    guide = guide_of(vehicle_assembly, parameters)
+    _check_innovations(vehicle_assembly, parameters, guide)
+    _check_bandwidth(vehicle_assembly, parameters, guide)
+    stiffness, damping = pitch_spring(vehicle_assembly.parameters, parameters.bandwidth, parameters.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
-    sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
+    sprung = vehicle_assembly.with_spring(PitchSpring("chassis", stiffness, damping))
     guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
     return replace(
         guided,
         outputs=(*guided.outputs, partial(_guiding_channels, guide, stiffness, damping)),
-        doubts=(*guided.doubts, *_filter_objections(p, guide)),
+        doubts=(*guided.doubts, *_filter_objections(parameters, guide)),
         assumptions=(*guided.assumptions, _innovation_assumption(guide)),
     )
 
@@ -141,88 +141,94 @@ _LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
 """Cache of the last estimate, by all inputs on which it depends: the check and the run in every engine use the same."""
 
 
-def guide_of(assembly: Assembly, parameters: Parameters) -> GuidingEstimate:
+def guide_of(vehicle_assembly: Assembly, filter_parameters: Parameters) -> GuidingEstimate:
     """Returns the estimated pitch that a force-excited assembly follows. Raises InputError for an unusable file, and
     RunFailed from the filter.
     """
-    from models.systems.pitch_plane.pitch_filter import estimate
+    from models.systems.pitch_plane.pitch_filter import estimate_pitch
 
-    measured, forces, p_vehicle = _measurement(assembly, parameters), assembly.input, assembly.parameters
+    measured, forces, p_vehicle = (
+        _measurement(vehicle_assembly, filter_parameters),
+        vehicle_assembly.input,
+        vehicle_assembly.parameters,
+    )
     assert isinstance(forces, Sampled | Smooth)
     signal = type(forces).__name__, forces.values, forces.period, forces.held
-    kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
-    key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, parameters))
+    kind = vehicle_assembly.mode, vehicle_assembly.vehicle.geometry, vehicle_assembly.scene.run.duration
+    key = pickle.dumps((kind, p_vehicle.array(), vehicle_assembly.initial, signal, measured, filter_parameters))
     if key not in _LATEST_GUIDE:
-        estimated = estimate(
-            assembly,
+        estimated = estimate_pitch(
+            vehicle_assembly,
             measured,
-            parameters.force_deviation,
-            start_deviation=parameters.start_deviation,
-            inertia_deviation=parameters.inertia_deviation,
-            smoother=parameters.smoother,
+            filter_parameters.force_deviation,
+            start_deviation=filter_parameters.start_deviation,
+            inertia_deviation=filter_parameters.inertia_deviation,
+            with_smoother=filter_parameters.smoother,
         )
         _LATEST_GUIDE.clear()
-        _LATEST_GUIDE[key] = _guiding_estimate(assembly, estimated, measured)
+        _LATEST_GUIDE[key] = _guiding_estimate(vehicle_assembly, estimated, measured)
     return _LATEST_GUIDE[key]
 
 
-def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurement") -> GuidingEstimate:
-    from models.systems.pitch_plane.pitch_filter import INERTIA_SHARE, KEPT_STATES, PITCH, PITCH_RATE
+def _guiding_estimate(
+    vehicle_assembly: Assembly, pitch_estimate: "PitchEstimate", pitch_measurement: "PitchMeasurement"
+) -> GuidingEstimate:
+    from models.systems.pitch_plane.pitch_filter import FILTERED_STATES, INERTIA_SHARE, PITCH, PITCH_RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
-    deviations = np.sqrt(estimated.error_covariances()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
-    share, names = estimated.states[:, INERTIA_SHARE], {PITCH: "pitch", PITCH_RATE: "pitch_rate"}
+    deviations = np.sqrt(pitch_estimate.error_covariances()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
+    share, names = pitch_estimate.states[:, INERTIA_SHARE], {PITCH: "pitch", PITCH_RATE: "pitch_rate"}
     relative = np.zeros((8, len(share)))
-    relative[KEPT_STATES] = estimated.states[:, :6].T
-    moment = suspension_loads(relative, assembly.parameters, assembly.vehicle.geometry)[2]
-    fits = consistency(estimated.innovations, [names[column] for column in measurement.columns])
+    relative[FILTERED_STATES] = pitch_estimate.states[:, :6].T
+    moment = suspension_loads(relative, vehicle_assembly.parameters, vehicle_assembly.vehicle.geometry)[2]
+    fits = consistency(pitch_estimate.innovations, [names[column] for column in pitch_measurement.columns])
     return GuidingEstimate(
-        estimated.period,
-        estimated.states,
-        estimated.states[:, [PITCH, PITCH_RATE]],
+        pitch_estimate.period,
+        pitch_estimate.states,
+        pitch_estimate.states[:, [PITCH, PITCH_RATE]],
         deviations,
         share,
         share * moment,
-        np.cumsum(estimated.used_values),
-        np.cumsum(estimated.missed_values),
-        np.nancumsum(estimated.normalised_innovations),
+        np.cumsum(pitch_estimate.used_values),
+        np.cumsum(pitch_estimate.missed_values),
+        np.nancumsum(pitch_estimate.normalised_innovations),
         fits,
     )
 
 
-def _measurement(assembly: Assembly, parameters: Parameters) -> "Measurement":
+def _measurement(vehicle_assembly: Assembly, filter_parameters: Parameters) -> "PitchMeasurement":
     """Reads the measured pitch and pitch rate of the file, with their standard deviations. Raises InputError for files
     that the filter cannot use.
     """
     from models.core.time_series import read_time_series
-    from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, Measurement
+    from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, PitchMeasurement
 
-    scene, key_path = assembly.scene, "effects.kalman_filter"
+    scene, key_path = vehicle_assembly.scene, "effects.kalman_filter"
     known = (
-        ("pitch", RADIANS, PITCH, parameters.pitch_deviation),
-        ("pitch_rate", RADIANS_PER_SECOND, PITCH_RATE, parameters.rate_deviation),
+        ("pitch", RADIANS, PITCH, filter_parameters.pitch_deviation),
+        ("pitch_rate", RADIANS_PER_SECOND, PITCH_RATE, filter_parameters.rate_deviation),
     )
     read_columns = {name: (units, state, deviation) for name, units, state, deviation in known if deviation is not None}
     if not read_columns:
         raise InputError(
             scene.file, key_path, None, "needs pitch_deviation, rate_deviation or both: the columns to read"
         )
-    path = scene.path(parameters.file, f"{key_path}.file")
+    path = scene.path(filter_parameters.file, f"{key_path}.file")
     values, period = read_time_series(path, {name: fields[0] for name, fields in read_columns.items()}, gaps=True)
     for name, column in zip(read_columns, values.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
-    check_end(scene, f"{key_path}.file", parameters.file, len(values) * period)
-    assert assembly.input is not None and assembly.input.period is not None
-    if not divides(*sorted((period, assembly.input.period))):
+    check_end(scene, f"{key_path}.file", filter_parameters.file, len(values) * period)
+    assert vehicle_assembly.input is not None and vehicle_assembly.input.period is not None
+    if not divides(*sorted((period, vehicle_assembly.input.period))):
         raise InputError(
             scene.file,
             f"{key_path}.file",
-            parameters.file,
-            f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
+            filter_parameters.file,
+            f"is sampled every {period:g} s and the forces every {vehicle_assembly.input.period:g} s: one must be "
             "a multiple of the other",
         )
-    return Measurement(
+    return PitchMeasurement(
         values,
         period,
         tuple(fields[1] for fields in read_columns.values()),
@@ -230,22 +236,25 @@ def _measurement(assembly: Assembly, parameters: Parameters) -> "Measurement":
     )
 
 
-def _check_innovations(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
+def _check_innovations(
+    vehicle_assembly: Assembly, filter_parameters: Parameters, guiding_estimate: GuidingEstimate
+) -> None:
     """Raise InputError where the measurement contradicts wheel forces or model: the mean normalised innovation squared
     is above INNOVATION_LIMIT.
     """
     mean = float(guiding_estimate.innovation_sum[-1] / max(guiding_estimate.used_values[-1], 1))
     if mean > INNOVATION_LIMIT:
         raise InputError(
-            assembly.scene.file,
+            vehicle_assembly.scene.file,
             "effects.kalman_filter",
             None,
-            f"{parameters.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
-            f"what the deviations allow (at most {INNOVATION_LIMIT:g}): check sign and unit, or state larger ones",
+            f"{filter_parameters.file} contradicts forces and model: the squares of the innovations are {mean:.3g} "
+            f"times what the deviations allow (at most {INNOVATION_LIMIT:g}): check sign and unit, or state larger "
+            "ones",
         )
 
 
-def _filter_objections(parameters: Parameters, guiding_estimate: GuidingEstimate) -> tuple[str, ...]:
+def _filter_objections(filter_parameters: Parameters, guiding_estimate: GuidingEstimate) -> tuple[str, ...]:
     """Objections to the measurement or the model, as text, where the filter's innovations are not consistent."""
     if guiding_estimate.consistency.consistent:
         return ()
@@ -255,9 +264,9 @@ def _filter_objections(parameters: Parameters, guiding_estimate: GuidingEstimate
     remedy = (
         "the stated deviations are too large: state smaller ones"
         if square.value < square.low
-        else f"check {parameters.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
+        else f"check {filter_parameters.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
     )
-    return (f"the filter contradicts {parameters.file}: {guiding_estimate.consistency}; {known}; {remedy}",)
+    return (f"the filter contradicts {filter_parameters.file}: {guiding_estimate.consistency}; {known}; {remedy}",)
 
 
 def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
@@ -273,33 +282,38 @@ def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
     )
 
 
-def _positions_in_intervals(consistency: Consistency, run: Result) -> Watched:
+def _positions_in_intervals(innovation_statistics: Consistency, run_result: Result) -> Watched:
     """Position of each statistic of the innovations in its interval, from -1 at the lower end to 1 at the upper end."""
-    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
+    return {
+        f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)])
+        for f in innovation_statistics.statistics
+    }
 
 
-def _check_bandwidth(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
+def _check_bandwidth(
+    vehicle_assembly: Assembly, filter_parameters: Parameters, guiding_estimate: GuidingEstimate
+) -> None:
     """Raise InputError for a bandwidth at which the moment acts more slowly than the pitch diverges. Only forces that
     stay vertical make it diverge.
     """
-    if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
+    if vehicle_assembly.mode != "force" or vehicle_assembly.vehicle.geometry != "exact":
         return
-    share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total_inertia)
+    share = math.sqrt(vehicle_assembly.parameters.I / rigid_pitch(vehicle_assembly.parameters).total_inertia)
     growth = share * float(np.sqrt(np.mean(guiding_estimate.values[:, 1] ** 2)))
-    if 2 * math.pi * parameters.bandwidth <= growth:
+    if 2 * math.pi * filter_parameters.bandwidth <= growth:
         raise InputError(
-            assembly.scene.file,
+            vehicle_assembly.scene.file,
             "effects.kalman_filter.bandwidth",
-            parameters.bandwidth,
+            filter_parameters.bandwidth,
             f"must be above {growth / (2 * math.pi):.3g} Hz: a pitch error grows at {growth:.3g} 1/s here",
         )
 
 
 def _guiding_channels(
     guiding_estimate: GuidingEstimate,
-    stiffness: float,
-    damping: float,
-    assembly: Assembly,
+    pull_stiffness: float,
+    pull_damping: float,
+    vehicle_assembly: Assembly,
     times: np.ndarray,
     states: np.ndarray,
 ) -> Channels:
@@ -317,7 +331,7 @@ def _guiding_channels(
         )
     )
     latest = np.clip(np.floor(times / guiding_estimate.period + 1e-6).astype(int), 0, len(grid) - 1)
-    moment = stiffness * (pitch - states[:, 3]) + damping * (rate - states[:, 7])
+    moment = pull_stiffness * (pitch - states[:, 3]) + pull_damping * (rate - states[:, 7])
     return {
         "kalman_moment": ("N m", "artificial moment towards the estimated pitch, nose up", moment),
         "inertia_moment": ("N m", "artificial moment that the model's inertia lacks, nose up", lacking),

@@ -30,7 +30,7 @@ class Parameters(Strict):
     """[effects.lift_off]: no settings."""
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with tyres that only push."""
-    struts = tuple(replace(strut, pushes_only=strut.lower.body is None) for strut in assembly.vehicle.struts)
-    return replace(assembly, vehicle=replace(assembly.vehicle, struts=struts))
+    struts = tuple(replace(strut, pushes_only=strut.lower.body is None) for strut in vehicle_assembly.vehicle.struts)
+    return replace(vehicle_assembly, vehicle=replace(vehicle_assembly.vehicle, struts=struts))

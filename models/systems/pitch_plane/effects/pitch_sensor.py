@@ -31,13 +31,15 @@ class Parameters(Strict):
     path: int = PATH_FIELD
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with the sensor's reading of the pitch among its channels."""
-    check_rate(assembly.scene, RATE_KEY, p.sampling_rate)
-    return replace(assembly, outputs=(*assembly.outputs, partial(pitch_reading, p)))
+    check_rate(vehicle_assembly.scene, RATE_KEY, parameters.sampling_rate)
+    return replace(vehicle_assembly, outputs=(*vehicle_assembly.outputs, partial(pitch_reading, parameters)))
 
 
-def pitch_reading(p: Any, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+def pitch_reading(
+    sensor_parameters: Any, vehicle_assembly: Assembly, times: np.ndarray, states: np.ndarray
+) -> Channels:
     """Returns the channel ``pitch_reading``: the sensor's reading of the pitch (rad), positive nose up."""
-    reading = noisy_reading(p, PITCH_SENSOR, times, states[:, 3], assembly.scene, RATE_KEY)
+    reading = noisy_reading(sensor_parameters, PITCH_SENSOR, times, states[:, 3], vehicle_assembly.scene, RATE_KEY)
     return {"pitch_reading": ("rad", "pitch as a sensor reads it, nose up", reading)}

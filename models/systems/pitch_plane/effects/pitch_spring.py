@@ -20,6 +20,8 @@ class Parameters(Strict):
     dead_band: float = quantity("rad", "no moment within this pitch to either side of zero", default=0.0, zero=True)
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with a rotational spring and damper between chassis and ground."""
-    return assembly.with_spring(PitchSpring("chassis", p.stiffness, p.damping, p.dead_band))
+    return vehicle_assembly.with_spring(
+        PitchSpring("chassis", parameters.stiffness, parameters.damping, parameters.dead_band)
+    )

@@ -34,9 +34,9 @@ class Parameters(Strict):
     bandwidth: float | None = quantity("Hz", "a measured motion is smoothed down to this before use", default=None)
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the force-excited vehicle with heave and pitch of the chassis prescribed, twice differentiable."""
     from models.systems.pitch_plane.effects.prescribed_pitch import prescribe
 
     columns = {"z3": METRES, "pitch": RADIANS}
-    return prescribe(assembly, "prescribed_heave_and_pitch", p, "heave-pitch", columns)
+    return prescribe(vehicle_assembly, "prescribed_heave_and_pitch", parameters, "heave-pitch", columns)

@@ -39,42 +39,48 @@ class Parameters(Strict):
     bandwidth: float | None = quantity("Hz", "a measured pitch is smoothed down to this before use", default=None)
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the force-excited vehicle with prescribed pitch, a quintic spline through the samples of a file."""
-    return prescribe(assembly, "prescribed_pitch", p, "pitch", {"pitch": RADIANS})
+    return prescribe(vehicle_assembly, "prescribed_pitch", parameters, "pitch", {"pitch": RADIANS})
 
 
 def prescribe(
-    assembly: Assembly, effect: str, p: Any, drive_mode: Mode, columns: Mapping[str, Mapping[str, float]]
+    vehicle_assembly: Assembly,
+    effect_name: str,
+    motion_parameters: Any,
+    drive_mode: Mode,
+    units_of_columns: Mapping[str, Mapping[str, float]],
 ) -> Assembly:
     """Returns the force-excited vehicle with the coordinates of ``drive_mode`` prescribed by a quintic spline through
     the samples of a file.
 
-    p : has the effect's ``file`` and ``bandwidth`` (Hz or None); columns : names of the file's columns, with the
-    factors of their units, in the order of the mode's coordinates. Raises InputError.
+    motion_parameters : has the effect's ``file`` and ``bandwidth`` (Hz or None); units_of_columns : names of the file's
+    columns, with the factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
     from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, sparse_record_warning
 
-    scene = assembly.scene
-    _check_scene(scene, columns)
-    values, period = read_time_series(scene.path(p.file, f"effects.{effect}.file"), columns)
-    if p.bandwidth is not None:
-        values = low_passed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
+    scene = vehicle_assembly.scene
+    _check_scene(scene, units_of_columns)
+    values, period = read_time_series(
+        scene.path(motion_parameters.file, f"effects.{effect_name}.file"), units_of_columns
+    )
+    if motion_parameters.bandwidth is not None:
+        values = low_passed(values, period, motion_parameters.bandwidth, scene.file, f"effects.{effect_name}.bandwidth")
     motion = Smooth(values, period, derivatives=2, degree=5)
-    check_end(scene, f"effects.{effect}.file", p.file, motion.end)
-    assert assembly.input is not None
-    guided = assembly.with_input(drive_mode, Stacked((assembly.input, motion)))
+    check_end(scene, f"effects.{effect_name}.file", motion_parameters.file, motion.end)
+    assert vehicle_assembly.input is not None
+    guided = vehicle_assembly.with_input(drive_mode, Stacked((vehicle_assembly.input, motion)))
     guided.initial[[*PRESCRIBED_COORDINATES[drive_mode], *(4 + i for i in PRESCRIBED_COORDINATES[drive_mode])]] = (
-        motion.at(0.0)[: 2 * len(columns)]
+        motion.at(0.0)[: 2 * len(units_of_columns)]
     )
     doubt = sparse_record_warning(len(values), period, scene.run.duration, CHASSIS_SAMPLE_TIME)
     return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
 
 
-def _check_scene(scene: Any, columns: Mapping[str, Any]) -> None:
+def _check_scene(scene: Any, units_of_columns: Mapping[str, Any]) -> None:
     if scene.effects["wheel_forces"].frame == "body":
         allowed = "a prescribed pitch makes the frame a matter of the file: use 'inertial'"
         raise InputError(scene.file, "effects.wheel_forces.frame", "body", allowed)
-    for name in (full for column in columns for full in (column, f"{column}_rate") if full in scene.start):
+    for name in (full for column in units_of_columns for full in (column, f"{column}_rate") if full in scene.start):
         allowed = f"the {name.removesuffix('_rate')} is prescribed, and its file says where it starts: drop this key"
         raise InputError(scene.file, f"start.{name}", scene.start[name], allowed)

@@ -53,103 +53,118 @@ class Parameters(Strict):
     run_in: float | None = quantity("m", "opencrg, csv: length over which the road rises from the flat", default=None)
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with the road as its input."""
     from models.road.signal import RoadUnderWheels
 
-    _check_keys(assembly.scene.file, p)
-    distance = p.speed * assembly.scene.run.duration
-    profile, kinks = _road_profile(assembly.scene, p, distance)
-    wheelbase = assembly.parameters.a + assembly.parameters.b
-    driven = assembly.with_input("road", RoadUnderWheels(profile, p.speed, wheelbase, kinks))
+    _check_keys(vehicle_assembly.scene.file, parameters)
+    distance = parameters.speed * vehicle_assembly.scene.run.duration
+    profile, kinks = _road_profile(vehicle_assembly.scene, parameters, distance)
+    wheelbase = vehicle_assembly.parameters.a + vehicle_assembly.parameters.b
+    driven = vehicle_assembly.with_input("road", RoadUnderWheels(profile, parameters.speed, wheelbase, kinks))
     says = "the road is so even that a tyre touches it in one point below its wheel"
     remedy = "smooth the road over what a tyre's patch feels, some 0.2 m, or take a gentler one"
     slope = Assumption(
-        "even road", says, remedy, partial(_slopes_under_wheels, p.speed), "rad", -STEEPEST_PITCH, STEEPEST_PITCH
+        "even road",
+        says,
+        remedy,
+        partial(_slopes_under_wheels, parameters.speed),
+        "rad",
+        -STEEPEST_PITCH,
+        STEEPEST_PITCH,
     )
     return replace(driven, assumptions=(*driven.assumptions, slope))
 
 
-def _slopes_under_wheels(speed: float, run: Result) -> Watched:
+def _slopes_under_wheels(speed: float, run_result: Result) -> Watched:
     """Slope angle (n,) in rad of the road under each wheel over a run at a speed (m/s), positive uphill."""
-    metres = speed * run.times
-    slopes = {f"{axle} wheel": -np.gradient(run[f"zeta{i + 1}"], metres) for i, axle in enumerate(("front", "rear"))}
+    metres = speed * run_result.times
+    slopes = {
+        f"{axle} wheel": -np.gradient(run_result[f"zeta{i + 1}"], metres) for i, axle in enumerate(("front", "rear"))
+    }
     return {name: np.arctan(slope) for name, slope in slopes.items()}
 
 
-def _check_keys(file: str, parameters: Parameters) -> None:
-    keys = {name: value for name, value in parameters if name not in ("source", "speed") and value is not None}
+def _check_keys(scene_path: str, road_parameters: Parameters) -> None:
+    keys = {name: value for name, value in road_parameters if name not in ("source", "speed") and value is not None}
     for name, value in keys.items():
-        if name not in KEYS_OF_SOURCE[parameters.source]:
-            accepted_keys = ", ".join(("speed", *KEYS_OF_SOURCE[parameters.source]))
-            allowed = f"has no meaning for source = {parameters.source!r}, which takes {accepted_keys}"
-            raise InputError(file, f"effects.road.{name}", value, allowed)
-    for name in REQUIRED_KEYS.get(parameters.source, ()):
+        if name not in KEYS_OF_SOURCE[road_parameters.source]:
+            accepted_keys = ", ".join(("speed", *KEYS_OF_SOURCE[road_parameters.source]))
+            allowed = f"has no meaning for source = {road_parameters.source!r}, which takes {accepted_keys}"
+            raise InputError(scene_path, f"effects.road.{name}", value, allowed)
+    for name in REQUIRED_KEYS.get(road_parameters.source, ()):
         if name not in keys:
-            meaning = str(type(parameters).model_fields[name].description).partition(": ")[2]
-            allowed = f"is missing: source = {parameters.source!r} needs it ({meaning})"
-            raise InputError(file, f"effects.road.{name}", None, allowed)
+            meaning = str(type(road_parameters).model_fields[name].description).partition(": ")[2]
+            allowed = f"is missing: source = {road_parameters.source!r} needs it ({meaning})"
+            raise InputError(scene_path, f"effects.road.{name}", None, allowed)
 
 
-def _road_profile(scene: Any, parameters: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
+def _road_profile(scene: Any, road_parameters: Parameters, driven_distance: float) -> tuple[Any, tuple[float, ...]]:
     """Returns the road profile, and the stations (m) at which it is only twice continuously differentiable."""
-    if parameters.source in ("opencrg", "csv"):
-        profile = _measured_road(scene, parameters, distance)
+    if road_parameters.source in ("opencrg", "csv"):
+        profile = _measured_road(scene, road_parameters, driven_distance)
         return profile, (profile.start, profile.start + profile.window_length)
-    if parameters.source == "iso8608":
+    if road_parameters.source == "iso8608":
         from models.road.iso8608 import iso8608_road
 
-        assert parameters.road_class is not None
+        assert road_parameters.road_class is not None
         profile = iso8608_road(
-            parameters.road_class,
-            0 if parameters.seed is None else parameters.seed,
-            level_convention=parameters.level or "one-sided",
+            road_parameters.road_class,
+            0 if road_parameters.seed is None else road_parameters.seed,
+            level_convention=road_parameters.level or "one-sided",
         )
     else:
         from models.road.study import STUDY_GD, hills_road, study_road
 
         profile = (
             hills_road()
-            if parameters.source == "hills"
-            else study_road(STUDY_GD if parameters.gd is None else parameters.gd)
+            if road_parameters.source == "hills"
+            else study_road(STUDY_GD if road_parameters.gd is None else road_parameters.gd)
         )
     faded_in = profile.window_length
-    if parameters.grade is None:
+    if road_parameters.grade is None:
         return profile, (0.0, faded_in)
     from models.road.grade import TRANSITION_LENGTH, GradedRoad
 
-    return GradedRoad(profile, parameters.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
+    return GradedRoad(profile, road_parameters.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
 
 
-def _measured_road(scene: Any, parameters: Parameters, distance: float) -> Any:
+def _measured_road(scene: Any, road_parameters: Parameters, driven_distance: float) -> Any:
     from models.road.continuation import RUN_IN_LENGTH, continued_road, run_in
 
-    path, track = scene.path(parameters.file, "effects.road.file"), parameters.track or "mean"
-    length = RUN_IN_LENGTH if parameters.run_in is None else parameters.run_in
-    if parameters.source == "opencrg":
+    path, track = scene.path(road_parameters.file, "effects.road.file"), road_parameters.track or "mean"
+    length = RUN_IN_LENGTH if road_parameters.run_in is None else road_parameters.run_in
+    if road_parameters.source == "opencrg":
         from models.road.opencrg import read_opencrg
 
-        raw = read_opencrg(path, track, lateral_offset=0.0 if parameters.offset is None else parameters.offset)
+        raw = read_opencrg(
+            path, track, lateral_offset=0.0 if road_parameters.offset is None else road_parameters.offset
+        )
     else:
         from models.road.csv_road import read_csv_road
 
         raw = read_csv_road(path, track)
-    _check_length(scene, parameters, raw, distance, length)
-    longer = continued_road(raw, str(parameters.beyond_end), distance, path)
+    _check_length(scene, road_parameters, raw, driven_distance, length)
+    longer = continued_road(raw, str(road_parameters.beyond_end), driven_distance, path)
     assert isinstance(longer, type(raw))
     return run_in(longer, length)
 
 
-def _check_length(scene: Any, parameters: Parameters, raw: Any, distance: float, run_in: float) -> None:
+def _check_length(
+    scene: Any, road_parameters: Parameters, measured_profile: Any, driven_distance: float, run_in_length: float
+) -> None:
     """Raise InputError for a road file that is too short for the run-in (m) or for the driven distance (m)."""
-    total = raw.end - raw.start
-    if run_in > total:
+    total = measured_profile.end - measured_profile.start
+    if run_in_length > total:
         raise InputError(
-            scene.file, "effects.road.run_in", run_in, f"the road {parameters.file} is only {total:g} m long"
+            scene.file,
+            "effects.road.run_in",
+            run_in_length,
+            f"the road {road_parameters.file} is only {total:g} m long",
         )
-    if parameters.beyond_end == "refused" and distance > total * (1 + 1e-9):
+    if road_parameters.beyond_end == "refused" and driven_distance > total * (1 + 1e-9):
         allowed = (
-            f"the road {parameters.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
+            f"the road {road_parameters.file} ends at {total:g} m and the run needs {driven_distance:g} m: shorten "
             "run.duration, lower effects.road.speed or set this to 'mirrored'"
         )
         raise InputError(scene.file, "effects.road.beyond_end", "refused", allowed)

@@ -40,23 +40,23 @@ class Parameters(Strict):
     ] = Field([], description="findings of the checks against the vehicle's weight that are meant as they are")
 
 
-def extend(assembly: Assembly, p: Any) -> Assembly:
+def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the vehicle without tyres, with two wheel forces from a file as its input."""
     from models.core.time_series import read_time_series
 
-    scene = assembly.scene
+    scene = vehicle_assembly.scene
     columns = {"front": NEWTONS, "rear": NEWTONS}
-    values, period = read_time_series(scene.path(p.file, "effects.wheel_forces.file"), columns)
-    signal = signal_from_samples(values, period, p.interpolation)
-    check_end(scene, "effects.wheel_forces.file", p.file, signal.end)
-    turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
-    driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
-    doubts, assumed = _doubts_about_forces(driven, p, values, period)
+    values, period = read_time_series(scene.path(parameters.file, "effects.wheel_forces.file"), columns)
+    signal = signal_from_samples(values, period, parameters.interpolation)
+    check_end(scene, "effects.wheel_forces.file", parameters.file, signal.end)
+    turns = parameters.frame == "body" and vehicle_assembly.vehicle.geometry == "exact"
+    driven = vehicle_assembly.without_tyres().with_input("force-body" if turns else "force", signal)
+    doubts, assumed = _doubts_about_forces(driven, parameters, values, period)
     return replace(driven, doubts=(*driven.doubts, *doubts), assumptions=(*driven.assumptions, *assumed))
 
 
 def _doubts_about_forces(
-    assembly: Assembly, parameters: Parameters, values: np.ndarray, sample_period: float
+    vehicle_assembly: Assembly, force_parameters: Parameters, force_samples: np.ndarray, sample_period: float
 ) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
     """Returns doubts about wheel forces (n, 2) in N that do not suit the vehicle, and assumptions that they carry its
     weight. Raises InputError for impossible forces.
@@ -65,23 +65,23 @@ def _doubts_about_forces(
     from models.measured.signal import Signal
 
     front, rear = (
-        Signal(axle, parameters.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0)
+        Signal(axle, force_parameters.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0)
         for axle in ("front", "rear")
     )
-    scene = assembly.scene
+    scene = vehicle_assembly.scene
     axles = AxleForces(
-        values,
+        force_samples,
         sample_period,
-        assembly.parameters,
+        vehicle_assembly.parameters,
         ((front,), (rear,)),
         scene.run.duration,
         FILE_REMEDIES,
         starts_at_rest=not scene.start,
-        turns_with_chassis=assembly.mode == "force-body",
+        turns_with_chassis=vehicle_assembly.mode == "force-body",
     )
-    looked = (*check_axle_forces(axles), *_sample_findings((front, rear), values, sample_period))
+    looked = (*check_axle_forces(axles), *_sample_findings((front, rear), force_samples, sample_period))
     findings = tuple(
-        finding for finding in looked if finding.weight != "note" and finding.check not in parameters.accept
+        finding for finding in looked if finding.weight != "note" and finding.check not in force_parameters.accept
     )
     errors = [finding for finding in findings if finding.weight == "error"]
     if errors:
@@ -89,19 +89,19 @@ def _doubts_about_forces(
         raise InputError(
             scene.file,
             "effects.wheel_forces.file",
-            parameters.file,
+            force_parameters.file,
             f"{' '.join(finding.text for finding in errors)} If it is meant so: accept = [{names}].",
         )
-    return tuple(finding.text for finding in findings), _balance_assumptions(axles, parameters)
+    return tuple(finding.text for finding in findings), _balance_assumptions(axles, force_parameters)
 
 
-def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[Assumption, ...]:
+def _balance_assumptions(axle_forces: "AxleForces", force_parameters: Parameters) -> tuple[Assumption, ...]:
     """Assumptions that the mean wheel forces carry the vehicle's weight and balance in pitch, within the uncertainty of
     the record's length.
     """
     from models.measured.axle_balance import equilibrium_residual
 
-    means = equilibrium_residual(axles)
+    means = equilibrium_residual(axle_forces)
     balance_rows = (
         ("weight", "the wheel forces carry the vehicle's weight on average", "m/s^2", "m1, m2, m3"),
         ("balance", "front and rear wheel forces balance each other on average", "rad/s^2", "a, b"),
@@ -118,15 +118,17 @@ def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[A
             float(means.uncertainties[i]),
         )
         for i, (name, says, unit, symbols) in enumerate(balance_rows)
-        if name not in parameters.accept and axles.parameters.g > 0
+        if name not in force_parameters.accept and axle_forces.parameters.g > 0
     )
 
 
-def _steady_accelerations(acceleration: float, run: Result) -> Watched:
-    return {"chassis": np.array([acceleration])}
+def _steady_accelerations(steady_acceleration: float, run_result: Result) -> Watched:
+    return {"chassis": np.array([steady_acceleration])}
 
 
-def _sample_findings(signals: "tuple[Signal, ...]", values: np.ndarray, sample_period: float) -> "list[Finding]":
+def _sample_findings(
+    force_signals: "tuple[Signal, ...]", force_samples: np.ndarray, sample_period: float
+) -> "list[Finding]":
     """Findings on impossible samples of wheel forces: spikes, and values clipped at the sensor's range. Zeros of a
     lifted wheel do not count.
     """
@@ -135,6 +137,6 @@ def _sample_findings(signals: "tuple[Signal, ...]", values: np.ndarray, sample_p
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 
-    felt = MemoryColumns(tuple(s.name for s in signals), np.where(values == 0.0, np.nan, values))
-    evidence = Evidence(Recording(signals, felt, sample_period), None)
+    felt = MemoryColumns(tuple(s.name for s in force_signals), np.where(force_samples == 0.0, np.nan, force_samples))
+    evidence = Evidence(Recording(force_signals, felt, sample_period), None)
     return [*spikes.check(evidence), *(finding for finding in clipped.check(evidence) if finding.unit == "%")]

@@ -12,19 +12,19 @@ def _vehicle_effect(description: str, cost: str, is_present: Callable[[Any], boo
     return Entry(description, "vehicle.file", cost, is_present=is_present, leave_out=_keep_vehicle)
 
 
-def _keep_vehicle(table: Table, scene: Any) -> None:
+def _keep_vehicle(scene_tables: Table, scene: Any) -> None:
     """Raise InputError, as the effect can be left out only if another vehicle file is named."""
     allowed = 'has it: name a file without it, or let effects = "auto" leave it out'
     raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
 
 
-def _has_omissions_of_kind(kind: str) -> Callable[[Any], bool]:
+def _has_omissions_of_kind(effect_kind: str) -> Callable[[Any], bool]:
     """Returns a function of a scene: whether its vehicle or road has effects of a kind that can be left out."""
 
     def is_present(scene: Any) -> bool:
         from models.systems.ride.omissions import has_omissions
 
-        return has_omissions(scene, kind)
+        return has_omissions(scene, effect_kind)
 
     return is_present
 
@@ -35,38 +35,38 @@ def _vehicle_of_scene(scene: Any) -> Any:
     return vehicle_of(scene)
 
 
-def _equal_heights_edit(key: str) -> Callable[[Table, Any], None]:
+def _equal_heights_edit(road_key: str) -> Callable[[Table, Any], None]:
     """Returns a function that edits a scene: it sets a key of [road] so that wheels meet equal heights."""
 
-    def leave_out(table: Table, scene: Any) -> None:
-        table.setdefault("road", {})[key] = "equal"
+    def leave_out(scene_tables: Table, scene: Any) -> None:
+        scene_tables.setdefault("road", {})[road_key] = "equal"
 
     return leave_out
 
 
-def _straighten_curves(table: Table, scene: Any) -> None:
+def _straighten_curves(scene_tables: Table, scene: Any) -> None:
     """Edit a scene so that springs have their slopes at rest instead of curves."""
-    table["vehicle"]["small_motion"] = True
+    scene_tables["vehicle"]["small_motion"] = True
 
 
-def _take_papers_road(table: Table, scene: Any) -> None:
+def _take_papers_road(scene_tables: Table, scene: Any) -> None:
     for key in ("file", "track_width", "first", "last"):
-        table["road"].pop(key, None)
+        scene_tables["road"].pop(key, None)
 
 
-def _hold_mean_speed(table: Table, scene: Any) -> None:
-    drive = table.pop("drive")
+def _hold_mean_speed(scene_tables: Table, scene: Any) -> None:
+    drive = scene_tables.pop("drive")
     drive_times, speeds = drive["time"], drive["speed"]
     driven_distance = sum(
         (b - a) * (v + w) / 2.0 for a, b, v, w in zip(drive_times, drive_times[1:], speeds, speeds[1:], strict=False)
     )
-    table["speeds"] = {"values": [driven_distance / (drive_times[-1] - drive_times[0])]}
+    scene_tables["speeds"] = {"values": [driven_distance / (drive_times[-1] - drive_times[0])]}
 
 
-def _weight_first_output(table: Table, scene: Any) -> None:
+def _weight_first_output(scene_tables: Table, scene: Any) -> None:
     """Edit a scene so that its first acceleration output is weighted by Wk (ISO 2631-1)."""
     name = next(output.name for output in _vehicle_of_scene(scene).outputs if output.kind == "acceleration")
-    table["weighting"] = {name: "Wk"}
+    scene_tables["weighting"] = {name: "Wk"}
 
 
 COST_PER_SPEED = "a linear vehicle of its own at every speed"

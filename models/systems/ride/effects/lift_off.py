@@ -18,8 +18,8 @@ class Parameters(Strict):
     """[effects.lift_off]: no settings."""
 
 
-def extend(built: Built, p: Any) -> Built:
+def extend(vehicle_and_road: Built, parameters: Any) -> Built:
     """Returns vehicle and road with tyres that only push, by the law of
     ``models.systems.pitch_plane.effects.lift_off``.
     """
-    return replace(built, vehicle=built.vehicle.with_tyres(pushes_only=True))
+    return replace(vehicle_and_road, vehicle=vehicle_and_road.vehicle.with_tyres(pushes_only=True))

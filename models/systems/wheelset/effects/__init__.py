@@ -12,7 +12,7 @@ from models.core.scene_effects import Entry, Table
 
 
 def _parameter_effect(
-    description: str, keys: tuple[str, ...], cost: str, work_counts: dict[str, int], **entry_fields: Any
+    description: str, parameter_keys: tuple[str, ...], cost: str, work_counts: dict[str, int], **entry_fields: Any
 ) -> Entry:
     """Returns an effect that is present where any of some wheelset parameters is above zero. Its usual values are the
     parameters of CHOSEN_WHEELSET.
@@ -23,23 +23,23 @@ def _parameter_effect(
 
         wheelset = wheelset_of(scene)
         excluded = "profiles" in entry_fields.get("excludes", ()) and wheelset.profiles is not None
-        return not excluded and any(getattr(wheelset, key) > 0.0 for key in keys)
+        return not excluded and any(getattr(wheelset, key) > 0.0 for key in parameter_keys)
 
-    def overriding(value_of: Callable[[str], float]) -> Callable[[Table, Any], None]:
-        def change(table: Table, scene: Any) -> None:
-            override = table.setdefault("wheelset", {}).setdefault("override", {})
-            override.update({key: value_of(key) for key in keys})
+    def overriding(value_of_parameter: Callable[[str], float]) -> Callable[[Table, Any], None]:
+        def change(scene_tables: Table, scene: Any) -> None:
+            override = scene_tables.setdefault("wheelset", {}).setdefault("override", {})
+            override.update({key: value_of_parameter(key) for key in parameter_keys})
 
         return change
 
-    def usual(key: str) -> float:
+    def usual(parameter_key: str) -> float:
         from models.rail.wheelset import CHOSEN_WHEELSET
 
-        return float(getattr(CHOSEN_WHEELSET, key))
+        return float(getattr(CHOSEN_WHEELSET, parameter_key))
 
     return Entry(
         description,
-        f"wheelset.override.{keys[0]}",
+        f"wheelset.override.{parameter_keys[0]}",
         cost,
         work_counts,
         is_present=is_present,
@@ -55,7 +55,7 @@ def _has_profiles(scene: Any) -> bool:
     return wheelset_of(scene).profiles is not None
 
 
-def _without_profiles(table: Table, scene: Any) -> None:
+def _without_profiles(scene_tables: Table, scene: Any) -> None:
     """Replace the scene's profiles by cones on rail heads of one radius, with springs as flanges. Raises InputError
     where the profiles belong to the wheelset's parameter file.
     """
@@ -63,13 +63,13 @@ def _without_profiles(table: Table, scene: Any) -> None:
         raise InputError(
             scene.file, "wheelset.parameters", scene.wheelset.parameters, "has profiles: name a file without them"
         )
-    del table["profiles"]
+    del scene_tables["profiles"]
 
 
-def _with_profiles(table: Table, scene: Any) -> None:
+def _with_profiles(scene_tables: Table, scene: Any) -> None:
     """Add the profiles S1002 on UIC60 to a scene, and drop the flange springs of its cones."""
-    table["profiles"] = {}
-    table.get("wheelset", {}).get("override", {}).pop("flange_stiffness", None)
+    scene_tables["profiles"] = {}
+    scene_tables.get("wheelset", {}).get("override", {}).pop("flange_stiffness", None)
 
 
 COST_TEXT = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
