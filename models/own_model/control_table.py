@@ -72,7 +72,7 @@ def read_controls(csv_path: Path, mujoco_model: mujoco.MjModel) -> ControlTable:
         raise InputError("--controls", "", str(csv_path), "the model has no actuators")
     if len({"time", *names}) <= len(names):
         raise InputError("--controls", "", str(csv_path), "columns would share a name: rename the model's actuators")
-    table = read_table(csv_path, {"time": SECONDS, **dict.fromkeys(names, CONTROL_UNITS)}, increasing="time")
+    table = read_table(csv_path, {"time": SECONDS, **dict.fromkeys(names, CONTROL_UNITS)}, increasing_column="time")
     if table["time"][0] != 0.0:
         raise InputError(csv_path, "row 1, column 'time'", float(table["time"][0]), "the first row must be of time 0")
     for i, name in enumerate(names):

@@ -228,7 +228,7 @@ def _norm_rows(path_count: int) -> list[Row]:
     period = span / steps
     for axes in (1, 3):
         noise = np.zeros((steps, path_count, 3))
-        noise[:, :, :axes] = normal_samples(SEED, axes, steps * path_count, axes, source=GYRO).reshape(
+        noise[:, :, :axes] = normal_samples(SEED, axes, steps * path_count, axes, noise_source=GYRO).reshape(
             steps, path_count, axes
         )
         q = euler_quaternions(EQUAL_WALK * period**0.5 * noise, START_ATTITUDE)

@@ -155,7 +155,7 @@ def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
-            noise = normal_samples(SEED, i, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
+            noise = normal_samples(SEED, i, sample_count, 15, noise_source=ACCELEROMETERS).reshape(sample_count, 5, 3)
             alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((sample_count, 3)))
             axis = int(np.argmax(array.noise_gains()))
             law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
@@ -300,7 +300,7 @@ def _turning_body(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarra
 
 
 def _noise_samples(path: int, sample_count: int) -> np.ndarray:
-    return NOISE_DEVIATION * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(
+    return NOISE_DEVIATION * normal_samples(SEED + 1, path, sample_count, 15, noise_source=ACCELEROMETERS).reshape(
         sample_count, 5, 3
     )
 

@@ -69,7 +69,7 @@ def read_pressures(path: str | Path, wheels: int, sample_period: float = SAMPLE)
     measured = "speed" in header
     if measured:
         columns |= {f"speed_{name}": FACTOR_TO_METRES_PER_SECOND for name in names}
-    table = read_table(path, columns, increasing="time", least_rows=2)
+    table = read_table(path, columns, increasing_column="time", least_row_count=2)
     if table["time"][0] != 0.0:
         raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
     pressures = _columns_of_wheels(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")

@@ -33,7 +33,7 @@ class HubForces:
 
     def with_noise(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """Returns the hub forces with white noise on every sample, of standard deviations (6 h,) in N and N m."""
-        noise = normal_samples(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
+        noise = normal_samples(seed, path, len(self.samples), self.samples.shape[1], noise_source=FORCES)
         return replace(self, samples=self.samples + noise * deviation)
 
 
@@ -48,7 +48,7 @@ class Angles:
 
     def with_noise(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
         """Returns the angles with white noise on every sample; deviations : of angles (rad) and of rates (rad/s)."""
-        noise = normal_samples(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
+        noise = normal_samples(seed, path, len(self.samples), 4, noise_source=PITCH_SENSOR)
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
 
 

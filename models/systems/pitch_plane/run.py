@@ -103,7 +103,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
         return rerun(_settings_of_longer_step(settings, step_factor, share))
 
     return with_estimated_errors(
-        run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), channel_sizes=sizes
+        run, fine, longer, method.order, settings.step, error_growth=_pitch_error_growth(assembly), channel_sizes=sizes
     )
 
 

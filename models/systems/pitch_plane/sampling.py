@@ -79,7 +79,7 @@ def noisy_reading(
     path.
     """
     number = instant_numbers(times, p.sampling_rate)
-    noise = p.deviation * normal_samples(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
+    noise = p.deviation * normal_samples(p.seed, p.path, int(number[-1]) + 1, 1, noise_source=source)[:, 0]
     return read_samples(times, values, p.sampling_rate, scene, key_path) + noise[number]
 
 

@@ -162,7 +162,7 @@ class Bench:
     def _write_sensors(self, stride: int, sample_period: float) -> None:
         """Write files of measured pitch with noise, and of exact heave and pitch, sampled every ``stride`` steps."""
         heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
-        noise = normal_samples(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
+        noise = normal_samples(self.options.seed, 0, len(pitch), 1, noise_source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
         write_time_series(self.folder / "measured_pitch.csv", noisy, sample_period)
         exact_columns = {"z3": ("m", heave), "pitch": ("rad", pitch)}
