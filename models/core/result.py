@@ -51,9 +51,9 @@ class Result:
     data: "xr.Dataset"
     detail: Any = field(default=None, repr=False)
 
-    def __getitem__(self, channel: str) -> np.ndarray:
+    def __getitem__(self, channel_name: str) -> np.ndarray:
         """Values of a channel, by its name, as an array."""
-        return self.data[channel].values
+        return self.data[channel_name].values
 
     @property
     def times(self) -> np.ndarray:
@@ -97,12 +97,12 @@ class Result:
             Path(output_path), data.to_netcdf(engine="h5netcdf", encoding=checked)
         )  # HDF5 itself crashes on a full disk
 
-    def save_table(self, path: Path | str, *channel_names: str) -> None:
+    def save_table(self, output_path: Path | str, *channel_names: str) -> None:
         """Write channels that share one axis as columns of a CSV file; all channels if none is named."""
         from models.core.tables import write_table
 
         names = channel_names or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
-        write_table(Path(path), {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
+        write_table(Path(output_path), {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
 
 
 def result(

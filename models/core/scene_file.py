@@ -58,9 +58,9 @@ class SceneFile(Strict):
                 allowed = f'is read by effects = "auto", of the study {self.CHOOSING!r}, only'
                 raise InputError(self.file, key, value, allowed)
 
-    def path(self, name: str, key_path: str = "") -> Path:
+    def path(self, file_name: str, key_path: str = "") -> Path:
         """Path of a file that the scene names at ``key_path``: in the scene's folder, or else in the working folder."""
-        return existing_file(name, Path(self.folder), self.file, key_path)
+        return existing_file(file_name, Path(self.folder), self.file, key_path)
 
 
 Model = TypeVar("Model", bound=SceneFile)

@@ -42,7 +42,7 @@ class Signal(Protocol):
         """Longest step (s) with which an adaptive solver does not miss a feature of the signal."""
         ...
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values at start_time + i step, shape (sample_count, channels)."""
         ...
 
@@ -89,9 +89,9 @@ class Sampled:
             return self.values[None]
         return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values at start_time + i step, shape (sample_count, channels)."""
-        index, fractions = _sample_and_fraction(start_time, step, sample_count, self.period, len(self.values))
+        index, fractions = _sample_and_fraction(start_time, time_step, sample_count, self.period, len(self.values))
         if self.held:
             return self.values[index]
         from models.core.piecewise import interpolate
@@ -176,11 +176,11 @@ class Smooth:
         first, in the time since the period's first sample."""
         return self._pieces
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values and derivatives at start_time + i step, shape (sample_count, channels)."""
         from models.core.piecewise import evaluate
 
-        return evaluate(self._pieces, self.period, start_time, step, sample_count, self.derivatives)
+        return evaluate(self._pieces, self.period, start_time, time_step, sample_count, self.derivatives)
 
     def at(self, time: float) -> np.ndarray:
         """Values and derivatives at one time (s), shape (channels,)."""
@@ -236,9 +236,9 @@ class Stacked:
         """The shortest resolution (s) among the combined signals."""
         return min(signal.resolution for signal in self.parts)
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values of all combined signals at start_time + i step, shape (sample_count, channels)."""
-        return np.hstack([signal.sample(start_time, step, sample_count) for signal in self.parts])
+        return np.hstack([signal.sample(start_time, time_step, sample_count) for signal in self.parts])
 
     def at(self, time: float) -> np.ndarray:
         """Values of all combined signals at one time (s), shape (channels,)."""

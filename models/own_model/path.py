@@ -376,7 +376,7 @@ def _energy_imbalance(path_sections: Sequence[PathSection], path_states: np.ndar
     return float(abs(kinetic[-1] - kinetic[0] - work) / max(*kinetic, 1e-12))
 
 
-def _energy_and_power(plain: PlainTree, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+def _energy_and_power(tree_equations: PlainTree, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
     """Kinetic energy (J), and power of all forces (W)."""
-    mass, _ = plain.mass_and_force(0.0, q, v)
-    return 0.5 * float(v @ mass @ v), float(v @ plain.applied_forces(q, v))
+    mass, _ = tree_equations.mass_and_force(0.0, q, v)
+    return 0.5 * float(v @ mass @ v), float(v @ tree_equations.applied_forces(q, v))

@@ -51,18 +51,18 @@ class _Writer:
         parser.Parse(file_content, True)
         return "".join(self.pieces)
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+    def _start(self, xml_tag: str, attributes: dict[str, str]) -> None:
         if self.enclosing_tags == ["robot"]:
-            self.link = attributes.get("name", "") if tag == "link" else ""
-        if self.removed_depth or self._is_unwanted(tag):
-            self.removed_tags.update([] if self.removed_depth else [tag])
+            self.link = attributes.get("name", "") if xml_tag == "link" else ""
+        if self.removed_depth or self._is_unwanted(xml_tag):
+            self.removed_tags.update([] if self.removed_depth else [xml_tag])
             self.removed_depth += 1
             return
         line = self._parser.CurrentLineNumber
         told = "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())
-        self.pieces += ["\n" * (line - self.line), f"<{tag}{told}>"]
+        self.pieces += ["\n" * (line - self.line), f"<{xml_tag}{told}>"]
         self.line = max(line, self.line)
-        self.enclosing_tags.append(tag)
+        self.enclosing_tags.append(xml_tag)
 
     def _is_unwanted(self, xml_tag: str) -> bool:
         if self.enclosing_tags == ["robot"]:
@@ -73,11 +73,11 @@ class _Writer:
             return True
         return xml_tag == "collision" and self.link in self.links_with_mass
 
-    def _end(self, tag: str) -> None:
+    def _end(self, xml_tag: str) -> None:
         if self.removed_depth:
             self.removed_depth -= 1
             return
-        self.pieces.append(f"</{tag}>")
+        self.pieces.append(f"</{xml_tag}>")
         self.enclosing_tags.pop()
 
 

@@ -83,12 +83,12 @@ class _Reader:
             raise InputError(self.path.name, f"line {parser.CurrentLineNumber}", None, f"is no XML: {error}") from None
         return self.elements
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+    def _start(self, xml_tag: str, attributes: dict[str, str]) -> None:
         line = self._parser.CurrentLineNumber
-        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.enclosing_tags)))
-        self.enclosing_tags.append(tag)
+        self.elements.append(XmlElement(xml_tag, attributes, self.path.name, line, tuple(self.enclosing_tags)))
+        self.enclosing_tags.append(xml_tag)
 
-    def _end(self, tag: str) -> None:
+    def _end(self, xml_tag: str) -> None:
         self.enclosing_tags.pop()
 
     def _refuse_types(self, *_: Any) -> None:

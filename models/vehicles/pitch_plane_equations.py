@@ -257,8 +257,8 @@ one."""
 
 @register_jitable
 def pitch_springs(state, inputs, parameters, state_rates):
-    """Add rotational springs and dampers between chassis and ground to dy; their N m/rad, N m s/rad and dead band (rad)
-    begin at p[15]."""
+    """Add rotational springs and dampers between chassis and ground to the state's rates; their N m/rad, N m s/rad and
+    dead band (rad) begin at p[15]."""
     for i in range(15, len(parameters), 3):
         beyond = abs(state[3]) - parameters[i + 2]
         if beyond >= 0.0:
@@ -269,7 +269,7 @@ def pitch_springs(state, inputs, parameters, state_rates):
 
 @register_jitable
 def pitch_moment(state, inputs, parameters, state_rates):
-    """Add a moment on the chassis (N m, nose up), the last channel of the input, to dy."""
+    """Add a moment on the chassis (N m, nose up), the last channel of the input, to the state's rates."""
     state_rates[7] += inputs[-1] / parameters[5]
 
 

@@ -147,8 +147,8 @@ def _masses(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
         )
 
 
-def _tonnes(value: float) -> str:
-    return "Masses are in kg, not in tonnes" if value < 100 else "Masses are in kg, not in g or lb"
+def _tonnes(mass_in_kg: float) -> str:
+    return "Masses are in kg, not in tonnes" if mass_in_kg < 100 else "Masses are in kg, not in g or lb"
 
 
 def _sizes(vehicle_figures: VehicleFigures) -> Iterator[Finding]:

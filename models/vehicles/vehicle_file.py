@@ -348,18 +348,18 @@ class _Builder:
         at, number = (axle.x, y if tyre_table.y is None else tyre_table.y, z), list(self.axles).index(tyre_table.axle)
         return Tyre(tyre_table.name, tyre_table.body, at, number, tyre_table.stiffness, tyre_table.damping)
 
-    def _bar(self, bar: BarTable) -> AntiRollBar:
-        place, names = _key_path("anti_roll_bars", bar.name), tuple(self.tyres)
-        body = self.bodies[self._body(f"{place}.body", bar.body)]
+    def _bar(self, bar_table: BarTable) -> AntiRollBar:
+        place, names = _key_path("anti_roll_bars", bar_table.name), tuple(self.tyres)
+        body = self.bodies[self._body(f"{place}.body", bar_table.body)]
         towed = body.name in self.towed
         rolls = towed or ("rx" in body.freedoms and body.parent is None)
         allowed = "needs a body with the freedom rx and without a parent, or a towed one"
-        self._require(rolls, f"{place}.body", bar.body, allowed)
-        left, right = (self.tyres[self._known_name(f"{place}.tyres", name, "tyre", names)] for name in bar.tyres)
+        self._require(rolls, f"{place}.body", bar_table.body, allowed)
+        left, right = (self.tyres[self._known_name(f"{place}.tyres", name, "tyre", names)] for name in bar_table.tyres)
         pair = left.axle == right.axle and left.point[1] > right.point[1]
-        self._require(pair, f"{place}.tyres", bar.tyres, "must be the left and the right tyre of one axle")
+        self._require(pair, f"{place}.tyres", bar_table.tyres, "must be the left and the right tyre of one axle")
         ends, frame = (left.body, right.body, left.point, right.point), body.name if towed else None
-        return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping, frame)
+        return AntiRollBar(bar_table.name, bar_table.body, *ends, bar_table.stiffness, bar_table.damping, frame)
 
     def _side_forces(self) -> tuple[SideForce, ...]:
         """Side forces of the tyres. They act on the chassis, which guides the wheels laterally."""
