@@ -139,7 +139,7 @@ def test_implicit_steps_need_fewer_calls_with_slopes_and_end_alike():
     wheels, ends, calls = Wheels(2, cells=11), [], []
     for slope in (None, Forces(wheels).slopes):
         forces, count = Forces(wheels), []
-        rolling = Rolling(wheels, lambda q, v, f=forces, n=count: n.append(1) or f.of(q, v), slopes=slope)
+        rolling = Rolling(wheels, lambda q, v, f=forces, n=count: n.append(1) or f.of(q, v), force_slopes=slope)
         ends.append(rolling.run(*wheels.state(), 20, 1e-3, "GeneralizedAlpha"))
         calls.append(len(count))
     # Newton's method ends at its own tolerance, whatever matrix it takes
@@ -157,7 +157,7 @@ def test_low_speed_forces_no_tiny_steps():
     true = Rolling(wheels, forces.of).run(*start, 2000, 1e-4, "RK44")
     assert 1e-4 < stable < 4e-3 / 20.0
     for solver in ("GeneralizedAlpha", "TrapezoidalIndex2"):
-        end = Rolling(wheels, forces.of, slopes=forces.slopes).run(*start, 50, 4e-3, solver)
+        end = Rolling(wheels, forces.of, force_slopes=forces.slopes).run(*start, 50, 4e-3, solver)
         # second order in a step that is 1/17 of the suspension's shortest period: below 0.1 % of what is left
         assert np.abs(end - true)[:4].max() < 1e-3 * np.abs(true[:4]).max()
 
@@ -167,7 +167,7 @@ def test_crawling_and_standing_wheels(speed):
     wheels = Wheels(1, cells=7, speed=speed)
     q, v = wheels.state()
     forces = Forces(wheels)
-    end = Rolling(wheels, forces.of, slopes=forces.slopes).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")
+    end = Rolling(wheels, forces.of, force_slopes=forces.slopes).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")
     assert np.abs(end[:4]).max() < np.abs(q).max()
     with pytest.raises(RunFailed, match="exudyn"):  # Newton's method by differences leaps from slip to slip
         Rolling(wheels, forces.of).run(q, v / 200.0, 20, 1e-3, "GeneralizedAlpha")

@@ -345,7 +345,7 @@ class Counting:
 
 def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monkeypatch, tmp_path):
     """Blocks of 2 rows, one of them with a wrong row; what was finished before the interrupt is not computed again."""
-    monkeypatch.setattr(cases_table, "table_blocks", partial(table_blocks, rows=2))
+    monkeypatch.setattr(cases_table, "table_blocks", partial(table_blocks, block_rows=2))
     path, built = tmp_path / "cases.csv", partial(Built, MaterialPair())
     path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
     alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))

@@ -158,7 +158,7 @@ def test_contact_points_find_the_road_that_made_the_forces(tmp_path):
 
 def test_noise_is_named_by_its_seed_and_independent_of_the_step(forces):
     long = normal_samples(4, 0, 9000, 2)
-    assert np.array_equal(normal_samples(4, 0, 300, 2, first=4000), long[4000:4300])  # across a block's edge
+    assert np.array_equal(normal_samples(4, 0, 300, 2, first_sample=4000), long[4000:4300])  # across a block's edge
     assert not np.array_equal(long[:5], normal_samples(5, 0, 5, 2)) and not np.array_equal(
         long[:5], normal_samples(4, 1, 5, 2)
     )

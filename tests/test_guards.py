@@ -159,7 +159,7 @@ def test_the_guard_names_what_it_found(times, states, reason):
 
 def test_a_moment_that_is_no_number_fails_the_run():
     with pytest.raises(RunFailed, match="not a number"):
-        guard("engine", np.array([0.0, 1.0]), np.zeros((2, 8)), 1.0, enforced=np.array([[0.0], [np.nan]]))
+        guard("engine", np.array([0.0, 1.0]), np.zeros((2, 8)), 1.0, enforcing_forces=np.array([[0.0], [np.nan]]))
 
 
 def test_a_multiplier_may_be_small_beside_the_inertia_term():

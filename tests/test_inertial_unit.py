@@ -48,7 +48,9 @@ def test_noise_of_a_path_is_its_own_whoever_runs_beside_it():
     both = unit.measured_attitude(rates, 0.01, deviation, START_ATTITUDE, range(3, 5), 9)
     alone = unit.measured_attitude(rates, 0.01, deviation, START_ATTITUDE, range(4, 5), 9)
     assert np.array_equal(both[:, 1], alone[:, 0])
-    first = quaternion_of_rotation_vector(0.01 * (rates[0] + deviation * normal_samples(9, 4, 1, 3, source=GYRO)[0]))
+    first = quaternion_of_rotation_vector(
+        0.01 * (rates[0] + deviation * normal_samples(9, 4, 1, 3, noise_source=GYRO)[0])
+    )
     assert alone[1, 0] == pytest.approx(first, abs=1e-15)
 
 

@@ -70,7 +70,7 @@ def drawn(folder, **own):
 
 
 def angles(folder):
-    return read_time_series(folder / "p.csv", {"pitch": {"rad": 1.0}}, gaps=True)[0]
+    return read_time_series(folder / "p.csv", {"pitch": {"rad": 1.0}}, gaps_allowed=True)[0]
 
 
 def matrices(assembly):
@@ -205,12 +205,12 @@ def test_gaps_are_skipped_counted_and_never_absorbed(folder):
 
 def test_gaps_are_allowed_only_where_they_are_asked_for(folder):
     (folder / "g.csv").write_text("time [s],front [N]\n" + "".join(f"{i},{'' if i == 3 else i}\n" for i in range(9)))
-    assert np.isnan(read_time_series(folder / "g.csv", {"front": NEWTONS}, gaps=True)[0][3, 0])
+    assert np.isnan(read_time_series(folder / "g.csv", {"front": NEWTONS}, gaps_allowed=True)[0][3, 0])
     with pytest.raises(InputError, match="line 5"):
         read_time_series(folder / "g.csv", {"front": NEWTONS})
     (folder / "g.csv").write_text("time [s],front [N]\n" + "".join(f"{'' if i == 3 else i},{i}\n" for i in range(9)))
     with pytest.raises(InputError, match="line 5, column 'time"):
-        read_time_series(folder / "g.csv", {"front": NEWTONS}, gaps=True)
+        read_time_series(folder / "g.csv", {"front": NEWTONS}, gaps_allowed=True)
 
 
 def test_angle_and_rate_together_are_surer_than_either(folder):

@@ -39,7 +39,7 @@ def twin(tmp_path):
 def test_every_build_has_the_path_of_the_file_under_its_controls(twin, tmp_path):
     """The file's own model takes the controls themselves, the builds have them in the bias of their actuators."""
     table = read_controls(tmp_path / "controls.csv", twin.model)
-    report = compare_paths(twin, table=table)
+    report = compare_paths(twin, control_table=table)
     assert report.alike and not report.failed and report.comparison_horizon == 1.0
     assert report.distances[FILE_BUILD_NAME] < 1e-12
     assert report.energy < 1e-5  # Simpson's rule over odd numbers of steps of 2 ms; 6e-8 at 1 ms
@@ -65,7 +65,7 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
 
     honest = marching.path_of_build
     monkeypatch.setattr(marching, "path_of_build", wrong)
-    report = compare_paths(twin, table=table)
+    report = compare_paths(twin, control_table=table)
     assert not report.alike and report.distances[FILE_BUILD_NAME] > 1e-8
 
 
@@ -112,7 +112,7 @@ def test_a_row_between_two_steps_is_refused(twin, tmp_path):
     path = tmp_path / "controls.csv"
     path.write_text(TABLE.replace("350", "351"))
     with pytest.raises(InputError, match=r"row 3.*0\.351.*multiples of the step, 0\.002 s"):
-        compare_paths(twin, table=read_controls(path, twin.model))
+        compare_paths(twin, control_table=read_controls(path, twin.model))
 
 
 @pytest.mark.parametrize("name", ["time", "actuator 3"])

@@ -287,7 +287,7 @@ def test_no_interval_from_one_run():
 def test_a_job_takes_part_in_some_rounds():
     calls = []
     jobs = [lambda i=i: calls.append(i) for i in range(2)]
-    seconds = interleave(jobs, 15, 0.0, lasted=[1.0, 7.0], round_interval=[1, 3])
+    seconds = interleave(jobs, 15, 0.0, warm_up_times=[1.0, 7.0], round_interval=[1, 3])
     assert (calls.count(0), calls.count(1), seconds[1, 0]) == (15, 4, 7.0), "the run that has been is its first"
     assert np.flatnonzero(np.isfinite(seconds[0])).size == 15
     assert np.flatnonzero(np.isfinite(seconds[1])).tolist() == [0, 3, 6, 9, 12]

@@ -357,7 +357,7 @@ def test_limits_of_parts_that_a_vehicle_has_not(table, said, empty_folder):
     text = (SCENES_FOLDER / "vehicles" / "pitch_plane.toml").read_text()
     (empty_folder / "mine.toml").write_text(f"{text}\n[reduced]\n{table}\n")
     with pytest.raises(InputError, match=said):
-        load_vehicle("mine.toml", empty_folder, allows_reduced=True)
+        load_vehicle("mine.toml", empty_folder, allows_reduced_vehicle=True)
 
 
 def test_a_reduced_vehicle_is_refused_where_it_would_be_read_as_a_whole_one(empty_folder):
@@ -366,4 +366,4 @@ def test_a_reduced_vehicle_is_refused_where_it_would_be_read_as_a_whole_one(empt
     with pytest.raises(InputError, match="only the study ride"):
         load_vehicle("mine.toml", empty_folder)
     with pytest.raises(InputError, match="reduced vehicle"):
-        build_engine("mujoco", load_vehicle("mine.toml", empty_folder, allows_reduced=True))
+        build_engine("mujoco", load_vehicle("mine.toml", empty_folder, allows_reduced_vehicle=True))

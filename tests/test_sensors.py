@@ -38,13 +38,13 @@ def test_readings_are_the_truth_at_their_instants_plus_their_own_noise(engine):
         ("gyro", "pitch_rate", 10, 0.02, GYRO),
         ("pitch_reading", "pitch", 20, 0.01, PITCH_SENSOR),
     ):
-        noise = deviation * normal_samples(4, 2, 800 // every + 1, 1, source=source)[:, 0]
+        noise = deviation * normal_samples(4, 2, 800 // every + 1, 1, noise_source=source)[:, 0]
         assert np.array_equal(run[channel], run[true][rows - rows % every] + noise[rows // every])
     assert np.array_equal(run.states, simulate(scene({}), engine).states)
 
 
 def test_instruments_of_one_seed_are_independent():
-    draws = [normal_samples(7, 0, 20_000, 1, source=source)[:, 0] for source in range(4)]
+    draws = [normal_samples(7, 0, 20_000, 1, noise_source=source)[:, 0] for source in range(4)]
     off = np.corrcoef(draws)[np.triu_indices(4, 1)]
     assert np.abs(off).max() < 4.0 / np.sqrt(20_000)  # 4 standard errors; the same stream would give 1
 

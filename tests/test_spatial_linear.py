@@ -333,11 +333,11 @@ def test_curves_and_friction_have_their_slopes():
     pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
     np.testing.assert_allclose(bent.stiffness - plain.stiffness, 200.0 * pair, atol=1e-8)
     np.testing.assert_allclose(bent.damping - plain.damping, 1500.0 * pair, atol=1e-9)
-    given = linearise(replace(vehicle, springs=(spring,)), equivalent={"front left": (1000.0, 10.0)})
+    given = linearise(replace(vehicle, springs=(spring,)), equivalent_gains={"front left": (1000.0, 10.0)})
     np.testing.assert_allclose(given.stiffness[0], [1000.0, -1000.0], atol=1e-9)
     np.testing.assert_allclose(given.damping, 10.0 * pair, atol=1e-12)
     with pytest.raises(InputError, match=r"equivalent = 'front lefd': no such spring .*did you mean 'front left'"):
-        linearise(vehicle, equivalent={"front lefd": (1000.0, 10.0)})
+        linearise(vehicle, equivalent_gains={"front lefd": (1000.0, 10.0)})
 
 
 def test_weight_that_nothing_carries():

@@ -33,7 +33,7 @@ FORMS = {
 def table(tmp_path, text, encoding="utf-8", **asked):
     """Read a text as a table of two tracks over time."""
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
-    return read_table(tmp_path / "a.csv", COLUMNS, increasing="time", **asked)
+    return read_table(tmp_path / "a.csv", COLUMNS, increasing_column="time", **asked)
 
 
 @pytest.mark.parametrize("text", FORMS.values(), ids=FORMS)

@@ -159,7 +159,7 @@ def test_small_side_forces_of_a_towed_body_see_its_own_heading():
 
 def test_systems_that_cannot_tow_say_so():
     with pytest.raises(InputError, match=r"vehicle\.file = 'r19_caravan': tows 'caravan' by a hitch"):
-        load_vehicle("r19_caravan", file="s.toml", place="vehicle.file")
+        load_vehicle("r19_caravan", scene_path="s.toml", key_path="vehicle.file")
 
 
 def test_springs_of_a_trailer_keep_to_its_own_axes():

@@ -106,7 +106,7 @@ def test_an_oscillator_grows_in_steps_of_euler_by_their_known_factor():
 
 def test_a_bias_starts_from_its_draw_and_forgets_by_its_time():
     """b = turn_on n0 + s x, x(0) = n1, x(k + 1) = f x(k) + sqrt(1 - f^2) n(k + 2), f = exp(-period / tau)."""
-    draws = normal_samples(3, 1, 6, 1, source=GYRO_BIAS)[:, 0]
+    draws = normal_samples(3, 1, 6, 1, noise_source=GYRO_BIAS)[:, 0]
     factor, state, wanted = math.exp(-0.25), draws[1], []
     for k in range(5):
         wanted.append(0.3 * draws[0] + 0.2 * state)

@@ -106,100 +106,115 @@ class BrokenAssumption:
         )
 
 
-def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | None:
+def worst_violation(run_result: Result, assumption: Assumption) -> BrokenAssumption | None:
     """The worst violation of an assumption in a run, or None if there is none; NaN and infinite values are not
     judged."""
     judged = [
-        _gaussian_violation(run, assumption, value_name, values)
+        _gaussian_violation(run_result, assumption, value_name, values)
         if isinstance(values, Gaussian)
-        else _sampled_violation(run, assumption, value_name, np.asarray(values, float))
-        for value_name, values in assumption.watched_values(run).items()
+        else _sampled_violation(run_result, assumption, value_name, np.asarray(values, float))
+        for value_name, values in assumption.watched_values(run_result).items()
     ]
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
 def _violation(
-    assumption: Assumption, where: str, share: float, first: float, worst: float, law: str = ""
+    assumption: Assumption,
+    place_name: str,
+    time_share: float,
+    first_time: float,
+    worst_value: float,
+    tyre_law: str = "",
 ) -> BrokenAssumption:
-    """The violation of an assumption at ``where`` for a share of the time, with its first time (s) and worst value."""
-    named = assumption.name, assumption.says, where, share, first, worst
-    return BrokenAssumption(*named, assumption.unit, assumption.allowed, assumption.remedy, law)
+    """The violation of an assumption at ``place_name`` for a share of the time, with its first time (s) and worst
+    value."""
+    named = assumption.name, assumption.says, place_name, time_share, first_time, worst_value
+    return BrokenAssumption(*named, assumption.unit, assumption.allowed, assumption.remedy, tyre_law)
 
 
-def _sampled_violation(run: Result, assumption: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
+def _sampled_violation(
+    run_result: Result, assumption: Assumption, place_name: str, sampled_values: np.ndarray
+) -> BrokenAssumption | None:
     """The violation of an assumption by values sampled over a run; None if all lie within the limits."""
-    beyond = (values < assumption.lower_limit) | (values > assumption.upper_limit)
+    beyond = (sampled_values < assumption.lower_limit) | (sampled_values > assumption.upper_limit)
     if not beyond.any():
         return None
-    excess = np.where(beyond, np.maximum(assumption.lower_limit - values, values - assumption.upper_limit), -np.inf)
-    timed = "time" in run.data.coords and len(values) == len(run.times)
-    first = float(run.times[np.argmax(beyond)]) if timed else math.nan
-    worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
-    return _violation(assumption, where, share, first, worst)
+    excess = np.where(
+        beyond, np.maximum(assumption.lower_limit - sampled_values, sampled_values - assumption.upper_limit), -np.inf
+    )
+    timed = "time" in run_result.data.coords and len(sampled_values) == len(run_result.times)
+    first = float(run_result.times[np.argmax(beyond)]) if timed else math.nan
+    worst, share = float(sampled_values[np.argmax(excess)]), float(np.mean(beyond))
+    return _violation(assumption, place_name, share, first, worst)
 
 
-def _gaussian_violation(run: Result, assumption: Assumption, where: str, values: Gaussian) -> BrokenAssumption | None:
+def _gaussian_violation(
+    run_result: Result, assumption: Assumption, place_name: str, gaussian_values: Gaussian
+) -> BrokenAssumption | None:
     """The violation by the normally distributed quantity that exceeds a limit for the largest share of the time; None
     if no share is above ALLOWED_TIME_SHARE."""
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = (
-            np.array([assumption.lower_limit - values.mean, values.mean - assumption.upper_limit]) / values.deviation
+            np.array([assumption.lower_limit - gaussian_values.mean, gaussian_values.mean - assumption.upper_limit])
+            / gaussian_values.deviation
         )
-    known = np.isfinite(values.deviation) & (values.deviation > 0.0)
+    known = np.isfinite(gaussian_values.deviation) & (gaussian_values.deviation > 0.0)
     shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
     if not (shares > ALLOWED_TIME_SHARE).any():
         return None
     side, row = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
-    timed = "time" in run.data.coords and len(values.mean) == len(run.times)
-    first = float(run.times[np.argmax((shares > ALLOWED_TIME_SHARE).any(axis=0))]) if timed else math.nan
-    worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
-    value_name = f"{where} {values.rows[row]}" if values.rows else where
+    timed = "time" in run_result.data.coords and len(gaussian_values.mean) == len(run_result.times)
+    first = float(run_result.times[np.argmax((shares > ALLOWED_TIME_SHARE).any(axis=0))]) if timed else math.nan
+    worst = float(gaussian_values.mean[row] + (-3.0, 3.0)[side] * gaussian_values.deviation[row])
+    value_name = f"{place_name} {gaussian_values.rows[row]}" if gaussian_values.rows else place_name
     return _violation(assumption, value_name, float(shares[side, row]), first, worst, " by the normal law")
 
 
-def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
+def with_assumptions(run_result: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with the list of its assumptions and of the violated ones; violations are named in its status, too."""
     listed = list(assumptions)
-    breaches = [breach for breach in (worst_violation(run, assumption) for assumption in listed) if breach is not None]
-    run.data.attrs["assumptions"] = json.dumps(
+    breaches = [
+        breach for breach in (worst_violation(run_result, assumption) for assumption in listed) if breach is not None
+    ]
+    run_result.data.attrs["assumptions"] = json.dumps(
         {"assumed": [assumption.says for assumption in listed], "broken": [asdict(breach) for breach in breaches]}
     )
     if breaches:
-        run.data.attrs["status"] += ", assumptions broken"
-    _RESULT_OBSERVER.get()(run)
-    return run
+        run_result.data.attrs["status"] += ", assumptions broken"
+    _RESULT_OBSERVER.get()(run_result)
+    return run_result
 
 
 _RESULT_OBSERVER: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
 
 
 @contextmanager
-def result_observer(note: Callable[[Result], None]) -> Iterator[None]:
-    """Context in which ``note`` is called with each result that is checked for assumptions. Of nested contexts only the
-    inner one is called."""
-    token = _RESULT_OBSERVER.set(note)
+def result_observer(observe_result: Callable[[Result], None]) -> Iterator[None]:
+    """Context in which ``observe_result`` is called with each result that is checked for assumptions. Of nested
+    contexts only the inner one is called."""
+    token = _RESULT_OBSERVER.set(observe_result)
     try:
         yield
     finally:
         _RESULT_OBSERVER.reset(token)
 
 
-def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
+def assumption_lines(assumptions: Iterable[Assumption], line_width: int = 10) -> list[str]:
     """Lines of ``twinrig show`` that list the assumptions of a scene."""
-    return [f"  {'assumes':<{width}} {assumption.says} ({assumption.allowed})" for assumption in assumptions]
+    return [f"  {'assumes':<{line_width}} {assumption.says} ({assumption.allowed})" for assumption in assumptions]
 
 
-def broken_of(run: Result) -> list[BrokenAssumption]:
+def broken_of(run_result: Result) -> list[BrokenAssumption]:
     """Violated assumptions that are stored in a result."""
-    stored: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
+    stored: dict[str, Any] = json.loads(run_result.data.attrs.get("assumptions", "{}"))
     return [BrokenAssumption(**entry) for entry in stored.get("broken", ())]
 
 
-def assumption_sentences(run: Result) -> list[str]:
+def assumption_sentences(run_result: Result) -> list[str]:
     """Sentences of the assumptions against which a result was checked."""
-    stored: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
+    stored: dict[str, Any] = json.loads(run_result.data.attrs.get("assumptions", "{}"))
     return list(stored.get("assumed", ()))
 
 
@@ -209,8 +224,8 @@ def collected_breaches() -> Iterator[dict[str, BrokenAssumption]]:
     name."""
     worst: dict[str, BrokenAssumption] = {}
 
-    def note(run: Result) -> None:
-        for breach in broken_of(run):
+    def note(run_result: Result) -> None:
+        for breach in broken_of(run_result):
             if breach.name not in worst or breach.share > worst[breach.name].share:
                 worst[breach.name] = breach
 

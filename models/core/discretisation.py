@@ -76,11 +76,11 @@ class Estimate:
         return not self.share <= REFUSED_SHARE and self.step != 0.0
 
 
-def reference_size(values: np.ndarray) -> float:
+def reference_size(channel_values: np.ndarray) -> float:
     """Reference size of a channel for its relative error: its standard deviation along the first axis, or its magnitude
     if it is constant."""
-    largest = float(np.abs(values).max(initial=0.0))
-    deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
+    largest = float(np.abs(channel_values).max(initial=0.0))
+    deviation = float(np.sqrt(np.mean(np.var(channel_values, axis=0))))
     return deviation if deviation > UNMOVED_DEVIATION * largest else largest
 
 
@@ -101,9 +101,9 @@ def estimate(
     fine_values: np.ndarray,
     coarse_values: np.ndarray,
     declared_order: float,
-    step: float,
+    time_step: float,
     coarsest_values: np.ndarray | None = None,
-    unit: str = "",
+    channel_unit: str = "",
 ) -> Estimate:
     """Estimated error of ``fine_values`` (m, ...) from runs with twice and (over the first rows) four times the step,
     all read at the rows of the run with twice the step.
@@ -120,18 +120,20 @@ def estimate(
         )
     largest = float(np.abs(fine_values).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine_values)))
-    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), reference_size(fine_values), step)
+    return estimate_rescaled(
+        Estimate(error, channel_unit, 0.0, order, time_step), reference_size(fine_values), time_step
+    )
 
 
-def root_mean_square(values: np.ndarray) -> float:
+def root_mean_square(channel_values: np.ndarray) -> float:
     """Root mean square of values of any shape; infinite where squares are too large, 0 where there are none."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
+        return float(np.sqrt(np.mean(np.square(channel_values)))) if channel_values.size else 0.0
 
 
-def finite_rms(values: np.ndarray) -> float:
+def finite_rms(channel_values: np.ndarray) -> float:
     """Root mean square of the finite values; 0 where there are none."""
-    return root_mean_square(values[np.isfinite(values)])
+    return root_mean_square(channel_values[np.isfinite(channel_values)])
 
 
 def nearest_rows(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
@@ -155,99 +157,111 @@ are longer or the share is 1. Raises InputError or RunFailed where that is impos
 
 
 def with_estimated_errors(
-    run: Result,
+    run_result: Result,
     fine_run: Series,
-    rerun: Rerun,
-    order: float,
-    step: float,
-    growth: Mapping[str, float] | None = None,
+    run_again: Rerun,
+    convergence_order: float,
+    time_step: float,
+    error_growth: Mapping[str, float] | None = None,
     channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result with estimated errors of the channels in ``fine_run``: rows of that run at steps of ``step`` (s),
-    compared with runs that ``rerun`` makes in other steps.
+    """The result with estimated errors of the channels in ``fine_run``: rows of that run at steps of ``time_step`` (s),
+    compared with runs that ``run_again`` makes in other steps.
 
-    growth : by channel, least factor on what a part tells, where errors grow faster than by a power of time;
+    error_growth : by channel, least factor on what a part tells, where errors grow faster than by a power of time;
     channel_sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
     ``partial`` is the result, where a channel is no answer.
     """
-    estimates, method_text = step_errors(fine_run, rerun, order, step, growth, channel_sizes)
-    known = {name: run.data[name].attrs.get("units", "") for name in fine_run.channels if name in run.data}
+    estimates, method_text = step_errors(fine_run, run_again, convergence_order, time_step, error_growth, channel_sizes)
+    known = {
+        name: run_result.data[name].attrs.get("units", "") for name in fine_run.channels if name in run_result.data
+    }
     known |= fine_run.units
     return with_stated_errors(
-        run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in estimates.items()}, method_text
+        run_result,
+        {name: replace(estimate, unit=known.get(name, "")) for name, estimate in estimates.items()},
+        method_text,
     )
 
 
 def step_errors(
     fine_run: Series,
-    rerun: Rerun,
-    order: float,
-    step: float,
-    growth: Mapping[str, float] | None = None,
+    run_again: Rerun,
+    convergence_order: float,
+    time_step: float,
+    error_growth: Mapping[str, float] | None = None,
     channel_sizes: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Estimate], str]:
     """Estimated errors of the channels in ``fine_run`` from runs in other steps, without units, and a text on the
     method of estimation.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. growth, channel_sizes : as in ``with_estimated_errors``.
+    be, half of it over a part tells. error_growth, channel_sizes : as in ``with_estimated_errors``.
     """
     try:
-        estimates, method_text = _by_longer_steps(fine_run, rerun, order, step), "runs in longer steps"
+        estimates, method_text = (
+            _by_longer_steps(fine_run, run_again, convergence_order, time_step),
+            "runs in longer steps",
+        )
     except (InputError, RunFailed):
-        estimates, method_text = _by_half_steps(fine_run, rerun, order, step, growth or {}), "a part in half the step"
+        estimates, method_text = (
+            _by_half_steps(fine_run, run_again, convergence_order, time_step, error_growth or {}),
+            "a part in half the step",
+        )
     for name, size in (channel_sizes or {}).items():
-        estimates[name] = estimate_rescaled(estimates[name], size, step)
+        estimates[name] = estimate_rescaled(estimates[name], size, time_step)
     return estimates, method_text
 
 
-def _by_longer_steps(fine_run: Series, rerun: Rerun, order: float, step: float) -> dict[str, Estimate]:
+def _by_longer_steps(
+    fine_run: Series, run_again: Rerun, convergence_order: float, time_step: float
+) -> dict[str, Estimate]:
     """Estimated errors by channel from runs in twice the step and, over a part, four times the step."""
-    coarse = _comparable_coarse_run(fine_run, rerun(2.0, 1.0), step)
+    coarse = _comparable_coarse_run(fine_run, run_again(2.0, 1.0), time_step)
     coarser: Mapping[str, np.ndarray] = {}
     with suppress(InputError, RunFailed):
-        coarser = _comparable_coarse_run(coarse, rerun(4.0, REPEATED_SHARE), step).channels
+        coarser = _comparable_coarse_run(coarse, run_again(4.0, REPEATED_SHARE), time_step).channels
     rows = nearest_rows(fine_run.times, coarse.times)
     return {
-        name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
+        name: estimate(values[rows], coarse.channels[name], convergence_order, time_step, coarser.get(name))
         for name, values in fine_run.channels.items()
     }
 
 
-def _comparable_coarse_run(fine_run: Series, coarse_run: Series, step: float) -> Series:
+def _comparable_coarse_run(fine_run: Series, coarse_run: Series, time_step: float) -> Series:
     """The run in longer steps, unchanged; raises RunFailed where it has no row besides the start, or lasts longer than
     the finer run.
 
     Steps of a short run, twice as long, may outlast it: nothing is there to compare.
     """
-    if len(coarse_run.times) < 2 or coarse_run.times[-1] > fine_run.times[-1] + 0.25 * step:
-        raise RunFailed("", f"longer steps than {step:g} s do not fit into the run")
+    if len(coarse_run.times) < 2 or coarse_run.times[-1] > fine_run.times[-1] + 0.25 * time_step:
+        raise RunFailed("", f"longer steps than {time_step:g} s do not fit into the run")
     return coarse_run
 
 
 def _by_half_steps(
-    fine_run: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
+    fine_run: Series, run_again: Rerun, convergence_order: float, time_step: float, error_growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
     """Estimated errors by channel from part of the run, or all of a short one, repeated with half the step; scaled to
     the run's step by the order of the method, and to the rest of the run by the error's growth."""
-    finer = rerun(0.5, FINE_WINDOW if len(fine_run.times) > MOST_FULLY_REPEATED_ROWS else 1.0)
+    finer = run_again(0.5, FINE_WINDOW if len(fine_run.times) > MOST_FULLY_REPEATED_ROWS else 1.0)
     slack = 1e-9 * finer.times[-1]
     in_finer_run = (fine_run.times >= finer.times[0] - slack) & (fine_run.times <= finer.times[-1] + slack)
     rows = nearest_rows(finer.times, fine_run.times[in_finer_run])
     estimates = {}
     for name, values in fine_run.channels.items():
-        error = estimate(finer.channels[name][rows], values[in_finer_run], order, step)
+        error = estimate(finer.channels[name][rows], values[in_finer_run], convergence_order, time_step)
         later = max(
             _growth_after_window(values[in_finer_run] - finer.channels[name][rows], values) if in_finer_run[0] else 1.0,
-            growth.get(name, 1.0),
+            error_growth.get(name, 1.0),
         )
         estimates[name] = estimate_rescaled(
-            replace(error, error=error.error * 2.0**error.order * later), reference_size(values), step
+            replace(error, error=error.error * 2.0**error.order * later), reference_size(values), time_step
         )
     return estimates
 
 
-def _growth_after_window(error_rows: np.ndarray, values: np.ndarray) -> float:
+def _growth_after_window(error_rows: np.ndarray, channel_values: np.ndarray) -> float:
     """Ratio of the error's rms over the whole run to that over the first rows, in which ``error_rows`` (k, ...) is the
     difference of two runs.
 
@@ -261,37 +275,38 @@ def _growth_after_window(error_rows: np.ndarray, values: np.ndarray) -> float:
         root_mean_square(error_rows[len(error_rows) // 2 :]),
     )
     power = 0.5 * (math.log2(1.0 + (second / first) ** 2) - 1.0) if first > 0.0 else 0.0
-    bends = np.diff(values, 2, axis=0)
+    bends = np.diff(channel_values, 2, axis=0)
     bends_at_start, over_all = root_mean_square(bends[: len(error_rows) - 2]), root_mean_square(bends)
     rougher = over_all / bends_at_start if bends_at_start > 0.0 else 1.0
-    return max(1.0, rougher, (len(values) / len(error_rows)) ** min(power, STEEPEST_ERROR_GROWTH))
+    return max(1.0, rougher, (len(channel_values) / len(error_rows)) ** min(power, STEEPEST_ERROR_GROWTH))
 
 
-def estimate_rescaled(estimate: Estimate, channel_size: float, step: float) -> Estimate:
-    """The estimate with share and advised step recomputed for the size of the whole channel; ``step`` is the run's
+def estimate_rescaled(estimate: Estimate, channel_size: float, time_step: float) -> Estimate:
+    """The estimate with share and advised step recomputed for the size of the whole channel; ``time_step`` is the run's
     step."""
     share = estimate.error / channel_size if channel_size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL_SHARE) ** (1.0 / estimate.order) if share < math.inf else 1.0
-    return replace(estimate, share=share, step=step / _whole_divisor(wanted))
+    return replace(estimate, share=share, step=time_step / _whole_divisor(wanted))
 
 
-def _whole_divisor(minimum: float) -> int:
-    """Smallest number 2^i 5^j that is at least ``minimum``; a step divided by this number stays a short decimal."""
+def _whole_divisor(least_divisor: float) -> int:
+    """Smallest number 2^i 5^j that is at least ``least_divisor``; a step divided by this number stays a short
+    decimal."""
     powers = (2**i * 5**j for i in range(30) for j in range(12))
-    return min((number for number in powers if number >= minimum), default=1)
+    return min((number for number in powers if number >= least_divisor), default=1)
 
 
 def with_tolerance_error(
-    run: Result,
+    run_result: Result,
     fine_run: Series,
     looser_run: Series,
-    factor: float,
-    tolerance: float,
+    tolerance_ratio: float,
+    solver_tolerance: float,
     channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result of an adaptive method with estimated errors of its channels, from a run with ``factor`` times the
-    tolerance. The error is assumed to grow with the power TOLERANCE_POWER of the tolerance only, and is overestimated.
-    ``channel_sizes`` as in ``with_estimated_errors``.
+    """The result of an adaptive method with estimated errors of its channels, from a run with ``tolerance_ratio`` times
+    the tolerance. The error is assumed to grow with the power TOLERANCE_POWER of the tolerance only, and is
+    overestimated. ``channel_sizes`` as in ``with_estimated_errors``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -302,113 +317,138 @@ def with_tolerance_error(
         same_times = len(looser_run.times) == len(fine_run.times) and np.array_equal(looser_run.times, fine_run.times)
         values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser_run.times)
         error = max(
-            root_mean_square(values_at_looser - looser_run.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
-            LEAST_TOLERANCE_SHARE * tolerance * reference_size(values),
+            root_mean_square(values_at_looser - looser_run.channels[name]) / (tolerance_ratio**TOLERANCE_POWER - 1.0),
+            LEAST_TOLERANCE_SHARE * solver_tolerance * reference_size(values),
         )
-        estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)
+        estimate = Estimate(
+            error, run_result.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, solver_tolerance
+        )
         estimates[name] = estimate_rescaled(
-            estimate, (channel_sizes or {}).get(name, reference_size(values)), tolerance
+            estimate, (channel_sizes or {}).get(name, reference_size(values)), solver_tolerance
         )
-    return with_stated_errors(run, estimates, f"a run with {factor:g} times the tolerance", "as tolerance")
+    return with_stated_errors(
+        run_result, estimates, f"a run with {tolerance_ratio:g} times the tolerance", "as tolerance"
+    )
 
 
-def grid_error(error: float, channel_size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
-    """Estimated error on a grid of ``cells`` cells along each axis. The ``step`` of the estimate is the number of cells
-    needed for GOAL_SHARE, at most ``maximum_cells``."""
-    share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
-    needed = cells * max(1.0, (min(share, 1.0) / GOAL_SHARE) ** (1.0 / order))
-    return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS_NOTE)
+def grid_error(
+    grid_difference: float,
+    channel_size: float,
+    channel_unit: str,
+    cell_count: int,
+    convergence_order: float,
+    cell_limit: int,
+) -> Estimate:
+    """Estimated error on a grid of ``cell_count`` cells along each axis. The ``step`` of the estimate is the number of
+    cells needed for GOAL_SHARE, at most ``cell_limit``."""
+    share = grid_difference / channel_size if channel_size > 0.0 else (0.0 if grid_difference == 0.0 else math.inf)
+    needed = cell_count * max(1.0, (min(share, 1.0) / GOAL_SHARE) ** (1.0 / convergence_order))
+    return Estimate(
+        grid_difference, channel_unit, share, convergence_order, float(min(cell_limit, math.ceil(needed))), CELLS_NOTE
+    )
 
 
-def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
+def summed_error(first_error: Estimate, added_error: Estimate) -> Estimate:
     """Sum of two estimated errors, such as those of a run and of its input.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
     """
-    larger = first if first.share >= added_error.share else added_error
-    step = min(first.step, added_error.step) if first.of == added_error.of == "" else larger.step
-    order = min(first.order, added_error.order)
+    larger = first_error if first_error.share >= added_error.share else added_error
+    step = min(first_error.step, added_error.step) if first_error.of == added_error.of == "" else larger.step
+    order = min(first_error.order, added_error.order)
     return Estimate(
-        first.error + added_error.error, first.unit, first.share + added_error.share, order, step, larger.of
+        first_error.error + added_error.error,
+        first_error.unit,
+        first_error.share + added_error.share,
+        order,
+        step,
+        larger.of,
     )
 
 
-def with_stated_errors(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
+def with_stated_errors(
+    run_result: Result, estimates: Mapping[str, Estimate], method_text: str, step_unit: str = "s"
+) -> Result:
     """The result with the estimated error of each channel and the method of estimation; ``step_unit`` is the unit of
     steps or cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     if not estimates:
-        return not_estimated(run, NO_CHANGING_CHANNEL)
+        return not_estimated(run_result, NO_CHANGING_CHANNEL)
     channels = {name: asdict(estimate) for name, estimate in estimates.items()}
-    run.data.attrs["error"] = json.dumps({"how": method, "of": step_unit, "channels": channels})
+    run_result.data.attrs["error"] = json.dumps({"how": method_text, "of": step_unit, "channels": channels})
     worst = max(estimates, key=lambda name: estimates[name].share, default=None)
     if worst is not None and estimates[worst].refused:
-        engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], estimates[worst]
+        engine, estimate = run_result.data.attrs["engine"] or run_result.data.attrs["system"], estimates[worst]
         why = f"{worst} errs by {100.0 * estimate.share:.3g} % of its deviation; {estimate.advice(step_unit)}"
         fault = "cells are too few" if estimate.of else "steps are too long" if estimate.step else "error is too large"
         failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
-        failure.partial = run
+        failure.partial = run_result
         raise failure
-    return run
+    return run_result
 
 
-def errors_of(run: Result) -> dict[str, Estimate]:
+def errors_of(run_result: Result) -> dict[str, Estimate]:
     """Error estimates stored in a result, by channel; empty if no estimate was made."""
-    stored = json.loads(run.data.attrs.get("error", "{}"))
+    stored = json.loads(run_result.data.attrs.get("error", "{}"))
     return {name: Estimate(**values) for name, values in stored.get("channels", {}).items()}
 
 
-def not_estimated(run: Result, reason: str) -> Result:
+def not_estimated(run_result: Result, reason: str) -> Result:
     """The result with a statement why its error is not estimated, such as a force law that switches differently in
     every run."""
-    run.data.attrs["error"] = json.dumps({"why": reason})
-    return run
+    run_result.data.attrs["error"] = json.dumps({"why": reason})
+    return run_result
 
 
-def with_theory_error(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
-    """The result with the error of the theory beside that of the grid; ``method`` is text on how it is known.
+def with_theory_error(run_result: Result, estimates: Mapping[str, Estimate], method_text: str) -> Result:
+    """The result with the error of the theory beside that of the grid; ``method_text`` is text on how it is known.
 
     A finer grid does not reduce this error, so it leads to no warning and no refusal.
     """
-    stored = json.loads(run.data.attrs["error"])
-    stored["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
-    run.data.attrs["error"] = json.dumps(stored)
-    return run
+    stored = json.loads(run_result.data.attrs["error"])
+    stored["theory"] = {
+        "how": method_text,
+        "channels": {name: asdict(estimate) for name, estimate in estimates.items()},
+    }
+    run_result.data.attrs["error"] = json.dumps(stored)
+    return run_result
 
 
-def with_sampling_error(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
-    """The result of an ensemble with the standard errors of its channels, from ``samples`` paths.
+def with_sampling_error(run_result: Result, estimates: Mapping[str, Estimate], sample_count: int) -> Result:
+    """The result of an ensemble with the standard errors of its channels, from ``sample_count`` paths.
 
     The errors of the time step stay in the result as well.
     """
-    stored = json.loads(run.data.attrs["error"])
+    stored = json.loads(run_result.data.attrs["error"])
     stored["chance"] = {
-        "samples": samples,
+        "samples": sample_count,
         "channels": {name: asdict(estimate) for name, estimate in estimates.items()},
     }
-    run.data.attrs["error"] = json.dumps(stored)
-    return run
+    run_result.data.attrs["error"] = json.dumps(stored)
+    return run_result
 
 
-def sampling_error(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
+def sampling_error(standard_error: float, channel_size: float, channel_unit: str, sample_count: int) -> Estimate:
     """The standard error of an ensemble's result as an ``Estimate``; its ``step`` is the number of samples that would
     reduce the share to WARNED_SHARE."""
-    share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
-    needed = samples * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf
-    return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
+    share = standard_error / channel_size if channel_size > 0.0 else (0.0 if standard_error == 0.0 else math.inf)
+    needed = sample_count * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf
+    return Estimate(
+        standard_error, channel_unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf
+    )
 
 
-def largest_estimate(run: Result) -> Estimate | None:
+def largest_estimate(run_result: Result) -> Estimate | None:
     """The error estimate with the largest share in a result; None if there are no estimates."""
-    return max(errors_of(run).values(), key=lambda estimate: estimate.share, default=None)
+    return max(errors_of(run_result).values(), key=lambda estimate: estimate.share, default=None)
 
 
-def error_lines(run: Result) -> list[str]:
+def error_lines(run_result: Result) -> list[str]:
     """Printed lines on a result's error: the worst channel for the time step and the worst for cells, with a warning
     and advice if needed, then the errors of the theory and of the sample."""
-    stored, estimates = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
+    stored, estimates = json.loads(run_result.data.attrs.get("error", "{}")), errors_of(run_result)
     text = [f"error not estimated: {stored['why']}"] if "why" in stored else []
     shares = {name: estimate.share for name, estimate in sorted(estimates.items(), key=lambda entry: entry[1].share)}
     worst = {estimates[name].of: name for name in shares}
@@ -423,8 +463,8 @@ def error_lines(run: Result) -> list[str]:
     return text
 
 
-def _size_text(name: str, estimate: Estimate) -> str:
+def _size_text(channel_name: str, estimate: Estimate) -> str:
     """Text with the share of an estimated error in per cent, the channel, and the error in its unit."""
     share, error = (float(f"{value:.2g}") for value in (100.0 * estimate.share, estimate.error))
     size = f"{error:g} {estimate.unit}".rstrip()
-    return f"{share:g} % ({name}: {size})"
+    return f"{share:g} % ({channel_name}: {size})"

@@ -47,33 +47,33 @@ def _value_text(shown_value: Any) -> str:
     return f" = {text if len(text) <= LONGEST_VALUE_TEXT else text[: LONGEST_VALUE_TEXT - 3] + '...'}"
 
 
-def nearest_names_phrase(name: object, choices: tuple[str, ...]) -> str:
-    """Phrase that lists the accepted names and proposes the one most similar to ``name``."""
+def nearest_names_phrase(unknown_name: object, choices: tuple[str, ...]) -> str:
+    """Phrase that lists the accepted names and proposes the one most similar to ``unknown_name``."""
     if not choices:
         return ""
     listed, omitted_text = sorted(choices), ""
     if len(choices) > MOST_NAMES:
-        listed = get_close_matches(str(name), choices, n=5, cutoff=0.3) or listed[:5]
+        listed = get_close_matches(str(unknown_name), choices, n=5, cutoff=0.3) or listed[:5]
         omitted_text = f", and {len(choices) - len(listed)} others"
-    return f" (allowed: {', '.join(listed)}{omitted_text}){suggestion_phrase(name, choices)}"
+    return f" (allowed: {', '.join(listed)}{omitted_text}){suggestion_phrase(unknown_name, choices)}"
 
 
-def suggestion_phrase(name: object, choices: tuple[str, ...]) -> str:
-    """Phrase "did you mean ..." with the accepted name most similar to ``name``, regardless of upper and lower case;
-    empty if none is similar."""
+def suggestion_phrase(unknown_name: object, choices: tuple[str, ...]) -> str:
+    """Phrase "did you mean ..." with the accepted name most similar to ``unknown_name``, regardless of upper and lower
+    case; empty if none is similar."""
     lower = {choice.casefold(): choice for choice in choices}
-    match = get_close_matches(str(name).casefold(), lower, n=1, cutoff=0.6)
+    match = get_close_matches(str(unknown_name).casefold(), lower, n=1, cutoff=0.6)
     return f"; did you mean {lower[match[0]]!r}?" if match else ""
 
 
-def similar_file(path: Path) -> str:
+def similar_file(missing_path: Path) -> str:
     """Phrase "did you mean ..." with the most similar name among the files of the same kind in the folder of
-    ``path``."""
+    ``missing_path``."""
     try:
-        stems = tuple(p.stem for p in path.parent.iterdir() if p.suffix == path.suffix and p.is_file())
+        stems = tuple(p.stem for p in missing_path.parent.iterdir() if p.suffix == missing_path.suffix and p.is_file())
     except OSError:
         return ""
-    return suggestion_phrase(path.stem, stems).replace("'?", f"{path.suffix}'?")
+    return suggestion_phrase(missing_path.stem, stems).replace("'?", f"{missing_path.suffix}'?")
 
 
 class RunFailed(RuntimeError):

@@ -6,20 +6,20 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True)
-def evaluate(coefficients, period, start_time, step, sample_count, derivatives):
+def evaluate(coefficients, sampling_period, start_time, time_step, sample_count, derivative_count):
     """Values of a piecewise polynomial at the times start_time + i step, followed by its derivatives up to the order
-    ``derivatives``: shape (sample_count, columns (derivatives + 1)).
+    ``derivative_count``: shape (sample_count, columns (derivatives + 1)).
 
     coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
-    the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
+    the pieces lie ``sampling_period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
     """
     powers, pieces, columns = coefficients.shape
-    values_out = np.empty((sample_count, columns * (derivatives + 1)))
+    values_out = np.empty((sample_count, columns * (derivative_count + 1)))
     for row in range(sample_count):
-        time = start_time + row * step
-        piece = min(max(int(np.floor(time / period + 1e-9)), 0), pieces - 1)
-        since = time - piece * period
-        for order in range(derivatives + 1):
+        time = start_time + row * time_step
+        piece = min(max(int(np.floor(time / sampling_period + 1e-9)), 0), pieces - 1)
+        since = time - piece * sampling_period
+        for order in range(derivative_count + 1):
             for column in range(columns):
                 value = 0.0
                 for power in range(powers - 1, order - 1, -1):
@@ -32,14 +32,16 @@ def evaluate(coefficients, period, start_time, step, sample_count, derivatives):
 
 
 @njit(cache=True, nogil=True)
-def interpolate(values, index, fraction):
-    """Samples interpolated linearly, shape (m, columns): between row ``index`` (m,) of ``values`` (n, columns) and the
-    next row, at the ``fraction`` (m,) of a period."""
-    rows, columns = values.shape
-    values_out = np.empty((len(index), columns))
-    for i in range(len(index)):
-        row = index[i]
+def interpolate(samples, row_indices, period_fractions):
+    """Samples interpolated linearly, shape (m, columns): between row ``row_indices`` (m,) of ``samples`` (n, columns)
+    and the next row, at the ``period_fractions`` (m,) of a period."""
+    rows, columns = samples.shape
+    values_out = np.empty((len(row_indices), columns))
+    for i in range(len(row_indices)):
+        row = row_indices[i]
         next_row = min(row + 1, rows - 1)
         for column in range(columns):
-            values_out[i, column] = values[row, column] + fraction[i] * (values[next_row, column] - values[row, column])
+            values_out[i, column] = samples[row, column] + period_fractions[i] * (
+                samples[next_row, column] - samples[row, column]
+            )
     return values_out

@@ -20,7 +20,9 @@ NEGLIGIBLE_VELOCITY, ROUNDING_VELOCITY_SHARE = 1e-6, 1e-9
 """Velocity (m/s, of the largest mass), and share of the velocities at the start, below which a motion is negligible."""
 
 
-def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
+def missed_velocity_share(
+    positions: np.ndarray, rates: np.ndarray, time_step: float, masses: np.ndarray
+) -> tuple[float, int]:
     """Largest velocity error within one second, relative to the velocity change of the run, and the row where that
     second begins. The error compares displacements over two steps with the integral of the rates by Simpson's rule.
 
@@ -28,44 +30,46 @@ def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float,
     """
     if len(positions) < 3:
         return 0.0, 0
-    mass = mass if np.ndim(mass) == 2 else np.diag(mass)
-    root = np.linalg.cholesky(mass)
-    displacement = step / 3.0 * (rates[:-2] + 4.0 * rates[1:-1] + rates[2:])
-    errors_of_step = np.linalg.norm((positions[2:] - positions[:-2] - displacement) @ root, axis=1) / (2.0 * step)
+    masses = masses if np.ndim(masses) == 2 else np.diag(masses)
+    root = np.linalg.cholesky(masses)
+    displacement = time_step / 3.0 * (rates[:-2] + 4.0 * rates[1:-1] + rates[2:])
+    errors_of_step = np.linalg.norm((positions[2:] - positions[:-2] - displacement) @ root, axis=1) / (2.0 * time_step)
     velocity_scale = np.linalg.norm((rates - rates[0]) @ root, axis=1).max()
     velocity_scale = max(
         velocity_scale,
         ROUNDING_VELOCITY_SHARE * np.linalg.norm(rates[0] @ root),
-        NEGLIGIBLE_VELOCITY * np.sqrt(mass.diagonal().max()),
+        NEGLIGIBLE_VELOCITY * np.sqrt(masses.diagonal().max()),
     )
     sums = np.concatenate(([0.0], np.cumsum(errors_of_step)))
-    window = min(len(errors_of_step), max(1, round(1.0 / step)))
+    window = min(len(errors_of_step), max(1, round(1.0 / time_step)))
     within = sums[window:] - sums[:-window]
     return float(within.max() / velocity_scale), int(within.argmax())
 
 
 def missed_velocity_share_first_order(
-    positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray
+    positions: np.ndarray, rates: np.ndarray, time_step: float, masses: np.ndarray
 ) -> tuple[float, int]:
     """``missed_velocity_share`` for first-order methods: the smallest of three results, in which the rates belong to
     the ends of the steps, or to the middle of the step after or before."""
     middle = (rates[1:] + rates[:-1]) / 2.0
     variants = ((positions, rates), (positions[:-1], middle), (positions[1:], middle))
-    return min(missed_velocity_share(positions_at, velocities, step, mass) for positions_at, velocities in variants)
+    return min(
+        missed_velocity_share(positions_at, velocities, time_step, masses) for positions_at, velocities in variants
+    )
 
 
 def check_resolved(
-    engine: str, times: np.ndarray, positions: np.ndarray, rates: np.ndarray, mass: np.ndarray, order: int = 2
+    engine: str, times: np.ndarray, positions: np.ndarray, rates: np.ndarray, masses: np.ndarray, method_order: int = 2
 ) -> None:
     """Raise RunFailed if the steps of a run were too long to resolve its motion.
 
-    times (m,) in s; order : of the method that went the steps; the others as in ``missed_velocity_share``.
+    times (m,) in s; method_order : of the method that went the steps; the others as in ``missed_velocity_share``.
     """
     if len(times) < 3:
         return
     step = float(times[1] - times[0])
-    missed = missed_velocity_share_first_order if order == 1 else missed_velocity_share
-    share, row = missed(positions, rates, step, mass)
+    missed = missed_velocity_share_first_order if method_order == 1 else missed_velocity_share
+    share, row = missed(positions, rates, step, masses)
     if not share <= ALLOWED_MISSING_SHARE:
         raise RunFailed(
             engine,

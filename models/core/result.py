@@ -51,9 +51,9 @@ class Result:
     data: "xr.Dataset"
     detail: Any = field(default=None, repr=False)
 
-    def __getitem__(self, channel: str) -> np.ndarray:
+    def __getitem__(self, channel_name: str) -> np.ndarray:
         """Values of a channel, by its name, as an array."""
-        return self.data[channel].values
+        return self.data[channel_name].values
 
     @property
     def times(self) -> np.ndarray:
@@ -70,10 +70,10 @@ class Result:
         """Counts of steps, force calls and the like of the run, by name."""
         return json.loads(self.data.attrs["counts"])
 
-    def every(self, spacing: float) -> "Result":
-        """A copy of the result with rows ``spacing`` (s) apart; all rows if they are already at least that far
+    def every(self, row_spacing: float) -> "Result":
+        """A copy of the result with rows ``row_spacing`` (s) apart; all rows if they are already at least that far
         apart."""
-        step = max(1, round(spacing / float(self.times[1] - self.times[0])))
+        step = max(1, round(row_spacing / float(self.times[1] - self.times[0])))
         return replace(self, data=self.data.isel(time=slice(None, None, step)))
 
     @property
@@ -81,7 +81,7 @@ class Result:
         """Computing time of the run (s); a result that was read from a file does not have it."""
         return float(self.data.attrs["seconds"])
 
-    def save(self, path: Path | str) -> None:
+    def save(self, output_path: Path | str) -> None:
         """Write the result as a netCDF file without the computing time, so that equal runs give identical bytes.
 
         It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
@@ -94,21 +94,21 @@ class Result:
             if variable.size and variable.ndim and variable.dtype.kind in "fiu"
         }
         write_whole(
-            Path(path), data.to_netcdf(engine="h5netcdf", encoding=checked)
+            Path(output_path), data.to_netcdf(engine="h5netcdf", encoding=checked)
         )  # HDF5 itself crashes on a full disk
 
-    def save_table(self, path: Path | str, *channels: str) -> None:
+    def save_table(self, output_path: Path | str, *channel_names: str) -> None:
         """Write channels that share one axis as columns of a CSV file; all channels if none is named."""
         from models.core.tables import write_table
 
-        names = channels or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
-        write_table(Path(path), {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
+        names = channel_names or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
+        write_table(Path(output_path), {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
 
 
 def result(
     scene: Any,
     channels: Mapping[str, Channel],
-    axes: Mapping[str, Channel],
+    axis_channels: Mapping[str, Channel],
     *,
     counts: Mapping[str, int] | None = None,
     seconds: float = 0.0,
@@ -118,14 +118,13 @@ def result(
 ) -> Result:
     """A ``Result`` from the channels of a scene's run, with counts, doubts and provenance.
 
-    axes : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the march;
-    doubts : sentences on what contradicts the scene; attributes : the ``engine`` and more, numbers or text.
-    """
+    axis_channels : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the
+    march; doubts : sentences on what contradicts the scene; attributes : the ``engine`` and more, numbers or text."""
     import xarray as xr
 
     data = xr.Dataset(
         {name: channel.labelled() for name, channel in channels.items()},
-        coords={name: axis.labelled() for name, axis in axes.items()},
+        coords={name: axis.labelled() for name, axis in axis_channels.items()},
     )
     data.attrs = {
         "title": scene.title,
@@ -145,7 +144,7 @@ def result(
     return Result(data, detail)
 
 
-def join_results(results: Mapping[str, Result], axis: str) -> Result:
+def join_results(results: Mapping[str, Result], axis_name: str) -> Result:
     """Results with the same channels joined into one, along a new first axis labelled with the names in the mapping.
 
     The attributes are those of the first; counts, seconds, errors and assumptions stand by name.
@@ -153,7 +152,7 @@ def join_results(results: Mapping[str, Result], axis: str) -> Result:
     import xarray as xr
 
     parts = [result.data for result in results.values()]
-    data = xr.concat(parts, xr.Variable(axis, list(results)), combine_attrs="override")
+    data = xr.concat(parts, xr.Variable(axis_name, list(results)), combine_attrs="override")
     data.attrs["engine"] = ", ".join(dataset.attrs["engine"] for dataset in parts)
     data.attrs["counts"] = json.dumps({name: result.counts() for name, result in results.items()})
     for attribute in ("error", "assumptions"):
@@ -164,36 +163,36 @@ def join_results(results: Mapping[str, Result], axis: str) -> Result:
     return Result(data)
 
 
-def result_from_table(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, **attributes: Any) -> Result:
-    """A table (rows of dicts) as a ``Result``: one channel per column along ``axis``. Columns with computing times are
-    left out, since these never repeat.
+def result_from_table(scene: Any, table_rows: Sequence[Mapping[str, Any]], axis_name: str, **attributes: Any) -> Result:
+    """A table (rows of dicts) as a ``Result``: one channel per column along ``axis_name``. Columns with computing times
+    are left out, since these never repeat.
 
     Values are numbers, text, or None for no number; a name's unit is what it has in brackets, as "heave [m]".
     """
-    columns = {name: [math.nan if row[name] is None else row[name] for row in rows] for name in rows[0]}
+    columns = {name: [math.nan if row[name] is None else row[name] for row in table_rows] for name in table_rows[0]}
     columns.pop("seconds", None)
     units = {name: name.partition("[")[2].rstrip("]") for name in columns}
     return result(
-        scene, {name: Channel(axis, values, units[name]) for name, values in columns.items()}, {}, **attributes
+        scene, {name: Channel(axis_name, values, units[name]) for name, values in columns.items()}, {}, **attributes
     )
 
 
-def load(path: Path) -> Result:
+def load(result_path: Path) -> Result:
     """Read a saved result from a netCDF file; raises InputError if the file holds none."""
     import xarray as xr
 
-    if not path.is_file():
-        refusal = "is a folder: name one file of it" if path.is_dir() else "no such file"
-        raise InputError(path, "", None, f"{refusal} (a saved result ends in .nc)")
+    if not result_path.is_file():
+        refusal = "is a folder: name one file of it" if result_path.is_dir() else "no such file"
+        raise InputError(result_path, "", None, f"{refusal} (a saved result ends in .nc)")
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as data:
+        with xr.open_dataset(result_path, engine="h5netcdf") as data:
             return Result(data.load())
     except (OSError, ValueError, KeyError, RuntimeError) as error:  # the last: what HDF5 finds in its own headers
         reason = str(error).splitlines()[0]
-        raise InputError(path, "", None, f"not a saved result, or a damaged one: {reason}") from None
+        raise InputError(result_path, "", None, f"not a saved result, or a damaged one: {reason}") from None
 
 
-def provenance(command: str = "") -> dict[str, Any]:
+def provenance(command_line: str = "") -> dict[str, Any]:
     """Package versions, commit, machine and command, from which a result can be reproduced."""
     return {
         "twinrig": _version("twinrig"),
@@ -202,7 +201,7 @@ def provenance(command: str = "") -> dict[str, Any]:
         "python": platform.python_version(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {_processor_name()}",
         "system": f"{platform.system()} {platform.release()}",
-        "command": command,
+        "command": command_line,
     }
 
 
@@ -232,6 +231,6 @@ def _processor_name() -> str:
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown processor")
 
 
-def write(data: "xr.Dataset", path: Path) -> None:
+def write(dataset: "xr.Dataset", output_path: Path) -> None:
     """Write an xarray Dataset as a netCDF file, as ``Result.save`` does."""
-    Result(data).save(path)
+    Result(dataset).save(output_path)

@@ -14,13 +14,13 @@ RK4_STAGES = 4
 
 
 def runge_kutta_step(
-    rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, step: float
+    state_rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, time_step: float
 ) -> np.ndarray:
-    """State after one classical Runge-Kutta step (s). ``rate`` gives the derivative at a time (s) and state; it is
-    evaluated at 0, 1/2, 1/2 and 1 step."""
-    half = 0.5 * step
-    first = rate(time, state)
-    second = rate(time + half, state + half * first)
-    third = rate(time + half, state + half * second)
-    fourth = rate(time + step, state + step * third)
-    return state + step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+    """State after one classical Runge-Kutta step (s). ``state_rate`` gives the derivative at a time (s) and state; it
+    is evaluated at 0, 1/2, 1/2 and 1 step."""
+    half = 0.5 * time_step
+    first = state_rate(time, state)
+    second = state_rate(time + half, state + half * first)
+    third = state_rate(time + half, state + half * second)
+    fourth = state_rate(time + time_step, state + time_step * third)
+    return state + time_step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)

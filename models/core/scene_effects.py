@@ -69,23 +69,23 @@ class Entry:
             value = getattr(value, key, None)
         return value is not None and value is not False and value != 0.0
 
-    def drop(self, table: Table, scene: Any) -> None:
+    def drop(self, scene_table: Table, scene: Any) -> None:
         """Remove the effect from the nested tables of a scene."""
         if self.leave_out is not None:
-            return self.leave_out(table, scene)
+            return self.leave_out(scene_table, scene)
         *parent_keys, key = self.place.split(".")
         for name in parent_keys:
-            table = table[name]
-        del table[key]
+            scene_table = scene_table[name]
+        del scene_table[key]
 
-    def add(self, table: Table, scene: Any) -> None:
+    def add(self, scene_table: Table, scene: Any) -> None:
         """Add the effect with its usual values to the nested tables of a scene."""
         if self.put_in is not None:
-            return self.put_in(table, scene)
+            return self.put_in(scene_table, scene)
         *parent_keys, key = self.place.split(".")
         for name in parent_keys:
-            table = table.setdefault(name, {})
-        table[key] = deepcopy(self.usual_value)
+            scene_table = scene_table.setdefault(name, {})
+        scene_table[key] = deepcopy(self.usual_value)
 
 
 class Effect:
@@ -110,67 +110,71 @@ class Effect:
     CHANNELS: tuple[str, ...] = ()
     BESIDE: Mapping[str, Table] = {}
 
-    def __init__(self, names: Mapping[str, Any]) -> None:
-        vars(self).update(names)
+    def __init__(self, attributes: Mapping[str, Any]) -> None:
+        vars(self).update(attributes)
 
 
-def _effect_of_entry(entry: Entry) -> Effect:
+def _effect_of_entry(table_entry: Entry) -> Effect:
     """An ``Effect`` made from an entry of a system's table, with the attribute names of an effect's file."""
     field_names = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
-    known = {key.upper(): getattr(entry, key) for key in field_names}
-    known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
-    known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
-    return Effect(known if entry.usual_value is None and entry.put_in is None else known | {"put_in": entry.add})
+    known = {key.upper(): getattr(table_entry, key) for key in field_names}
+    known |= {"COUNTS": {"all": table_entry.counts, **table_entry.in_engines}} if table_entry.counts else {}
+    known |= {"__doc__": table_entry.says, "named": table_entry.named, "leave_out": table_entry.drop}
+    return Effect(
+        known if table_entry.usual_value is None and table_entry.put_in is None else known | {"put_in": table_entry.add}
+    )
 
 
-def names_of(system: str) -> tuple[str, ...]:
+def names_of(system_name: str) -> tuple[str, ...]:
     """Names of all effects that scenes of a system may have, listed without importing the effects' files."""
-    return tuple(sorted({*_effect_files(system), *_table(system)}))
+    return tuple(sorted({*_effect_files(system_name), *_table(system_name)}))
 
 
-def _table(system: str) -> Mapping[str, Entry]:
+def _table(system_name: str) -> Mapping[str, Entry]:
     """Entries of a system's table of effects, by effect name; empty if all its effects are in files."""
-    package = SYSTEMS[system].effects
+    package = SYSTEMS[system_name].effects
     return getattr(import_module(package), "TABLE", {}) if package else {}
 
 
-def _effect_files(system: str) -> dict[str, Path]:
+def _effect_files(system_name: str) -> dict[str, Path]:
     """Files of a system's effects, by effect name."""
-    package = SYSTEMS[system].effects
+    package = SYSTEMS[system_name].effects
     folders = import_module(package).__path__ if package else ()
     return {file.stem: file for folder in folders for file in Path(folder).glob("[!_]*.py")}
 
 
-def effect_sentences(system: str) -> dict[str, str]:
+def effect_sentences(system_name: str) -> dict[str, str]:
     """First sentence on each effect of a system, by effect name, read without importing the effect's file."""
-    says = {name: _first_sentence(file) for name, file in _effect_files(system).items()}
-    says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
+    says = {name: _first_sentence(file) for name, file in _effect_files(system_name).items()}
+    says |= {name: entry.says.rstrip(".") for name, entry in _table(system_name).items()}
     return dict(sorted(says.items()))
 
 
-def _first_sentence(file: Path) -> str:
+def _first_sentence(effect_file: Path) -> str:
     """First line of the docstring of an effect's file, without its full stop."""
     try:
-        text = ast.get_docstring(ast.parse(file.read_text())) or ""
+        text = ast.get_docstring(ast.parse(effect_file.read_text())) or ""
     except SyntaxError as error:
         return f"(cannot be read: line {error.lineno}: {error.msg})"
     return text.partition("\n")[0].rstrip(".")
 
 
-def module_of(system: str, name: str) -> Any:
+def module_of(system_name: str, effect_name: str) -> Any:
     """The ``Effect`` of a name, from the system's table or from the effect's own file. Raises InputError for an unknown
     name, or a file that lacks something."""
-    if entry := _table(system).get(name):
+    if entry := _table(system_name).get(effect_name):
         return _effect_of_entry(entry)
     try:
-        file = import_module(f"{SYSTEMS[system].effects}.{name}")
+        file = import_module(f"{SYSTEMS[system_name].effects}.{effect_name}")
     except (ImportError, SyntaxError) as error:
-        raise InputError(f"{name}.py", "", None, f"is no effect of {system} that can be imported: {error}") from None
+        raise InputError(
+            f"{effect_name}.py", "", None, f"is no effect of {system_name} that can be imported: {error}"
+        ) from None
     needed = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
     missing = [key for key in ("COST", *needed) if not hasattr(file, key)]
     if missing:
         raise InputError(
-            f"{name}.py",
+            f"{effect_name}.py",
             "",
             None,
             f"has no {' and no '.join(missing)}: models/core/scene_effects.py says what the file of an effect holds",
@@ -189,9 +193,9 @@ def named_effects(scene: Any) -> tuple[str, ...]:
     return tuple(sorted(named))
 
 
-def _names_effect(scene: Any, file: Path) -> bool:
+def _names_effect(scene: Any, effect_file: Path) -> bool:
     """Whether the scene's system tables contain the key that names the effect in this file."""
-    return _is_in_own_tables(file) and module_of(scene.system, file.stem).named(scene)
+    return _is_in_own_tables(effect_file) and module_of(scene.system, effect_file.stem).named(scene)
 
 
 def absent_effects(scene: Any) -> tuple[str, ...]:
@@ -207,14 +211,14 @@ def tables_of(scene: Any) -> Mapping[str, Any]:
 
 
 @cache
-def _is_in_own_tables(file: Path) -> bool:
+def _is_in_own_tables(effect_file: Path) -> bool:
     """Whether the system's own tables have a key for the effect, according to the text of the effect's file."""
-    return re.search(r"^def named\(", file.read_text(), re.MULTILINE) is not None
+    return re.search(r"^def named\(", effect_file.read_text(), re.MULTILINE) is not None
 
 
-def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
+def read_tables(effect_tables: Mapping[str, Any], system_name: str, scene_path: str) -> Table:
     """Checked parameters of all tables [effects.NAME]; InputError for an effect that is unknown or has another key."""
-    return {name: _read(name, values, system, file) for name, values in tables.items()}
+    return {name: _read(name, values, system_name, scene_path) for name, values in effect_tables.items()}
 
 
 def with_effect_tables(scene: Any) -> Any:
@@ -233,31 +237,35 @@ def extended_by_effects(system_object: Any, scene: Any) -> Any:
     return system_object
 
 
-def _extend(name: str, module: Any, system_object: Any, table: Any) -> Any:
+def _extend(effect_name: str, effect_module: Any, system_object: Any, effect_table: Any) -> Any:
     """The system's object, extended by one effect; InputError if the effect's ``extend`` fails or returns nothing."""
     try:
-        result = module.extend(system_object, table)
+        result = effect_module.extend(system_object, effect_table)
     except (InputError, RunFailed):
         raise
     except Exception as error:
         lines = [
-            frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == module.__file__
+            frame.lineno
+            for frame in traceback.extract_tb(error.__traceback__)
+            if frame.filename == effect_module.__file__
         ]
         allowed = f"line {lines[-1]} stops with {type(error).__name__}: {error}"
-        raise InputError(f"{name}.py", "extend", None, allowed) from error
+        raise InputError(f"{effect_name}.py", "extend", None, allowed) from error
     if result is None:
-        raise InputError(f"{name}.py", "extend", None, "returns nothing: it must give back what it gets, changed")
+        raise InputError(
+            f"{effect_name}.py", "extend", None, "returns nothing: it must give back what it gets, changed"
+        )
     return result
 
 
-def _read(name: str, values: Any, system: str, file: str) -> Any:
+def _read(effect_name: str, table_values: Any, system_name: str, scene_path: str) -> Any:
     """Checked parameters of one table [effects.NAME]; raises InputError for an unknown effect."""
-    if name not in names_of(system):
-        raise InputError(file, f"effects.{name}", None, "no such effect", names_of(system))
-    module = module_of(system, name)
+    if effect_name not in names_of(system_name):
+        raise InputError(scene_path, f"effects.{effect_name}", None, "no such effect", names_of(system_name))
+    module = module_of(system_name, effect_name)
     if not hasattr(module, "Parameters"):
-        raise InputError(file, f"effects.{name}", None, f"has another place in a scene: {module.PLACE}")
-    return read(module.Parameters, values, file, f"effects.{name}")
+        raise InputError(scene_path, f"effects.{effect_name}", None, f"has another place in a scene: {module.PLACE}")
+    return read(module.Parameters, table_values, scene_path, f"effects.{effect_name}")
 
 
 def check(scene: Any) -> None:
@@ -291,21 +299,25 @@ def check_combination(present_effects: Iterable[str], scene: Any) -> None:
                 )
 
 
-def _what_to_drop(scene: Any, name: str, present_effects: tuple[str, ...]) -> str:
-    """Phrase that names the effects that cannot stand beside the effect ``name``; empty if there are none."""
-    clash = [other_effect for other_effect in module_of(scene.system, name).EXCLUDES if other_effect in present_effects]
+def _what_to_drop(scene: Any, effect_name: str, present_effects: tuple[str, ...]) -> str:
+    """Phrase that names the effects that cannot stand beside the effect ``effect_name``; empty if there are none."""
+    clash = [
+        other_effect
+        for other_effect in module_of(scene.system, effect_name).EXCLUDES
+        if other_effect in present_effects
+    ]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
-def _key_of_effect(module: Any, name: str) -> str:
+def _key_of_effect(effect_module: Any, effect_name: str) -> str:
     """Key in the scene that names an effect, such as "effects.road"."""
-    return str(module.PLACE) if hasattr(module, "named") else f"effects.{name}"
+    return str(effect_module.PLACE) if hasattr(effect_module, "named") else f"effects.{effect_name}"
 
 
-def _table_of_effect(scene: Any, name: str) -> str:
+def _table_of_effect(scene: Any, effect_name: str) -> str:
     """Phrase on the scene key that names an effect, if this is not the effect's own name; else empty."""
-    key = _key_of_effect(module_of(scene.system, name), name).removeprefix("effects.")
-    return "" if key == name else f"; {name!r} is named by {key}"
+    key = _key_of_effect(module_of(scene.system, effect_name), effect_name).removeprefix("effects.")
+    return "" if key == effect_name else f"; {effect_name!r} is named by {key}"
 
 
 def table_without_defaults(scene: Any) -> Table:
@@ -314,32 +326,34 @@ def table_without_defaults(scene: Any) -> Table:
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
 
-def scene_without(scene: Any, *left_out: str) -> Any:
+def scene_without(scene: Any, *left_out_effects: str) -> Any:
     """The scene without the given effects; InputError if an effect cannot be left out or another one needs it."""
     table = table_without_defaults(scene)
-    for name in sorted(left_out, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
+    for name in sorted(left_out_effects, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
             del table["effects"][name]
         else:
             module_of(scene.system, name).leave_out(table, scene)
-    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out, False)
-    needy = [name for name in named_effects(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
-    gone = [name for name in needy if name not in (*left_out, *named_effects(smaller))]
+    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out_effects, False)
+    needy = [name for name in named_effects(scene) if set(left_out_effects) & {*module_of(scene.system, name).NEEDS}]
+    gone = [name for name in needy if name not in (*left_out_effects, *named_effects(smaller))]
     if gone:
         need = "it needs" if len(gone) == 1 else "they need"
         raise InputError(
             scene.file,
             "",
             None,
-            f"{' and '.join(left_out)} cannot be left out alone: leave out {' and '.join(gone)}, too, for {need} it",
+            f"{' and '.join(left_out_effects)} cannot be left out alone: leave out {' and '.join(gone)}, too, "
+            f"for {need} it",
         )
     return smaller
 
 
-def _dependency_depth(name: str, system: str) -> int:
-    """Length of the longest chain of needed effects from ``name`` on; the longest chains are removed first."""
+def _dependency_depth(effect_name: str, system_name: str) -> int:
+    """Length of the longest chain of needed effects from ``effect_name`` on; the longest chains are removed first."""
     return 1 + max(
-        (_dependency_depth(other_effect, system) for other_effect in module_of(system, name).NEEDS), default=0
+        (_dependency_depth(other_effect, system_name) for other_effect in module_of(system_name, effect_name).NEEDS),
+        default=0,
     )
 
 
@@ -352,10 +366,10 @@ def with_effects(scene: Any, *added_effects: str) -> Any:
     return _confirmed_scene(rebuilt_scene(table, scene), added_effects, True)
 
 
-def _confirmed_scene(scene: Any, effects: Iterable[str], must_be_named: bool) -> Any:
+def _confirmed_scene(scene: Any, effect_names: Iterable[str], must_be_named: bool) -> Any:
     """The scene, after a check that it names all these effects (``must_be_named``), or none of them."""
     named = named_effects(scene)
-    for name in effects:
+    for name in effect_names:
         if (name in named) is not must_be_named:
             refusal = (
                 "cannot be in this scene: nothing of it takes part" if must_be_named else "is still there: leave it in"
@@ -366,33 +380,33 @@ def _confirmed_scene(scene: Any, effects: Iterable[str], must_be_named: bool) ->
     return scene
 
 
-def _put_in(table: Table, name: str, scene: Any) -> None:
+def _put_in(scene_table: Table, effect_name: str, scene: Any) -> None:
     """Add an effect with its usual values to the nested tables of a scene; raises InputError if it has none."""
-    module = module_of(scene.system, name)
+    module = module_of(scene.system, effect_name)
     if "file" in getattr(module, "EXAMPLE", ()):
-        raise InputError(scene.file, f"effects.{name}.file", None, "has no usual value: name a file of yours")
+        raise InputError(scene.file, f"effects.{effect_name}.file", None, "has no usual value: name a file of yours")
     if hasattr(module, "EXAMPLE"):
-        table.setdefault("effects", {})[name] = deepcopy(module.EXAMPLE)
+        scene_table.setdefault("effects", {})[effect_name] = deepcopy(module.EXAMPLE)
     elif hasattr(module, "put_in"):
-        module.put_in(table, scene)
+        module.put_in(scene_table, scene)
     else:
         raise InputError(
-            scene.file, _key_of_effect(module, name), None, "there are no usual values: name it in the scene"
+            scene.file, _key_of_effect(module, effect_name), None, "there are no usual values: name it in the scene"
         )
 
 
-def rebuilt_scene(table: Table, scene: Any) -> Any:
+def rebuilt_scene(scene_table: Table, scene: Any) -> Any:
     """The scene made from an edited table, after all checks."""
-    changed_scene = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
+    changed_scene = import_module(SYSTEMS[scene.system].scene).build(scene_table, scene.file, Path(scene.folder))
     check(changed_scene)
     return changed_scene
 
 
-def effect_lines(scene: Any, width: int = 10) -> list[str]:
+def effect_lines(scene: Any, line_width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: one per effect of the scene with its cost, and one that lists all absent effects."""
     cost_by_effect = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
-    effect_lines_of_scene = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in cost_by_effect.items()]
+    effect_lines_of_scene = [f"  {'effect':<{line_width}} {name}: {cost}" for name, cost in cost_by_effect.items()]
     return [
         *effect_lines_of_scene,
-        f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)",
+        f"  {'absent':<{line_width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)",
     ]

@@ -42,7 +42,7 @@ class Signal(Protocol):
         """Longest step (s) with which an adaptive solver does not miss a feature of the signal."""
         ...
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values at start_time + i step, shape (sample_count, channels)."""
         ...
 
@@ -89,9 +89,9 @@ class Sampled:
             return self.values[None]
         return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values at start_time + i step, shape (sample_count, channels)."""
-        index, fractions = _sample_and_fraction(start_time, step, sample_count, self.period, len(self.values))
+        index, fractions = _sample_and_fraction(start_time, time_step, sample_count, self.period, len(self.values))
         if self.held:
             return self.values[index]
         from models.core.piecewise import interpolate
@@ -119,14 +119,14 @@ class Sampled:
 
 @lru_cache(maxsize=2)
 def _sample_and_fraction(
-    start_time: float, step: float, sample_count: int, period: float, samples: int
+    start_time: float, time_step: float, sample_count: int, sampling_period: float, signal_length: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Index (sample_count,) of the sample at or before each time start_time + i step, and the fraction of a period
     after that sample. Cached, since all paths of an ensemble use the same times."""
-    position = (start_time + step * np.arange(sample_count)) / period
+    position = (start_time + time_step * np.arange(sample_count)) / sampling_period
     nearest = np.rint(position)
     snapped = np.where(np.abs(position - nearest) < SNAP_SHARE, nearest, position)
-    index = np.clip(np.floor(snapped), 0, samples - 1).astype(np.int64)
+    index = np.clip(np.floor(snapped), 0, signal_length - 1).astype(np.int64)
     fractions = snapped - index
     index.flags.writeable = fractions.flags.writeable = False
     return index, fractions
@@ -176,11 +176,11 @@ class Smooth:
         first, in the time since the period's first sample."""
         return self._pieces
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values and derivatives at start_time + i step, shape (sample_count, channels)."""
         from models.core.piecewise import evaluate
 
-        return evaluate(self._pieces, self.period, start_time, step, sample_count, self.derivatives)
+        return evaluate(self._pieces, self.period, start_time, time_step, sample_count, self.derivatives)
 
     def at(self, time: float) -> np.ndarray:
         """Values and derivatives at one time (s), shape (channels,)."""
@@ -191,7 +191,7 @@ class Smooth:
         return np.empty(0)
 
 
-def signal_from_samples(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
+def signal_from_samples(samples: np.ndarray, sampling_period: float, interpolation: Interpolation) -> Sampled | Smooth:
     """Signal from uniform samples, shape (n, channels), with the interpolation that a scene names: held, linear or
     smooth.
 
@@ -201,13 +201,13 @@ def signal_from_samples(values: np.ndarray, period: float, interpolation: Interp
     least = 4 if interpolation == "smooth" else 1
     if interpolation not in get_args(Interpolation):
         raise InputError("", "interpolation", interpolation, "is not known", get_args(Interpolation))
-    if not 0.0 < period < math.inf:
-        raise InputError("", "period", period, "must be above 0, in s")
-    if len(values) < least:
-        raise InputError("", "samples", len(values), f"{least} or more are needed for {interpolation!r}")
+    if not 0.0 < sampling_period < math.inf:
+        raise InputError("", "period", sampling_period, "must be above 0, in s")
+    if len(samples) < least:
+        raise InputError("", "samples", len(samples), f"{least} or more are needed for {interpolation!r}")
     if interpolation == "smooth":
-        return Smooth(values, period)
-    return Sampled(values, period, held=interpolation == "held")
+        return Smooth(samples, sampling_period)
+    return Sampled(samples, sampling_period, held=interpolation == "held")
 
 
 @dataclass(frozen=True)
@@ -236,9 +236,9 @@ class Stacked:
         """The shortest resolution (s) among the combined signals."""
         return min(signal.resolution for signal in self.parts)
 
-    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+    def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values of all combined signals at start_time + i step, shape (sample_count, channels)."""
-        return np.hstack([signal.sample(start_time, step, sample_count) for signal in self.parts])
+        return np.hstack([signal.sample(start_time, time_step, sample_count) for signal in self.parts])
 
     def at(self, time: float) -> np.ndarray:
         """Values of all combined signals at one time (s), shape (channels,)."""

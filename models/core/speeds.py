@@ -20,15 +20,17 @@ class Speeds(Strict):
         return np.array(self.values) if self.values else np.linspace(self.start, self.stop, self.count)  # type: ignore[arg-type]
 
 
-def check_speeds(file: str, speeds: Speeds) -> None:
+def check_speeds(scene_path: str, speeds: Speeds) -> None:
     """Raise InputError for a speed of 0, half a range, or a range beside a list."""
     for i, value in enumerate(speeds.values):
         if not (np.isfinite(value) and value > 0.0):
-            raise InputError(file, f"speeds.values.{i}", value, "must be above 0, in m/s: at standstill nothing moves")
+            raise InputError(
+                scene_path, f"speeds.values.{i}", value, "must be above 0, in m/s: at standstill nothing moves"
+            )
     for name in ("start", "stop", "count"):
         if speeds.values and name in speeds.model_fields_set:
             allowed = "is not read beside a list of speeds: drop one of them"
-            raise InputError(file, f"speeds.{name}", getattr(speeds, name), allowed)
+            raise InputError(scene_path, f"speeds.{name}", getattr(speeds, name), allowed)
     for name in ("start", "stop"):
         if not speeds.values and getattr(speeds, name) is None:
-            raise InputError(file, f"speeds.{name}", None, "is missing (m/s)")
+            raise InputError(scene_path, f"speeds.{name}", None, "is missing (m/s)")

@@ -46,24 +46,24 @@ def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False,
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def read(table_class: type[Model], values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
+def read(table_class: type[Model], table_values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
     """Build ``table_class`` from a user's table; raises InputError that names file, place, value and what is allowed.
 
     Of several errors the first is told in full, an unknown key before all others, and the rest are named.
     """
-    if not isinstance(values, Mapping):
-        raise InputError(file, key_path, values, ERROR_SENTENCES["dict_type"])
+    if not isinstance(table_values, Mapping):
+        raise InputError(file, key_path, table_values, ERROR_SENTENCES["dict_type"])
     try:
-        return table_class.model_validate(dict(values))
+        return table_class.model_validate(dict(table_values))
     except ValidationError as error:
         raise input_error_from_faults(error, table_class, file, key_path) from None
 
 
 def input_error_from_faults(
-    error: ValidationError, table_class: type[BaseModel], file: object, key_path: str
+    validation_error: ValidationError, table_class: type[BaseModel], file: object, key_path: str
 ) -> InputError:
     """One InputError from all faults that pydantic listed for a user's table."""
-    first, *other_faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    first, *other_faults = sorted(validation_error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys_of_error(first)
     value = None if first["type"] == "missing" else first["input"]
     allowed = _allowed_phrase(first, keys, _owning_model(table_class, keys))
@@ -78,40 +78,40 @@ def input_error_from_faults(
     return InputError(file, _dotted_key(key_path, keys), value, allowed + further_text)
 
 
-def _keys_of_error(fault: Any) -> tuple[str, ...]:
+def _keys_of_error(pydantic_fault: Any) -> tuple[str, ...]:
     """Nested keys of the value that an error of pydantic concerns."""
-    return tuple(str(key) for key in fault["loc"])
+    return tuple(str(key) for key in pydantic_fault["loc"])
 
 
-def _dotted_key(key_path: str, keys: tuple[str, ...]) -> str:
+def _dotted_key(key_path: str, nested_keys: tuple[str, ...]) -> str:
     """Nested keys joined with dots, below ``key_path``."""
-    return ".".join((*((key_path,) if key_path else ()), *keys))
+    return ".".join((*((key_path,) if key_path else ()), *nested_keys))
 
 
-def _owning_model(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
+def _owning_model(table_class: type[BaseModel], nested_keys: tuple[str, ...]) -> type[BaseModel] | None:
     """The model class of the table that holds the last key; None if no class of the project describes it."""
-    parents = iter(keys[:-1])
+    parents = iter(nested_keys[:-1])
     for key in parents:
-        field = model.model_fields.get(key)
+        field = table_class.model_fields.get(key)
         inner = None if field is None else _inner_model(field.annotation)
         if field is None or inner is None:
             return None
         if get_origin(field.annotation) in (dict, list):
             next(parents, None)  # a name that the user chose, or a place in a list
-        model = inner
-    return model
+        table_class = inner
+    return table_class
 
 
-def _inner_model(annotation: Any) -> type[BaseModel] | None:
+def _inner_model(type_annotation: Any) -> type[BaseModel] | None:
     """The model class in a type annotation, also within a list, dict or union; None if there is none."""
-    options = (annotation, *getattr(annotation, "__args__", ()))
+    options = (type_annotation, *getattr(type_annotation, "__args__", ()))
     return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _allowed_phrase(first_fault: Any, keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
+def _allowed_phrase(first_fault: Any, nested_keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
     """Phrase that says which keys or values would have been accepted."""
     fields = {} if owning_model is None else owning_model.model_fields
-    key = keys[-1] if keys else ""
+    key = nested_keys[-1] if nested_keys else ""
     kind, facts = first_fault["type"], _unit_and_meaning(fields.get(key))
     if kind == "extra_forbidden":
         known = tuple(name for name, field in fields.items() if not field.exclude)
@@ -150,11 +150,11 @@ ERROR_SENTENCES = {
 """Phrases on what is allowed, by the kind of error that pydantic reports."""
 
 
-def _unit_and_meaning(field: FieldInfo | None) -> str:
+def _unit_and_meaning(table_field: FieldInfo | None) -> str:
     """Meaning and unit of a scene key, as text in brackets; empty if there are none."""
-    if field is None:
+    if table_field is None:
         return ""
-    extra = field.json_schema_extra
+    extra = table_field.json_schema_extra
     unit = f"in {extra['unit']}" if isinstance(extra, dict) and extra.get("unit") else ""
-    description = ", ".join(phrase for phrase in (field.description or "", unit) if phrase)
+    description = ", ".join(phrase for phrase in (table_field.description or "", unit) if phrase)
     return f" ({description})" if description else ""

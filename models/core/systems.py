@@ -59,11 +59,12 @@ class System:
         return engines
 
 
-def systems_in_folder(folder: Path, package: str) -> dict[str, System]:
-    """Systems by their names: all subpackages of ``folder`` (of the package ``package``) that have scenes."""
-    system_folders = sorted(path.parent for path in folder.glob("*/scene.py"))
+def systems_in_folder(systems_folder: Path, package_name: str) -> dict[str, System]:
+    """Systems by their names: all subpackages of ``systems_folder`` (of the package ``package_name``) that have
+    scenes."""
+    system_folders = sorted(path.parent for path in systems_folder.glob("*/scene.py"))
     systems = {
-        system_folder.name.replace("_", "-"): System(f"{package}.{system_folder.name}", system_folder)
+        system_folder.name.replace("_", "-"): System(f"{package_name}.{system_folder.name}", system_folder)
         for system_folder in system_folders
     }
     return dict(sorted(systems.items(), key=lambda entry: entry[0] != DEFAULT_SYSTEM))
@@ -73,25 +74,27 @@ SYSTEMS = systems_in_folder(Path(__file__).parents[1] / "systems", "models.syste
 """All systems of this project, by their names in scenes."""
 
 
-def modules_of(package: str) -> dict[str, str]:
+def modules_of(package_name: str) -> dict[str, str]:
     """Full names of the modules in a package, by system name, without importing them."""
-    names = [module.name for module in iter_modules(import_module(package).__path__)]
-    return {name.replace("_", "-"): f"{package}.{name}" for name in names}
+    names = [module.name for module in iter_modules(import_module(package_name).__path__)]
+    return {name.replace("_", "-"): f"{package_name}.{name}" for name in names}
 
 
-def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] = SYSTEMS) -> Any:
+def load(scene_path: Path, changes: Iterable[str] = (), known_systems: Mapping[str, System] = SYSTEMS) -> Any:
     """The scene in a file of any system, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
     from models.core.scene_file import changed_tables
 
     changes = list(changes)
-    file = path.name + (" with --set" if changes else "")
-    return of_table(changed_tables(path, changes), file, path.parent, systems)
+    file = scene_path.name + (" with --set" if changes else "")
+    return of_table(changed_tables(scene_path, changes), file, scene_path.parent, known_systems)
 
 
-def of_table(table: Mapping[str, Any], file: str, folder: Path, systems: Mapping[str, System] = SYSTEMS) -> Any:
-    """The checked scene of any system, built from nested tables. ``file`` is named in messages; ``folder`` holds the
-    files that the scene names."""
-    name = table.get("system", DEFAULT_SYSTEM)
-    if not isinstance(name, str) or name not in systems:
-        raise InputError(file, "system", name, "no such system", tuple(systems))
-    return import_module(systems[name].scene).build(table, file, folder)
+def of_table(
+    scene_table: Mapping[str, Any], scene_path: str, scene_folder: Path, known_systems: Mapping[str, System] = SYSTEMS
+) -> Any:
+    """The checked scene of any system, built from nested tables. ``scene_path`` is named in messages; ``scene_folder``
+    holds the files that the scene names."""
+    name = scene_table.get("system", DEFAULT_SYSTEM)
+    if not isinstance(name, str) or name not in known_systems:
+        raise InputError(scene_path, "system", name, "no such system", tuple(known_systems))
+    return import_module(known_systems[name].scene).build(scene_table, scene_path, scene_folder)

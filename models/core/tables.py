@@ -73,18 +73,23 @@ _HEADING_PATTERN = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 
 
 def read_table(
-    path: str | Path, columns: ColumnUnits, *, increasing: str | None = None, least_rows: int = 1, gaps: bool = False
+    table_path: str | Path,
+    column_units: ColumnUnits,
+    *,
+    increasing_column: str | None = None,
+    least_row_count: int = 1,
+    columns_with_gaps: bool = False,
 ) -> dict[str, np.ndarray]:
     """Read a CSV table whose header names the unit of every column.
 
     Parameters
     ----------
-    path : the file
-    columns : name of each wanted column -> its accepted units, each with its factor to SI, for example
+    table_path : the file
+    column_units : name of each wanted column -> its accepted units, each with its factor to SI, for example
         ``{"time": SECONDS, "front": NEWTONS}``; the file has these columns and no others
-    increasing : column whose values must rise from every row to the next one (time, arc length)
-    least_rows : smallest accepted number of rows
-    gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
+    increasing_column : column whose values must rise from every row to the next one (time, arc length)
+    least_row_count : smallest accepted number of rows
+    columns_with_gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
 
     Returns
     -------
@@ -94,83 +99,86 @@ def read_table(
     ------
     InputError : naming file, line (counted from 1), column, value, what is allowed and the nearest match
     """
-    text = whole_text(path)
-    if not _is_plain(text, columns):
+    text = whole_text(table_path)
+    if not _is_plain(text, column_units):
         from models.core.csv_header import plain_text
 
-        text = plain_text(path, text, tuple(columns))
-    header, rows = _header_and_rows(path, text)
-    names, factors = columns_and_factors(path, header, columns)
-    raw = _all_cells(path, text, tuple(gaps and name != increasing for name in names))
-    if len(rows) < least_rows:
-        raise InputError(path, "rows", len(rows), f"at least {least_rows} rows of numbers are needed")
+        text = plain_text(table_path, text, tuple(column_units))
+    header, rows = _header_and_rows(table_path, text)
+    names, factors = columns_and_factors(table_path, header, column_units)
+    raw = _all_cells(table_path, text, tuple(columns_with_gaps and name != increasing_column for name in names))
+    if len(rows) < least_row_count:
+        raise InputError(table_path, "rows", len(rows), f"at least {least_row_count} rows of numbers are needed")
     table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
-    if increasing is not None:
-        _check_increasing(path, rows, increasing, raw[:, names.index(increasing)])
-    return {name: table[name] for name in columns}
+    if increasing_column is not None:
+        _check_increasing(table_path, rows, increasing_column, raw[:, names.index(increasing_column)])
+    return {name: table[name] for name in column_units}
 
 
-def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]]) -> None:
+def write_table(table_path: str | Path, column_units: Mapping[str, tuple[str, np.ndarray]]) -> None:
     """Write columns name -> (unit, values) with all digits, so that reading returns identical numbers."""
-    names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
+    names = [f"{name} [{unit}]" for name, (unit, _) in column_units.items()]
     line = ",".join(["%.17g"] * len(names)) + "\n"
-    rows = zip(*(np.asarray(values).tolist() for _, values in columns.values()), strict=True)
-    write_whole(Path(path), ",".join(names) + "\n" + "".join([line % row for row in rows]))
+    rows = zip(*(np.asarray(values).tolist() for _, values in column_units.values()), strict=True)
+    write_whole(Path(table_path), ",".join(names) + "\n" + "".join([line % row for row in rows]))
 
 
-def whole_text(path: str | Path) -> str:
+def whole_text(table_path: str | Path) -> str:
     """Whole text of a file; raises InputError if the file cannot be read."""
     try:
-        data = Path(path).read_bytes()
+        data = Path(table_path).read_bytes()
         return data.decode("utf-16" if data.startswith(UTF_16) else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
+        raise InputError(table_path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
     except OSError as error:
-        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+        raise InputError(table_path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _is_plain(text: str, columns: ColumnUnits) -> bool:
+def _is_plain(table_text: str, column_units: ColumnUnits) -> bool:
     """Whether the first line of a text has known headings with units, separated by commas, and no cell is quoted."""
     first = next(
-        (line for line in text[:HEADING_CHARACTERS].split("\n") if line.strip() and not line.startswith("#")), ""
+        (line for line in table_text[:HEADING_CHARACTERS].split("\n") if line.strip() and not line.startswith("#")), ""
     )
     names = [cell.partition("[")[0].strip() for cell in first.split(",")]
-    strange = '"' in text or ";" in first or "\t" in first or "[" not in first or names[-1] == ""
-    return not strange and any(name in columns for name in names)
+    strange = '"' in table_text or ";" in first or "\t" in first or "[" not in first or names[-1] == ""
+    return not strange and any(name in column_units for name in names)
 
 
 @lru_cache(CACHED_TEXTS)
-def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], NumberedLines]:
+def _header_and_rows(table_path: str | Path, table_text: str) -> tuple[tuple[int, str], NumberedLines]:
     """Header line and rows of numbers, each with its line number, without comments and empty lines."""
-    lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
+    lines = [(i, line.strip()) for i, line in enumerate(table_text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
-        raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
-    if not text.endswith("\n") and _last_line_is_cut_off([line for _, line in used]):
+        raise InputError(table_path, "", None, "the file is empty: a header line and rows of numbers are needed")
+    if not table_text.endswith("\n") and _last_line_is_cut_off([line for _, line in used]):
         line_text = f"line {len(lines)}"
         raise InputError(
-            path, line_text, lines[-1][1], "the last line has no line end and was cut off: add one, or delete the line"
+            table_path,
+            line_text,
+            lines[-1][1],
+            "the last line has no line end and was cut off: add one, or delete the line",
         )
     return used[0], used[1:]
 
 
-def has_line_end(path: str | Path) -> bool:
+def has_line_end(table_path: str | Path) -> bool:
     """Whether the last line of a file has a line end; if not, the last number may lack digits."""
-    with Path(path).open("rb") as file:
+    with Path(table_path).open("rb") as file:
         size = file.seek(0, io.SEEK_END)
         file.seek(max(size - 1, 0))
         return file.read() in (b"\n", b"")
 
 
-def _last_line_is_cut_off(lines: list[str]) -> bool:
+def _last_line_is_cut_off(last_lines: list[str]) -> bool:
     """Whether a last line without a line end is incomplete: a cell or digits are missing, or the value jumps more than
     in the rows before.
 
     A number counts as complete if it has as many digits before the point, after it and in the exponent as every other
     row has at least.
     """
-    *complete_lines, last_line = [line.rpartition(",") for line in lines]
-    if last_line[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(complete_lines) < 3:
+    *complete_lines, last_line = [line.rpartition(",") for line in last_lines]
+    if last_line[0].count(",") != last_lines[0].rpartition(",")[0].count(",") or len(complete_lines) < 3:
         return True
     numbers = [NUMBER_PATTERN.fullmatch(cell.strip()) for _, _, cell in (*complete_lines[1:], last_line)]
     if None in numbers:
@@ -187,92 +195,108 @@ def _last_line_is_cut_off(lines: list[str]) -> bool:
 
 
 def columns_and_factors(
-    path: str | Path, header: tuple[int, str], columns: ColumnUnits
+    table_path: str | Path, header_line: tuple[int, str], column_units: ColumnUnits
 ) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
-    line_text = f"line {header[0]} (header)"
+    line_text = f"line {header_line[0]} (header)"
     names, factors = zip(
-        *(_column_and_factor(path, line_text, cell, columns) for cell in header[1].split(",")), strict=True
+        *(_column_and_factor(table_path, line_text, cell, column_units) for cell in header_line[1].split(",")),
+        strict=True,
     )
     for name in names:
         if names.count(name) > 1:
-            raise InputError(path, line_text, name, "this column appears twice")
-    for name in columns:
+            raise InputError(table_path, line_text, name, "this column appears twice")
+    for name in column_units:
         if name not in names:
             raise InputError(
-                path, line_text, header[1], f"column {name!r} is missing; wanted: {_header_wanted(columns)}"
+                table_path,
+                line_text,
+                header_line[1],
+                f"column {name!r} is missing; wanted: {_header_wanted(column_units)}",
             )
     return list(names), list(factors)
 
 
-def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: ColumnUnits) -> tuple[str, float]:
+def _column_and_factor(
+    table_path: str | Path, line_text: str, cell_text: str, column_units: ColumnUnits
+) -> tuple[str, float]:
     """Name and factor to SI of one column heading, such as ``left [mm]``."""
-    match = _HEADING_PATTERN.fullmatch(cell.strip().strip('"'))
-    name, unit = match.groups() if match else (cell.strip(), None)
-    if name not in columns:
-        allowed = f"this column is not known; wanted, separated by commas: {_header_wanted(columns)}"
-        raise InputError(path, line_text, name, allowed, tuple(columns))
-    units = tuple(columns[name])
+    match = _HEADING_PATTERN.fullmatch(cell_text.strip().strip('"'))
+    name, unit = match.groups() if match else (cell_text.strip(), None)
+    if name not in column_units:
+        allowed = f"this column is not known; wanted, separated by commas: {_header_wanted(column_units)}"
+        raise InputError(table_path, line_text, name, allowed, tuple(column_units))
+    units = tuple(column_units[name])
     if unit is None:
-        raise InputError(path, line_text, cell.strip(), f"the unit is missing: write {name} [{units[0]}]", units)
-    if unit not in columns[name]:
-        raise InputError(path, f"{line_text}, column {name!r}, unit", unit, "this unit is not known here", units)
-    return name, columns[name][unit]
+        raise InputError(
+            table_path, line_text, cell_text.strip(), f"the unit is missing: write {name} [{units[0]}]", units
+        )
+    if unit not in column_units[name]:
+        raise InputError(table_path, f"{line_text}, column {name!r}, unit", unit, "this unit is not known here", units)
+    return name, column_units[name][unit]
 
 
-def _header_wanted(columns: ColumnUnits) -> str:
+def _header_wanted(column_units: ColumnUnits) -> str:
     """Header line that the file should have, with the first accepted unit of each column."""
-    return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
+    return ", ".join(f"{name} [{next(iter(units))}]" for name, units in column_units.items())
 
 
 @lru_cache(CACHED_TEXTS)
-def _all_cells(path: str | Path, text: str, gaps_allowed: tuple[bool, ...]) -> np.ndarray:
+def _all_cells(table_path: str | Path, table_text: str, gaps_allowed: tuple[bool, ...]) -> np.ndarray:
     """All cells of a table as an array (rows, columns), in the units of the file; NaN for gaps in the columns that
     allow gaps."""
-    header, rows = _header_and_rows(path, text)
+    header, rows = _header_and_rows(table_path, table_text)
     headings = header[1].split(",")
     values = np.empty((len(rows), len(headings)))
     for i, (line, row) in enumerate(rows):
-        values[i] = _numbers_of_row(path, line, row, headings, gaps_allowed)
+        values[i] = _numbers_of_row(table_path, line, row, headings, gaps_allowed)
     return values
 
 
 def _numbers_of_row(
-    path: str | Path, line_number: int, row: str, headings: list[str], gaps_allowed: tuple[bool, ...]
+    table_path: str | Path, line_number: int, row_text: str, headings: list[str], gaps_allowed: tuple[bool, ...]
 ) -> list[float]:
     """The numbers of one row of a table; raises InputError that names its line."""
-    cells = row.split(",")
+    cells = row_text.split(",")
     if len(cells) != len(headings):
         raise InputError(
-            path, f"line {line_number}", row.strip(), f"{len(headings)} values are needed, found {len(cells)}"
+            table_path,
+            f"line {line_number}",
+            row_text.strip(),
+            f"{len(headings)} values are needed, found {len(cells)}",
         )
     return [
-        math.nan if gap and cell.strip().lower() in GAP_CELLS else finite_number(path, line_number, title, cell)
+        math.nan if gap and cell.strip().lower() in GAP_CELLS else finite_number(table_path, line_number, title, cell)
         for title, cell, gap in zip(headings, cells, gaps_allowed, strict=True)
     ]
 
 
-def finite_number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
+def finite_number(table_path: str | Path, line_number: int, heading: str, cell_text: str) -> float:
     """The finite number in a cell; raises InputError for other text, also for Python's extensions (1_000, non-Latin
     digits)."""
     try:
-        value = float(cell) if cell.isascii() and "_" not in cell else math.nan
+        value = float(cell_text) if cell_text.isascii() and "_" not in cell_text else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         line_text = f"line {line_number}, column {heading.strip()!r}"
-        raise InputError(path, line_text, cell.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
+        raise InputError(table_path, line_text, cell_text.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
     return value
 
 
-def _check_increasing(path: str | Path, rows: NumberedLines, name: str, values: np.ndarray) -> None:
+def _check_increasing(
+    table_path: str | Path, numbered_lines: NumberedLines, column_name: str, column_values: np.ndarray
+) -> None:
     """Raise InputError at the first row whose value is not greater than the one before."""
-    wrong = np.flatnonzero(np.diff(values) <= 0.0)
+    wrong = np.flatnonzero(np.diff(column_values) <= 0.0)
     if wrong.size:
         i = int(wrong[0]) + 1
-        line_text = f"line {rows[i][0]}, column {name!r}"
+        line_text = f"line {numbered_lines[i][0]}, column {column_name!r}"
         raise InputError(
-            path, line_text, float(values[i]), f"must be greater than {values[i - 1]:g} in the row before it"
+            table_path,
+            line_text,
+            float(column_values[i]),
+            f"must be greater than {column_values[i - 1]:g} in the row before it",
         )
 
 
@@ -289,61 +313,68 @@ class RowBlock:
     faulty_rows: dict[int, str]
 
 
-def table_blocks(path: Path, columns: tuple[ColumnUnits, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:
-    """Blocks of at most ``rows`` rows of a CSV table.
+def table_blocks(
+    table_path: Path, possible_columns: tuple[ColumnUnits, ...], block_rows: int = ROWS_PER_BLOCK
+) -> Iterator[RowBlock]:
+    """Blocks of at most ``block_rows`` rows of a CSV table.
 
-    columns : the accepted sets of columns, of which the header must name one in full, each with its accepted units
-    and their factors to SI. Raises InputError for a file or a header that cannot be used.
-    """
-    with _opened_text(path) as file:
+    possible_columns : the accepted sets of columns, of which the header must name one in full, each with its accepted
+    units and their factors to SI. Raises InputError for a file or a header that cannot be used."""
+    with _opened_text(table_path) as file:
         lines = ((i, line) for i, line in enumerate(file, start=1) if line.strip() and not line.startswith("#"))
         header = next(lines, None)
         if header is None:
-            raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
-        names, factors = columns_and_factors(path, (header[0], header[1].strip()), _nearest_columns(header[1], columns))
-        while block := list(itertools.islice(lines, rows)):
-            yield _row_block(path, block, names, np.array(factors), header[1].split(","))
+            raise InputError(table_path, "", None, "the file is empty: a header line and rows of numbers are needed")
+        names, factors = columns_and_factors(
+            table_path, (header[0], header[1].strip()), _nearest_columns(header[1], possible_columns)
+        )
+        while block := list(itertools.islice(lines, block_rows)):
+            yield _row_block(table_path, block, names, np.array(factors), header[1].split(","))
 
 
-def _opened_text(path: Path) -> TextIO:
+def _opened_text(table_path: Path) -> TextIO:
     """The file opened as text, with a replacement for bytes that are no text; raises InputError if it cannot be
     read."""
     try:
-        return path.open(encoding="utf-8-sig", errors="replace")  # a byte that is no text spoils its row alone
+        return table_path.open(encoding="utf-8-sig", errors="replace")  # a byte that is no text spoils its row alone
     except OSError as error:
-        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+        raise InputError(table_path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _nearest_columns(header: str, columns: tuple[ColumnUnits, ...]) -> ColumnUnits:
+def _nearest_columns(header_text: str, possible_columns: tuple[ColumnUnits, ...]) -> ColumnUnits:
     """The set of columns that has most names in common with a header line."""
-    in_header = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
-    return max(columns, key=lambda wanted: len(in_header & set(wanted)))
+    in_header = {cell.partition("[")[0].strip().strip('"') for cell in header_text.split(",")}
+    return max(possible_columns, key=lambda wanted: len(in_header & set(wanted)))
 
 
 def _row_block(
-    path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, headings: list[str]
+    table_path: Path,
+    numbered_rows: list[tuple[int, str]],
+    column_names: list[str],
+    unit_factors: np.ndarray,
+    headings: list[str],
 ) -> RowBlock:
     """Block of rows in SI units; a row that cannot be read is NaN, with a message."""
-    lines, wrong = [line for line, _ in block], {}
-    values = _rows_at_once(block, len(names))
+    lines, wrong = [line for line, _ in numbered_rows], {}
+    values = _rows_at_once(numbered_rows, len(column_names))
     if values is None:
-        values = np.full((len(block), len(names)), np.nan)
-        for i, (line, text) in enumerate(block):
+        values = np.full((len(numbered_rows), len(column_names)), np.nan)
+        for i, (line, text) in enumerate(numbered_rows):
             try:
-                values[i] = _numbers_of_row(path, line, text, headings, (False,) * len(headings))
+                values[i] = _numbers_of_row(table_path, line, text, headings, (False,) * len(headings))
             except InputError as error:
                 wrong[i] = str(error).partition(f"line {line}")[2].lstrip(":, ")
-    values = values * factors
-    return RowBlock(lines, {name: values[:, j] for j, name in enumerate(names)}, wrong)
+    values = values * unit_factors
+    return RowBlock(lines, {name: values[:, j] for j, name in enumerate(column_names)}, wrong)
 
 
-def _rows_at_once(block: list[tuple[int, str]], width: int) -> np.ndarray | None:
+def _rows_at_once(numbered_rows: list[tuple[int, str]], column_count: int) -> np.ndarray | None:
     """All rows of a block parsed in one call, shape (rows, columns); None if some row must be parsed by itself."""
-    rows = [text for _, text in block]
+    rows = [text for _, text in numbered_rows]
     if not (all(map(str.isascii, rows)) and rows[-1].endswith("\n")) or any("_" in text for text in rows):
         return None
     try:
         values = np.loadtxt(rows, delimiter=",", comments=None, ndmin=2)
     except ValueError:
         return None
-    return values if values.shape == (len(block), width) and np.isfinite(values).all() else None
+    return values if values.shape == (len(numbered_rows), column_count) and np.isfinite(values).all() else None

@@ -20,42 +20,48 @@ times do not show."""
 
 
 def read_time_series(
-    path: str | Path, columns: Mapping[str, Mapping[str, float]], *, gaps: bool = False
+    csv_path: str | Path, column_units: Mapping[str, Mapping[str, float]], *, gaps_allowed: bool = False
 ) -> tuple[np.ndarray, float]:
     """Values (n, columns) in SI and the sampling period (s) of a CSV file with a column ``time``.
 
     The first sample must lie at t = 0 and the period must be constant to 1e-6 of itself: a clock that
-    jitters has to be repaired by someone who knows why. Where ``gaps`` are allowed, an empty cell or ``nan`` is NaN.
-    """
-    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least_rows=8, gaps=gaps)
+    jitters has to be repaired by someone who knows why. Where ``gaps_allowed`` are allowed, an empty cell or ``nan`` is
+    NaN."""
+    table = read_table(
+        csv_path,
+        {"time": SECONDS, **column_units},
+        increasing_column="time",
+        least_row_count=8,
+        columns_with_gaps=gaps_allowed,
+    )
     time = table["time"]
     period = (time[-1] - time[0]) / (len(time) - 1)
     if abs(time[0]) > 1e-6 * period:
-        raise InputError(path, "first row, column 'time'", float(time[0]), "the first sample must lie at time 0")
-    _check_even(path, time, period)
-    for name in columns:
-        _check_marks(path, name, table[name], time)
-    return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
+        raise InputError(csv_path, "first row, column 'time'", float(time[0]), "the first sample must lie at time 0")
+    _check_even(csv_path, time, period)
+    for name in column_units:
+        _check_marks(csv_path, name, table[name], time)
+    return np.column_stack([table[name] for name in column_units]), float(f"{period:.12g}")
 
 
-def wrong_time_unit_hint(duration: float, needed_duration: float) -> str:
+def wrong_time_unit_hint(file_duration: float, needed_duration: float) -> str:
     """Hint that a file's times may be in seconds, not in milliseconds as their heading says, if the file lasts (s) less
     than a hundredth of the needed time (s); else empty."""
-    wrong = duration < needed_duration / SHORT_TIME_SHARE
+    wrong = file_duration < needed_duration / SHORT_TIME_SHARE
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
 def sparse_record_warning(
-    sample_count: int, period: float, needed_duration: float, needed_period: float = WHEEL_SAMPLE_TIME
+    sample_count: int, sampling_period: float, needed_duration: float, needed_period: float = WHEEL_SAMPLE_TIME
 ) -> str:
-    """Warning that nearly all of ``sample_count`` samples, ``period`` (s) apart, lie beyond the needed time (s), and
-    are too far apart to resolve the motion (``needed_period``, s): their times may be in another unit. "" otherwise.
-    """
-    lasts = period * (sample_count - 1)
-    if sample_count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed_duration or period < needed_period:
+    """Warning that nearly all of ``sample_count`` samples, ``sampling_period`` (s) apart, lie beyond the needed time
+    (s), and are too far apart to resolve the motion (``needed_period``, s): their times may be in another unit. ""
+    otherwise."""
+    lasts = sampling_period * (sample_count - 1)
+    if sample_count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed_duration or sampling_period < needed_period:
         return ""
     return (
-        f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, "
+        f"The samples lie {sampling_period:.4g} s apart and last for {lasts:.4g} s, "
         f"of which the run takes {needed_duration:.4g} s; "
         f"{'a wheel' if needed_period == WHEEL_SAMPLE_TIME else 'a chassis'} moves with up to "
         f"{0.5 / needed_period:g} Hz. If their times are in "
@@ -63,38 +69,40 @@ def sparse_record_warning(
     )
 
 
-def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:
+def _check_marks(csv_path: str | Path, column_name: str, column_values: np.ndarray, times: np.ndarray) -> None:
     """Raise InputError for the special numbers that some exporters write for missing values."""
-    marks = np.flatnonzero(np.abs(values) > MISSING_VALUE_MARK)
+    marks = np.flatnonzero(np.abs(column_values) > MISSING_VALUE_MARK)
     if len(marks):
         raise InputError(
-            path,
-            f"column {name!r} at {time[marks[0]]:g} s",
-            float(values[marks[0]]),
+            csv_path,
+            f"column {column_name!r} at {times[marks[0]]:g} s",
+            float(column_values[marks[0]]),
             "is an exporter's "
-            f"mark for no value ({len(marks)} of {len(values)} samples are): mend the file, or leave "
+            f"mark for no value ({len(marks)} of {len(column_values)} samples are): mend the file, or leave "
             "such times out",
         )
 
 
-def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
+def _check_even(csv_path: str | Path, times: np.ndarray, sampling_period: float) -> None:
     """Raise InputError for times with jitter or missing samples, at the first row where this shows."""
-    slack = 1e-6 * period + 1e-12 * time[-1]
-    if np.abs(time - period * np.arange(len(time))).max() <= slack:
+    slack = 1e-6 * sampling_period + 1e-12 * times[-1]
+    if np.abs(times - sampling_period * np.arange(len(times))).max() <= slack:
         return
-    usual = float(np.median(np.diff(time)))  # one gap moves the mean period, and with it every row
-    row = 1 + int(np.argmax(np.abs(np.diff(time) - usual) > slack))
+    usual = float(np.median(np.diff(times)))  # one gap moves the mean period, and with it every row
+    row = 1 + int(np.argmax(np.abs(np.diff(times) - usual) > slack))
     raise InputError(
-        path,
+        csv_path,
         f"row {row + 1} of the numbers, column 'time' (s)",
-        float(f"{time[row]:.12g}"),
-        f"the samples must be equally spaced: {time[row - 1] + usual:.9g} is expected here, {usual:.9g} "
+        float(f"{times[row]:.12g}"),
+        f"the samples must be equally spaced: {times[row - 1] + usual:.9g} is expected here, {usual:.9g} "
         "after the row before it",
     )
 
 
-def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:
+def write_time_series(
+    csv_path: str | Path, column_units: Mapping[str, tuple[str, np.ndarray]], sampling_period: float
+) -> None:
     """Write a CSV file of columns name -> (unit, values), shape (n,) each, with a column of times at the sampling
-    ``period`` (s)."""
-    count = len(next(iter(columns.values()))[1])
-    write_table(path, {"time": ("s", period * np.arange(count)), **columns})
+    ``sampling_period`` (s)."""
+    count = len(next(iter(column_units.values()))[1])
+    write_table(csv_path, {"time": ("s", sampling_period * np.arange(count)), **column_units})

@@ -16,20 +16,23 @@ Results = Mapping[str, Result]
 """Results of one command by what distinguishes them, such as the engine."""
 
 
-def message_lines(results: Results) -> list[str]:
+def message_lines(results_by_name: Results) -> list[str]:
     """Printed lines on results: errors first, then broken assumptions, each listed once with the results that broke
     it."""
-    return [*_error_lines(results), *(f"  {names}: {breach.line()}" for names, breach in worst_breaches(results))]
+    return [
+        *_error_lines(results_by_name),
+        *(f"  {names}: {breach.line()}" for names, breach in worst_breaches(results_by_name)),
+    ]
 
 
-def _error_lines(results: Results) -> list[str]:
+def _error_lines(results_by_name: Results) -> list[str]:
     """Printed lines on the errors of results: one by one for few results, else the largest error, the names of
     the results with a warning, and the lines of those without an estimate."""
-    if len(results) <= LISTED_RESULTS:
-        return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
+    if len(results_by_name) <= LISTED_RESULTS:
+        return [f"  {name}: {line}" for name, run in results_by_name.items() for line in error_lines(run)]
     results_without_estimate: dict[str, list[str]] = {}
-    worst = {name: estimate for name, run in results.items() if (estimate := largest_estimate(run)) is not None}
-    for name, run in results.items():
+    worst = {name: estimate for name, run in results_by_name.items() if (estimate := largest_estimate(run)) is not None}
+    for name, run in results_by_name.items():
         for line in error_lines(run) if name not in worst else ():
             results_without_estimate.setdefault(line, []).append(name)
     listed = [f"  {_list_of_few(names)}: {line}" for line, names in results_without_estimate.items()]
@@ -42,23 +45,23 @@ def _error_lines(results: Results) -> list[str]:
         if warned[1:]
         else []
     )
-    first = f"  {len(worst)} results, the largest error {largest}: {error_lines(results[largest])[0]}"
+    first = f"  {len(worst)} results, the largest error {largest}: {error_lines(results_by_name[largest])[0]}"
     return [first, *further_lines, *listed]
 
 
-def _list_of_few(names: list[str]) -> str:
+def _list_of_few(result_names: list[str]) -> str:
     """The first few names, and the number of the others, as text."""
-    return ", ".join(names[:LISTED_RESULTS]) + (
-        f" and {len(names) - LISTED_RESULTS} more" if len(names) > LISTED_RESULTS else ""
+    return ", ".join(result_names[:LISTED_RESULTS]) + (
+        f" and {len(result_names) - LISTED_RESULTS} more" if len(result_names) > LISTED_RESULTS else ""
     )
 
 
-def worst_breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
+def worst_breaches(results_by_name: Results) -> list[tuple[str, BrokenAssumption]]:
     """Broken assumptions with the names of the results that broke them: of each assumption the worst violation over all
     results."""
     names_by_breach: dict[str, list[str]] = {}
     worst: dict[str, BrokenAssumption] = {}
-    for name, run in results.items():
+    for name, run in results_by_name.items():
         for breach in broken_of(run):
             names_by_breach.setdefault(breach.name, []).append(name)
             if breach.name not in worst or breach.share > worst[breach.name].share:
@@ -66,74 +69,81 @@ def worst_breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
     return [(_list_of_few(names_by_breach[name]), breach) for name, breach in worst.items()]
 
 
-def figure_remarks(results: Results) -> list[str]:
+def figure_remarks(results_by_name: Results) -> list[str]:
     """Short lines below a figure: warnings about errors, and broken assumptions."""
     steps = [
         f"{name}: {error_lines(run)[0]}"
-        for name, run in results.items()
+        for name, run in results_by_name.items()
         if (worst := largest_estimate(run)) is not None and worst.warned
     ]
-    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results))]
+    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results_by_name))]
 
 
-def joined_result(joined: Result, results: Results) -> Result:
+def joined_result(joined_data: Result, results_by_name: Results) -> Result:
     """A result joined from other results, with all their stated errors and all assumptions that any of them broke."""
-    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in results.items()}
+    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in results_by_name.items()}
     first = next(iter(stored_errors.values()))
     channels = {
         f"{name}, {channel}": values
         for name, stored_error in stored_errors.items()
         for channel, values in stored_error.get("channels", {}).items()
     }
-    joined.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
-    assumed = dict.fromkeys(text for run in results.values() for text in assumption_sentences(run))
-    worst_breach = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(results)]
-    joined.data.attrs["assumptions"] = json.dumps(
+    joined_data.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
+    assumed = dict.fromkeys(text for run in results_by_name.values() for text in assumption_sentences(run))
+    worst_breach = [
+        replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(results_by_name)
+    ]
+    joined_data.data.attrs["assumptions"] = json.dumps(
         {"assumed": list(assumed), "broken": [asdict(breach) for breach in worst_breach]}
     )
-    broke = (run.data.attrs["status"] for run in results.values() if broken_of(run))
-    joined.data.attrs["status"] = next(broke, joined.data.attrs["status"])
-    return joined
+    broke = (run.data.attrs["status"] for run in results_by_name.values() if broken_of(run))
+    joined_data.data.attrs["status"] = next(broke, joined_data.data.attrs["status"])
+    return joined_data
 
 
-def derived_result(derived: Result, results: Results, method: str) -> Result:
-    """A result computed from other results, with the errors and broken assumptions of these; ``method`` is text on how
-    the errors carry over.
+def derived_result(derived_data: Result, results_by_name: Results, method_text: str) -> Result:
+    """A result computed from other results, with the errors and broken assumptions of these; ``method_text`` is text on
+    how the errors carry over.
 
     Without estimates in the results it has none.
     """
-    assumed = [says for run in results.values() for says in assumption_sentences(run)]
+    assumed = [says for run in results_by_name.values() for says in assumption_sentences(run)]
     assumptions = {
         "assumed": list(dict.fromkeys(assumed)),
-        "broken": [asdict(breach) for _, breach in worst_breaches(results)],
+        "broken": [asdict(breach) for _, breach in worst_breaches(results_by_name)],
     }
-    derived.data.attrs["assumptions"] = json.dumps(assumptions)
-    if assumptions["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
-        derived.data.attrs["status"] += ", assumptions broken"
-    pairs = [pair for run in results.values() for pair in errors_of(run).items()]
+    derived_data.data.attrs["assumptions"] = json.dumps(assumptions)
+    if assumptions["broken"] and "assumptions broken" not in derived_data.data.attrs["status"]:
+        derived_data.data.attrs["status"] += ", assumptions broken"
+    pairs = [pair for run in results_by_name.values() for pair in errors_of(run).items()]
     worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
-    return with_stated_errors(derived, worst, method) if worst else derived
+    return with_stated_errors(derived_data, worst, method_text) if worst else derived_data
 
 
-def errors_and_assumptions(results: Results) -> dict[str, Any]:
+def errors_and_assumptions(results_by_name: Results) -> dict[str, Any]:
     """Items "errors" and "assumptions" of a summary, from the statements of each result; NaN becomes None."""
     return {
-        "errors": {name: _json_attribute(run, "error") for name, run in results.items()},
+        "errors": {name: _json_attribute(run, "error") for name, run in results_by_name.items()},
         "assumptions": {
-            name: {"assumed": [], "broken": [], **_json_attribute(run, "assumptions")} for name, run in results.items()
+            name: {"assumed": [], "broken": [], **_json_attribute(run, "assumptions")}
+            for name, run in results_by_name.items()
         },
     }
 
 
-def summary_with_errors(summary: dict[str, Any]) -> dict[str, Any]:
+def summary_with_errors(study_summary: dict[str, Any]) -> dict[str, Any]:
     """The summary of a study, with the errors and broken assumptions of its "results" added as text at the end."""
-    results = summary.pop("results", {})
-    return summary | errors_and_assumptions(results) | {"table": [*summary.get("table", []), *message_lines(results)]}
+    results = study_summary.pop("results", {})
+    return (
+        study_summary
+        | errors_and_assumptions(results)
+        | {"table": [*study_summary.get("table", []), *message_lines(results)]}
+    )
 
 
-def _json_attribute(run: Result, key: str) -> dict[str, Any]:
-    """Attribute ``key`` of a result, parsed from JSON, with None in place of NaN and infinity."""
-    attribute: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
+def _json_attribute(run_result: Result, attribute_name: str) -> dict[str, Any]:
+    """Attribute ``attribute_name`` of a result, parsed from JSON, with None in place of NaN and infinity."""
+    attribute: dict[str, Any] = json.loads(run_result.data.attrs[attribute_name], parse_constant=lambda text: None)
     return attribute
 
 
@@ -141,13 +151,15 @@ DOUBT_ATTRIBUTES = ("engine", "error", "assumptions")
 """Attributes of a result that state its engine, its error and its assumptions."""
 
 
-def attributes_for_json(results: Results) -> dict[str, dict[str, str]]:
+def attributes_for_json(results_by_name: Results) -> dict[str, dict[str, str]]:
     """Attributes of results, without their channels, for JSON; ``results_with_attributes`` is the inverse."""
-    return {name: {key: run.data.attrs[key] for key in DOUBT_ATTRIBUTES} for name, run in results.items()}
+    return {name: {key: run.data.attrs[key] for key in DOUBT_ATTRIBUTES} for name, run in results_by_name.items()}
 
 
-def results_with_attributes(attributes: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:
+def results_with_attributes(attributes_by_result: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:
     """Results without channels that have the given attributes; inverse of ``attributes_for_json``."""
     import xarray as xr
 
-    return {name: Result(xr.Dataset(attrs=attributes_of_run)) for name, attributes_of_run in attributes.items()}
+    return {
+        name: Result(xr.Dataset(attrs=attributes_of_run)) for name, attributes_of_run in attributes_by_result.items()
+    }

@@ -16,30 +16,30 @@ size."""
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Context with the path of a temporary file beside ``path``; if the block ends without error, the file is renamed
-    to ``path``.
+def whole_file(output_path: Path) -> Iterator[Path]:
+    """Context with the path of a temporary file beside ``output_path``; if the block ends without error, the file is
+    renamed to ``output_path``.
 
     An earlier file of that name is replaced. After an error the temporary file is removed, and the error is raised
-    again; an OSError then names ``path``.
+    again; an OSError then names ``output_path``.
     """
-    partial_path = path.with_name(PARTIAL_NAME.format(path.name, os.getpid(), path.suffix))
+    partial_path = output_path.with_name(PARTIAL_NAME.format(output_path.name, os.getpid(), output_path.suffix))
     try:
         yield partial_path
         with partial_path.open("rb") as file:
             os.fsync(file.fileno())
-        os.replace(partial_path, path)
+        os.replace(partial_path, output_path)
     except BaseException as error:
         partial_path.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            error.filename = str(path)
+            error.filename = str(output_path)
         raise
 
 
-def write_whole(path: Path, content: bytes | memoryview | str) -> None:
+def write_whole(output_path: Path, file_content: bytes | memoryview | str) -> None:
     """Write a file completely or not at all, from bytes, or from text in UTF-8 with its line ends unchanged."""
-    with whole_file(path) as partial_path:
-        partial_path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with whole_file(output_path) as partial_path:
+        partial_path.write_bytes(file_content.encode() if isinstance(file_content, str) else file_content)
 
 
 def remove_partial_files(folder: Path) -> None:
@@ -50,18 +50,18 @@ def remove_partial_files(folder: Path) -> None:
             shutil.rmtree(partial_path) if partial_path.is_dir() else partial_path.unlink(missing_ok=True)
 
 
-def _runs_elsewhere(process: int) -> bool:
+def _runs_elsewhere(process_number: int) -> bool:
     """Whether another running process has this number; True where the operating system offers no harmless query."""
     if os.name != "posix":
         return True
     try:
-        os.kill(process, 0)
+        os.kill(process_number, 0)
     except OSError as error:
         return error.errno == errno.EPERM
-    return process != os.getpid()
+    return process_number != os.getpid()
 
 
-def write_error_phrase(error: OSError) -> str:
+def write_error_phrase(write_error: OSError) -> str:
     """The operating system's reason why a file could not be written, as a phrase with the file name."""
-    reason = "the disk is full" if error.errno in DISK_FULL_ERRORS else error.strerror or str(error)
-    return " ".join(reason.split()) + (f" ({error.filename})" if error.filename else "")
+    reason = "the disk is full" if write_error.errno in DISK_FULL_ERRORS else write_error.strerror or str(write_error)
+    return " ".join(reason.split()) + (f" ({write_error.filename})" if write_error.filename else "")

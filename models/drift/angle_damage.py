@@ -36,7 +36,7 @@ def unit_angle_error_paths(
     """
     walks, drifts = list[np.ndarray](), list[np.ndarray]()
     for path in range(path_count):
-        noise = normal_samples(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
+        noise = normal_samples(seed, path, rate * length, 1, noise_source=GYRO)[:, 0] / rate**0.5
         wander = bias_path(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
         for paths, samples_of_paths in ((walks, noise), (drifts, wander)):
             paths.append(np.concatenate([[0.0], samples_of_paths.reshape(length, rate).sum(axis=1).cumsum()]))

@@ -55,19 +55,19 @@ class Assembly:
         """Indices of the coordinates that the input prescribes; empty for most modes."""
         return PRESCRIBED_COORDINATES.get(self.mode, ())
 
-    def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
-        """A copy of the assembly in the mode ``mode``, driven by ``signal``."""
-        return replace(self, mode=mode, input=signal)
+    def with_input(self, input_mode: Mode, input_signal: Signal) -> "Assembly":
+        """A copy of the assembly in the mode ``input_mode``, driven by ``input_signal``."""
+        return replace(self, mode=input_mode, input=input_signal)
 
-    def with_moment(self, signal: Signal) -> "Assembly":
+    def with_moment(self, moment_signal: Signal) -> "Assembly":
         """A copy of the assembly with an added pitch moment (N m, nose up) on the chassis; it acts together with any
         wheel forces."""
-        assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
-        return replace(self, moment=signal)
+        assert self.mode in ("force", "force-body") and moment_signal.channels == 1 and not moment_signal.held
+        return replace(self, moment=moment_signal)
 
-    def with_spring(self, spring: PitchSpring) -> "Assembly":
+    def with_spring(self, pitch_spring: PitchSpring) -> "Assembly":
         """A copy of the assembly with one more rotational spring from chassis to ground."""
-        springs = (*self.vehicle.pitch_springs, spring)
+        springs = (*self.vehicle.pitch_springs, pitch_spring)
         return replace(self, vehicle=replace(self.vehicle, pitch_springs=springs))
 
     def without_tyres(self) -> "Assembly":

@@ -40,15 +40,15 @@ class WheelForces(NamedTuple):
 
 
 @lean
-def held(numbers, time, q, v, f):
-    """Add the wheel forces, constant in the wheels' own axes, to the generalised forces ``f``. All arguments but the
-    time are pointers to doubles."""
-    head = array(numbers, (HEADER,))
+def held(parameter_table, time, q, v, generalised_forces):
+    """Add the wheel forces, constant in the wheels' own axes, to the generalised forces ``generalised_forces``. All
+    arguments but the time are pointers to doubles."""
+    head = array(parameter_table, (HEADER,))
     units, wheels = int(head[0]), int(head[1])
-    reach = array(beyond(numbers, HEADER), (units, units))
-    rows = array(beyond(numbers, HEADER + units * units), (HELD, wheels))
+    reach = array(beyond(parameter_table, HEADER), (units, units))
+    rows = array(beyond(parameter_table, HEADER + units * units), (HELD, wheels))
     wheel = WheelForces(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
-    position, force = array(q, (2 + units,)), array(f, (2 + units,))
+    position, force = array(q, (2 + units,)), array(generalised_forces, (2 + units,))
     for i in range(wheels):
         k, heading = int(wheel.unit[i]), wheel.steer[i]
         for j in range(k + 1):
@@ -69,24 +69,24 @@ def held(numbers, time, q, v, f):
 
 
 @lean
-def set_held(block, t, n):
+def set_held(block_address, t, coordinate_count):
     """Compute the generalised wheel forces for a state, in a block of doubles at an address: forces f (n,), which are
     set to zero first, q and v (n,), and the table."""
-    f = at(block)
-    array(f, (n,))[:] = 0.0
-    held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
+    f = at(block_address)
+    array(f, (coordinate_count,))[:] = 0.0
+    held(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
 
 
-def bodies(plane: Plane) -> SpatialVehicle:
+def bodies(plane_vehicle: Plane) -> SpatialVehicle:
     """The units of a plane vehicle (tractor, trailers) as bodies of an engine. Each unit after the first turns about
     its hinge.
 
     The hinge of unit k lies at reach[k, j] ahead of the units j < k and reach[k, k] behind its own centre.
     """
     chain = list[Body]()
-    for k, (mass, turn) in enumerate(zip(plane.masses, plane.inertias, strict=True)):
+    for k, (mass, turn) in enumerate(zip(plane_vehicle.masses, plane_vehicle.inertias, strict=True)):
         tensor = ((turn, 0.0, 0.0), (0.0, turn, 0.0), (0.0, 0.0, turn))
-        hinge, centre = float(plane.reach[k, :k].sum()), float(plane.reach[k].sum())
+        hinge, centre = float(plane_vehicle.reach[k, :k].sum()), float(plane_vehicle.reach[k].sum())
         if k == 0:
             chain.append(Body("0", float(mass), (0.0, 0.0, 0.0), ("x", "y", "rz"), tensor))
             continue
@@ -100,13 +100,13 @@ class EngineChassis:
     """The chassis of a plane vehicle in an engine. Its ``advance`` replaces the compiled function
     ``models.brake.advance.advance``."""
 
-    def __init__(self, engine: str, plane: Plane) -> None:
-        units, none = plane.masses.size, np.zeros((3, plane.wheels))
-        wheels = np.vstack((plane.unit, plane.place.T, none))
-        numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
-        driven = Driven(bodies(plane), np.zeros(3), numbers, held, set_held)
+    def __init__(self, engine: str, plane_vehicle: Plane) -> None:
+        units, none = plane_vehicle.masses.size, np.zeros((3, plane_vehicle.wheels))
+        wheels = np.vstack((plane_vehicle.unit, plane_vehicle.place.T, none))
+        numbers = np.concatenate(([units, plane_vehicle.wheels], plane_vehicle.reach.ravel(), wheels.ravel()))
+        driven = Driven(bodies(plane_vehicle), np.zeros(3), numbers, held, set_held)
         self._model: FreeModel = free_model(engine, driven)
-        self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
+        self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane_vehicle.wheels))
 
     def advance(
         self, motion: PlaneMotion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
@@ -132,10 +132,10 @@ class EngineChassis:
         motion in each step."""
         return moved(self.advance)(*arguments)
 
-    def _state_after_step(self, state_before: np.ndarray, step: float) -> np.ndarray:
+    def _state_after_step(self, state_before: np.ndarray, time_step: float) -> np.ndarray:
         """Positions and rates (2, 2 + U) of the U units after a step (s) of the engine."""
         carried = state_before.copy()
         carried[:, 3:] = np.diff(state_before[:, 2:], axis=1)
-        after = self._model.march(carried[0], carried[1], 1, step)[-1].reshape(2, -1)
+        after = self._model.march(carried[0], carried[1], 1, time_step)[-1].reshape(2, -1)
         after[:, 2:] = np.cumsum(after[:, 2:], axis=1)
         return after

@@ -51,10 +51,10 @@ BLINK = 1e-5
 """Duration (s) of the short step from which the accelerations of a freely rolling vehicle are computed."""
 
 
-def driven_vehicle(vehicle: Sprung, engine: str) -> Driven:
+def driven_vehicle(sprung_vehicle: Sprung, engine: str) -> Driven:
     """The free vehicle for "exudyn" or "mujoco": springs that the engine itself computes, and the table of all other
     forces."""
-    handling = vehicle.handling
+    handling = sprung_vehicle.handling
     division = towed_division(handling, engine)
     wheels = np.zeros(VALUES_PER_WHEEL * len(handling.vehicle.tyres))
     table = np.concatenate((shared_numbers(handling, division), wheels))
@@ -66,11 +66,13 @@ class EngineSprungVehicle:
     """A braked vehicle on its suspension in an engine. Its ``advance`` replaces the compiled function
     ``models.brake.advance.advance``, for all coordinates."""
 
-    def __init__(self, engine: str, vehicle: Sprung) -> None:
-        self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
-        self.wheels = len(vehicle.handling.vehicle.tyres)
-        self._driven = driven_vehicle(vehicle, engine)
-        self._units = Units(vehicle.turns, vehicle.leans, np.zeros((2, PLANE + vehicle.turns.size)))
+    def __init__(self, engine: str, sprung_vehicle: Sprung) -> None:
+        self.engine, self.vehicle, self.size = engine, sprung_vehicle, sprung_vehicle.size
+        self.wheels = len(sprung_vehicle.handling.vehicle.tyres)
+        self._driven = driven_vehicle(sprung_vehicle, engine)
+        self._units = Units(
+            sprung_vehicle.turns, sprung_vehicle.leans, np.zeros((2, PLANE + sprung_vehicle.turns.size))
+        )
         self._allowed = set[float]()
 
     @cached_property
@@ -94,14 +96,14 @@ class EngineSprungVehicle:
         """The engine's model of the vehicle, built when the first step needs it."""
         return free_model(self.engine, self._driven)
 
-    def _march_functions(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    def _march_functions(self, has_lag: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """Functions that advance the vehicle and that generate samples, with or without lag of the tyres; compiled
         where compiled code can call the engine."""
         if self._model.compiled() is not None:
             from models.engines import braking_sprung_mujoco as native
 
-            return native.lagging() if lags else (native.advance, native.by_steps)
-        if not lags:
+            return native.lagging() if has_lag else (native.advance, native.by_steps)
+        if not has_lag:
             return advance, moved(advance)
         from models.brake.sprung_relaxation import relax
 
@@ -124,11 +126,11 @@ class EngineSprungVehicle:
             self._units,
         )
 
-    def _at_wheels(self, table: np.ndarray) -> AtWheels:
+    def _at_wheels(self, parameter_table: np.ndarray) -> AtWheels:
         """``AtWheels``: the wheel quantities at the end of a table, whose memory they share."""
         wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
         return AtWheels(
-            WheelForces(*table[-VALUES_PER_WHEEL * self.wheels :].reshape(VALUES_PER_WHEEL, self.wheels)),
+            WheelForces(*parameter_table[-VALUES_PER_WHEEL * self.wheels :].reshape(VALUES_PER_WHEEL, self.wheels)),
             wheels,
             surfaces(self.wheels),
         )
@@ -191,17 +193,17 @@ class EngineSprungVehicle:
         )
         self._allowed.add(step)
 
-    def _checked_status(self, status: int, time: float) -> int:
+    def _checked_status(self, march_status: int, time: float) -> int:
         """The status of a march, unchanged; raises RunFailed if the vehicle turned over, jackknifed, or the engine gave
         up."""
-        if status == OVER:
+        if march_status == OVER:
             raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
-        if status == FOLDED:
+        if march_status == FOLDED:
             raise RunFailed(self.engine, f"the train jackknifes: a hitch yaws by more than {FOLD:.2f} rad", time)
-        if status == GAVE_UP:
+        if march_status == GAVE_UP:
             reason = "the engine gave up, since the motion grew without bound: raise run.substeps"
             raise RunFailed(self.engine, reason, time)
-        return status
+        return march_status
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' rotational

@@ -35,8 +35,8 @@ class PlainSprungVehicle:
     """A braked vehicle on its suspension in plain Python, with ``advance`` and ``moving`` as in
     ``EngineSprungVehicle``."""
 
-    def __init__(self, vehicle: Sprung) -> None:
-        self.vehicle, self.size, self.suspension = vehicle, vehicle.size, Suspension(vehicle)
+    def __init__(self, sprung_vehicle: Sprung) -> None:
+        self.vehicle, self.size, self.suspension = sprung_vehicle, sprung_vehicle.size, Suspension(sprung_vehicle)
         self.liveliness = self.suspension.liveliness()
         self._changes = np.zeros(len(self.suspension.tyres))
 
@@ -70,9 +70,16 @@ class PlainSprungVehicle:
                 return AT_REST, time
         return FINE, time
 
-    def _moving(self, motion: PlaneMotion, lag: "LaggingTyres | None") -> Moving:
+    def _moving(self, plane_motion: PlaneMotion, lagging_tyres: "LaggingTyres | None") -> Moving:
         """The arrays of the compiled motion in the form of the plain code: the report has a row for each wheel."""
-        return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations, lag)
+        return Moving(
+            plane_motion.state,
+            plane_motion.turning,
+            self._changes,
+            plane_motion.report.T,
+            plane_motion.accelerations,
+            lagging_tyres,
+        )
 
     def moving(
         self,

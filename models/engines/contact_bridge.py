@@ -135,25 +135,29 @@ class Wheels:
         """The table that ``forces`` reads, for the linear theory, whose forces rise most steeply with creepage."""
         return replace(self, theory="linear").numbers
 
-    def state(self, seed: int = 8) -> tuple[Array, Array]:
+    def state(self, random_seed: int = 8) -> tuple[Array, Array]:
         """Random positions and rates (size,) with creepages about as large as those at which the wheels begin to
         slide."""
-        draw = np.random.default_rng(seed)
+        draw = np.random.default_rng(random_seed)
         q = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [1e-4, 1e-4, 5e-6, 1e-3]
         v = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [0.02, 0.02, 1e-3, 0.5]
         return q.ravel(), v.ravel()
 
 
 @njit(cache=True, error_model="numpy")
-def forces(numbers, t, q, v, f):
-    """Add the forces (N, N m) on all wheels to ``f``, for callbacks; all arguments but the time are pointers to
-    doubles.
+def forces(parameter_table, t, q, v, generalised_forces):
+    """Add the forces (N, N m) on all wheels to ``generalised_forces``, for callbacks; all arguments but the time are
+    pointers to doubles.
 
     Not a number where a contact is none that the kernel can answer: the engines stop at that, and say so.
     """
-    head = records(numbers, 1, HEAD)[0]
+    head = records(parameter_table, 1, HEAD)[0]
     wheels = int(head.wheels)
-    places, rates, sums = records(q, wheels, FREEDOM), records(v, wheels, FREEDOM), records(f, wheels, FREEDOM)
+    places, rates, sums = (
+        records(q, wheels, FREEDOM),
+        records(v, wheels, FREEDOM),
+        records(generalised_forces, wheels, FREEDOM),
+    )
     inputs, outputs = doubles(INPUTS), doubles(OUTPUTS)
     given, answer = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0]
     given.shape_x, given.shape_y, given.mu = head.curved_x, head.curved_y, head.mu
@@ -170,7 +174,7 @@ def forces(numbers, t, q, v, f):
             given.xi_x = way * rate.x / speed
             given.xi_y = (rate.y - head.speed * place.yaw) / speed
             given.spin = way * rate.yaw / speed
-            contact(BY_APPROACH, inputs, beyond(numbers, HEADER), outputs)
+            contact(BY_APPROACH, inputs, beyond(parameter_table, HEADER), outputs)
             force.x += share * way * answer.fx
             force.y += share * answer.fy
             force.z += share * (head.weight - answer.load)
@@ -178,47 +182,47 @@ def forces(numbers, t, q, v, f):
 
 
 @njit(cache=True, error_model="numpy")
-def add_forces(numbers, q, v, f):
-    """Add the forces on all wheels to ``f`` as ``forces`` does, with arrays as arguments, for a callback from
-    Python."""
-    forces(start(numbers), 0.0, start(q), start(v), start(f))
+def add_forces(parameter_table, q, v, generalised_forces):
+    """Add the forces on all wheels to ``generalised_forces`` as ``forces`` does, with arrays as arguments, for a
+    callback from Python."""
+    forces(start(parameter_table), 0.0, start(q), start(v), start(generalised_forces))
 
 
 @njit(cache=True, error_model="numpy")
-def set_forces(block, t, size):
+def set_forces(block_address, t, coordinate_count):
     """Compute the forces on all wheels as ``forces`` does, in one block of doubles at an address, the least that Python
     can pass to compiled code.
 
     It holds f, q and v (size,) and the numbers; f is cleared before.
     """
-    f = at(block)
-    array(f, (size,))[:] = 0.0
-    forces(beyond(f, 3 * size), t, beyond(f, size), beyond(f, 2 * size), f)
+    f = at(block_address)
+    array(f, (coordinate_count,))[:] = 0.0
+    forces(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
 
 
 @njit(cache=True, error_model="numpy")
-def slopes(numbers, q, v, by_q, by_v, sensitivity):
-    """Fill ``sensitivity`` (size, size) with derivatives of the forces F on all wheels, by_q dF/dq + by_v dF/dv, by
+def slopes(parameter_table, q, v, position_factor, rate_factor, force_slopes):
+    """Fill ``force_slopes`` (size, size) with derivatives of the forces F on all wheels, by_q dF/dq + by_v dF/dv, by
     central differences, for implicit integrators.
 
     No wheel feels another, so that one coordinate of all wheels is moved at a time: 16 evaluations, however many
     wheels there are.
     """
     high, low, place, rate = np.empty(q.size), np.empty(q.size), q.copy(), v.copy()
-    sensitivity[:] = 0.0
+    force_slopes[:] = 0.0
     for i in range(FREEDOMS):
-        for moved, by, step in ((place, by_q, OF_POSITION[i]), (rate, by_v, OF_RATE[i])):
+        for moved, by, step in ((place, position_factor, OF_POSITION[i]), (rate, rate_factor, OF_RATE[i])):
             if by == 0.0:
                 continue
             kept = moved[i::FREEDOMS].copy()
             high[:], low[:] = 0.0, 0.0
             moved[i::FREEDOMS] = kept + step
-            add_forces(numbers, place, rate, high)
+            add_forces(parameter_table, place, rate, high)
             moved[i::FREEDOMS] = kept - step
-            add_forces(numbers, place, rate, low)
+            add_forces(parameter_table, place, rate, low)
             moved[i::FREEDOMS] = kept
             for row in range(q.size):
-                sensitivity[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
+                force_slopes[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
 
 
 def linearised_wheels(wheels: Wheels) -> LinearMatrices:
@@ -234,18 +238,18 @@ def linearised_wheels(wheels: Wheels) -> LinearMatrices:
     return np.diag(wheels.masses), damping - by_rate, stiffness - by_place, damping, damping
 
 
-def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int = LONG_RUN) -> None:
+def check_step(engine: str, wheels: Wheels, method_name: str, time_step: float, step_count: int = LONG_RUN) -> None:
     """Raise Refused for a step (s) with which a motion of the wheels would grow over the run; the message gives the
     longest stable step.
 
     MuJoCo's ``discrete`` is implicit in its own springs and dampers, not in forces of a callback: it goes by the limit
     of ``Euler``.
     """
-    about, like = linearised_wheels(replace(wheels, count=1)), "Euler" if method == "discrete" else method
-    if log_growth(like, step, steps * step, about) > np.log(ALLOWED_GROWTH):
-        longest = longest_stable_step(like, step, LONG_RUN * step, about)
+    about, like = linearised_wheels(replace(wheels, count=1)), "Euler" if method_name == "discrete" else method_name
+    if log_growth(like, time_step, step_count * time_step, about) > np.log(ALLOWED_GROWTH):
+        longest = longest_stable_step(like, time_step, LONG_RUN * time_step, about)
         raise Refused(
             engine,
-            f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "
+            f"step {time_step:g} s exceeds the stability limit of {method_name}, {0.999 * longest:.3g} s, for "
             f"wheels at {wheels.speed:g} m/s: shorten it, or take an implicit method",
         )

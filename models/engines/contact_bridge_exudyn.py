@@ -28,10 +28,14 @@ ROUTES = ("generic object", "loads", "before each step")
 function before each step."""
 
 
-def list_forces(size: int, numbers: Array, write_forces: Callable[[int, float, int], Any]) -> ListForces:
+def list_forces(
+    coordinate_count: int, parameter_table: Array, write_forces: Callable[[int, float, int], Any]
+) -> ListForces:
     """Function that returns lists of forces by a compiled force law that does not depend on time; its block of doubles
-    ends with the table ``numbers``."""
-    packed = packed_forces(size, np.concatenate((np.zeros(3 * size), numbers)), write_forces)
+    ends with the table ``parameter_table``."""
+    packed = packed_forces(
+        coordinate_count, np.concatenate((np.zeros(3 * coordinate_count), parameter_table)), write_forces
+    )
     return lambda positions, rates: packed(None, 0.0, 0, positions, rates)
 
 
@@ -43,20 +47,20 @@ class Forces:
     method leaps from slip to slip at low speed and never settles; with the steepest it creeps up on the solution.
     """
 
-    def __init__(self, wheels: Wheels, law: Law | None = None) -> None:
+    def __init__(self, wheels: Wheels, python_law: Law | None = None) -> None:
         size, numbers, sticking = wheels.size, wheels.numbers, wheels.sticking
         jacobian = np.zeros((size, size))
 
         def by_law(positions: Any, rates: Any) -> Any:
             forces = np.zeros(size)
-            law(numbers, np.array(positions), np.array(rates), forces)  # type: ignore[misc]
+            python_law(numbers, np.array(positions), np.array(rates), forces)  # type: ignore[misc]
             return forces.tolist()
 
-        def steepest_jacobian(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
-            slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, jacobian)
+        def steepest_jacobian(positions: Any, rates: Any, position_factor: float, rate_factor: float) -> Array:
+            slopes(sticking, np.array(positions), np.array(rates), position_factor, rate_factor, jacobian)
             return jacobian
 
-        self.of = by_law if law is not None else list_forces(size, numbers, set_forces)
+        self.of = by_law if python_law is not None else list_forces(size, numbers, set_forces)
         self.slopes = steepest_jacobian
 
 
@@ -72,12 +76,12 @@ class Rolling:
         self,
         wheels: Wheels,
         force_function: ListForces | None,
-        route: str = ROUTES[0],
-        slopes: Callable[[Any, Any, float, float], Array] | None = None,
+        force_route: str = ROUTES[0],
+        force_slopes: Callable[[Any, Any, float, float], Array] | None = None,
     ) -> None:
         self._container = exu.SystemContainer()
         self.mbs: Any = self._container.AddSystem()
-        self.wheels, self._slopes = wheels, slopes
+        self.wheels, self._slopes = wheels, force_slopes
         masses, k, d = wheels.masses[:FREEDOMS], wheels.stiffness, wheels.damping
         self._nodes = []
         for _ in range(wheels.count):
@@ -93,7 +97,7 @@ class Rolling:
                 "generic object": self._add_generic_object,
                 "loads": self._add_loads,
                 "before each step": self._add_step_loads,
-            }[route](force_function)
+            }[force_route](force_function)
         self.mbs.Assemble()
 
     def _add_generic_object(self, force_function: ListForces) -> None:
@@ -145,23 +149,29 @@ class Rolling:
         self.mbs.SetPreStepUserFunction(set_loads)
 
     def run(
-        self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler", tolerance: float = 0.0
+        self,
+        q: Array,
+        v: Array,
+        step_count: int,
+        time_step: float = 1e-4,
+        solver_name: str = "ExplicitEuler",
+        solver_tolerance: float = 0.0,
     ) -> Array:
-        """State (2 size,) after ``steps`` steps from positions and rates (size,); RunFailed unless it is finite.
+        """State (2 size,) after ``step_count`` steps from positions and rates (size,); RunFailed unless it is finite.
 
-        tolerance : relative, of a solver that picks its own steps, at most ``step`` long; 0 for steps as they are.
-        Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method gives up.
-        """
-        check_step("exudyn", self.wheels, solver, step, steps)
+        solver_tolerance : relative, of a solver that picks its own steps, at most ``time_step`` long; 0 for steps as
+        they are. Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method
+        gives up."""
+        check_step("exudyn", self.wheels, solver_name, time_step, step_count)
         set_start(self.mbs, q, v)
         options, data = quiet_settings(), self.mbs.systemData
         ti = options.timeIntegration
-        ti.automaticStepSize = tolerance > 0.0
-        ti.relativeTolerance, ti.absoluteTolerance = tolerance, 1e-2 * tolerance
+        ti.automaticStepSize = solver_tolerance > 0.0
+        ti.relativeTolerance, ti.absoluteTolerance = solver_tolerance, 1e-2 * solver_tolerance
         if self._slopes is not None:  # steep slopes converge slowly but surely: keep the matrix, go on for longer
             ti.newton.useModifiedNewton, ti.newton.modifiedNewtonContractivity = True, CONTRACTIVITY
             ti.newton.maxIterations = ITERATIONS
-        note = solve(self.mbs, Settings(solver, step, steps * step), options)
+        note = solve(self.mbs, Settings(solver_name, time_step, step_count * time_step), options)
         state = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
         if note or not np.isfinite(state).all():
             raise RunFailed("exudyn", f"the engine gave up{note}: shorten the step")

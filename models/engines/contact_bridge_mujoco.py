@@ -15,15 +15,15 @@ SLIDE, HINGE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
 JOINTS = ((SLIDE, (1.0, 0.0, 0.0)), (SLIDE, (0.0, 1.0, 0.0)), (SLIDE, (0.0, 0.0, 1.0)), (HINGE, (0.0, 0.0, 1.0)))
 
 
-def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
+def model(wheels: Wheels, time_step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
     """MuJoCo model of rail wheels on springs. The callback's numbers are stored in the model, so that one callback
     serves all models of the process.
 
     Refused is raised for a step that the integrator cannot take.
     """
-    check_step("mujoco", wheels, integrator, step)
+    check_step("mujoco", wheels, integrator, time_step)
     spec = mujoco.MjSpec()
-    spec.option.gravity, spec.option.timestep = [0.0, 0.0, 0.0], step
+    spec.option.gravity, spec.option.timestep = [0.0, 0.0, 0.0], time_step
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     spec.compiler.degree = False
@@ -48,7 +48,7 @@ def empty_law() -> Any:
     return law
 
 
-def python_law(add: Callable[[Array, Array, Array, Array], Any]) -> Callable[[Any, Any], None]:
-    """MuJoCo callback that calls a Python function ``add`` with arrays: numbers, positions, rates, and the forces to
-    which it adds."""
-    return lambda model, data: add(model.numeric_data, data.qpos, data.qvel, data.qfrc_passive)
+def python_law(add_forces: Callable[[Array, Array, Array, Array], Any]) -> Callable[[Any, Any], None]:
+    """MuJoCo callback that calls a Python function ``add_forces`` with arrays: numbers, positions, rates, and the
+    forces to which it adds."""
+    return lambda model, data: add_forces(model.numeric_data, data.qpos, data.qvel, data.qfrc_passive)

@@ -67,8 +67,8 @@ class WrittenEquations(FreeModel):
 
     ENGINE = "reference"
 
-    def __init__(self, driven: Driven) -> None:
-        self.driven, self.size, self.settings = driven, driven.size, None
+    def __init__(self, loaded_vehicle: Driven) -> None:
+        self.driven, self.size, self.settings = loaded_vehicle, loaded_vehicle.size, None
 
     def plan(self) -> dict[str, int]:
         """Counts of built items: coordinates, and no native items or callbacks."""
@@ -100,27 +100,27 @@ class HubModel:
         engine: str,
         vehicle: CutVehicle,
         hub_inputs: HubInputs,
-        settings: Settings,
-        forces: ForceRoute = "compiled",
+        run_settings: Settings,
+        force_route: ForceRoute = "compiled",
     ) -> None:
         """Build the model. Raises Refused where the step does not divide the duration, or where the inputs do not have
         one row per half step.
 
-        settings : "RK4", or an integrator of the engine that picks its own steps.
-        forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
+        run_settings : "RK4", or an integrator of the engine that picks its own steps.
+        force_route : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
         equations of the reference are the same either way. An enforced tilt needs them "compiled".
         """
-        check_divides(engine, settings)
-        self.engine, self.vehicle, self.hub_inputs, self.settings = engine, vehicle, hub_inputs, settings
-        step, self.step, self.steps, self.size = settings.step, settings.step, settings.steps, vehicle.size
-        self.adaptive = settings.integrator != FIXED_STEP_METHOD
+        check_divides(engine, run_settings)
+        self.engine, self.vehicle, self.hub_inputs, self.settings = engine, vehicle, hub_inputs, run_settings
+        step, self.step, self.steps, self.size = run_settings.step, run_settings.step, run_settings.steps, vehicle.size
+        self.adaptive = run_settings.integrator != FIXED_STEP_METHOD
         _check_inputs(engine, vehicle, hub_inputs, 2 * self.steps + 1)
-        _check_settings(engine, vehicle, settings)
+        _check_settings(engine, vehicle, run_settings)
         self.numbers = table(vehicle, hub_inputs, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         self.plain = _plain_hubs(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN_ENGINE else None
         division, numbers = Division((), vehicle.elements), self.numbers
-        if forces == "native" and engine not in (PLAIN_ENGINE, "reference"):
+        if force_route == "native" and engine not in (PLAIN_ENGINE, "reference"):
             if hub_inputs.guide is not None and hub_inputs.pull is None:
                 raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
             division = divide(vehicle.tree, vehicle.elements, engine)
@@ -134,11 +134,13 @@ class HubModel:
         if self.adaptive and not self.plain:
             self.model.numbers[ANY_TIME] = 1.0
 
-    def _in_engine(self, driven: Driven) -> FreeModel:
+    def _in_engine(self, loaded_vehicle: Driven) -> FreeModel:
         """The free vehicle in the engine, as written equations, or in plain code."""
         if self.plain:
             return Plain(self.engine, self.plain.acceleration, self.size)
-        return WrittenEquations(driven) if self.engine == "reference" else free_model(self.engine, driven)
+        return (
+            WrittenEquations(loaded_vehicle) if self.engine == "reference" else free_model(self.engine, loaded_vehicle)
+        )
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), from coordinates and rates (n,)."""
@@ -162,23 +164,23 @@ class HubModel:
             counts.update(path.counts)
         return Trajectory(self._times(self.steps), states, counts=dict(counts))
 
-    def _march(self, q: np.ndarray, v: np.ndarray, steps: int) -> Trajectory:
-        """Trajectory over ``steps`` steps from time 0 on."""
+    def _march(self, q: np.ndarray, v: np.ndarray, step_count: int) -> Trajectory:
+        """Trajectory over ``step_count`` steps from time 0 on."""
         if self.adaptive:
             from models.engines.free_vehicle_adaptive import march_adaptively
 
-            return march_adaptively(self.model, q, v, replace(self.settings, duration=steps * self.step))
-        states = self.model.march(q, v, steps, self.step)
-        return Trajectory(self._times(steps), states, counts={"steps": steps, "force calls": 4 * steps})
+            return march_adaptively(self.model, q, v, replace(self.settings, duration=step_count * self.step))
+        states = self.model.march(q, v, step_count, self.step)
+        return Trajectory(self._times(step_count), states, counts={"steps": step_count, "force calls": 4 * step_count})
 
-    def _times(self, steps: int) -> np.ndarray:
+    def _times(self, step_count: int) -> np.ndarray:
         """Times (steps + 1,) in s of the rows of a march."""
-        return self.step * np.arange(steps + 1)
+        return self.step * np.arange(step_count + 1)
 
-    def _hold_forces(self, first: int, last_step: int) -> None:
+    def _hold_forces(self, first_step: int, last_step: int) -> None:
         """Set the hub forces of a span of steps over which they are constant; the model's time starts again at the
         span."""
-        hub_inputs = self.hub_inputs.in_steps(first, last_step)
+        hub_inputs = self.hub_inputs.in_steps(first_step, last_step)
         if self.plain:
             self.plain.hub_inputs = hub_inputs
         else:
@@ -217,13 +219,13 @@ class HubModel:
         return block[: self.size].copy()
 
 
-def run_with_forces(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
+def run_with_forces(vehicle: CutVehicle, parameter_table: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
     """The run with given times (m,) in s and states (m, 2 n), with the compiled forces that act in these states;
-    ``numbers`` is the vehicle's table."""
+    ``parameter_table`` is the vehicle's table."""
     rows = len(times)
     inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
     wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
-    report(numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
+    report(parameter_table, times, np.ascontiguousarray(states), inside, wrenches, moments)
     return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
 
 
@@ -231,20 +233,20 @@ def build(
     engine: str,
     vehicle: CutVehicle,
     hub_inputs: HubInputs,
-    step: float,
+    time_step: float,
     duration: float,
-    forces: ForceRoute = "compiled",
+    force_route: ForceRoute = "compiled",
 ) -> HubModel:
     """A cut vehicle as ``HubModel`` in "reference", "plain", "exudyn" or "mujoco", for steps (s) of Runge-Kutta 4 over
     a duration (s); raises Refused."""
-    return HubModel(engine, vehicle, hub_inputs, Settings(FIXED_STEP_METHOD, step, duration), forces)
+    return HubModel(engine, vehicle, hub_inputs, Settings(FIXED_STEP_METHOD, time_step, duration), force_route)
 
 
-def _plain_hubs(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bool) -> "PlainHubs":
+def _plain_hubs(vehicle: CutVehicle, hub_inputs: HubInputs, time_step: float, reads_any_time: bool) -> "PlainHubs":
     """The cut vehicle by the independent plain code."""
     from models.multibody.plain.hubs import PlainHubs
 
-    return PlainHubs(vehicle, hub_inputs, step, any_time)
+    return PlainHubs(vehicle, hub_inputs, time_step, reads_any_time)
 
 
 @dataclass(frozen=True)
@@ -266,30 +268,32 @@ def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
     return NativeShare(elements, joints, division.reasons)
 
 
-def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
+def check_step(engine: str, vehicle: CutVehicle, time_step: float, duration: float) -> None:
     """Raise Refused for a step (s) with which a mode of the vehicle on its tyres would grow; without tyres the vehicle
     is softer."""
-    check_modes(engine, linearise(replace(vehicle.uncut, side_forces=())), Settings("RK4", step, duration))
+    check_modes(engine, linearise(replace(vehicle.uncut, side_forces=())), Settings("RK4", time_step, duration))
 
 
-def _check_inputs(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -> None:
+def _check_inputs(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, row_count: int) -> None:
     """Raise Refused unless the hub inputs have the right shapes, are finite, and held forces change only between
     steps."""
     width = (2 if hub_inputs.road else WRENCH) * len(vehicle.hubs)
-    if hub_inputs.hubs.shape != (rows, width) or not np.isfinite(hub_inputs.hubs).all():
-        raise Refused(engine, f"inputs must be {rows} rows (half steps) of {width} finite numbers")
+    if hub_inputs.hubs.shape != (row_count, width) or not np.isfinite(hub_inputs.hubs).all():
+        raise Refused(engine, f"inputs must be {row_count} rows (half steps) of {width} finite numbers")
     if hub_inputs.guide is not None and (
-        hub_inputs.guide.shape != (rows, 6) or not np.isfinite(hub_inputs.guide).all()
+        hub_inputs.guide.shape != (row_count, 6) or not np.isfinite(hub_inputs.guide).all()
     ):
-        raise Refused(engine, f"a guide must be {rows} rows (half steps) of 6 finite numbers")
+        raise Refused(engine, f"a guide must be {row_count} rows (half steps) of 6 finite numbers")
     if hub_inputs.constant_in_step and not np.array_equal(hub_inputs.hubs[1::2], hub_inputs.hubs[:-1:2]):
         raise Refused(engine, "held forces change within a step: it must divide the period of their samples")
 
 
-def _check_settings(engine: str, vehicle: CutVehicle, settings: Settings) -> None:
+def _check_settings(engine: str, vehicle: CutVehicle, run_settings: Settings) -> None:
     """Raise Refused if fixed steps are too long, or if the engine does not have the integrator."""
     adaptive = ADAPTIVE.get("reference" if engine == PLAIN_ENGINE else engine, ())
-    if settings.integrator == FIXED_STEP_METHOD:
-        check_step(engine, vehicle, settings.step, settings.duration)
-    elif settings.integrator not in adaptive:
-        raise Refused(engine, f"{settings.integrator} is not offered: {' or '.join((FIXED_STEP_METHOD, *adaptive))}")
+    if run_settings.integrator == FIXED_STEP_METHOD:
+        check_step(engine, vehicle, run_settings.step, run_settings.duration)
+    elif run_settings.integrator not in adaptive:
+        raise Refused(
+            engine, f"{run_settings.integrator} is not offered: {' or '.join((FIXED_STEP_METHOD, *adaptive))}"
+        )

@@ -19,25 +19,25 @@ class Adaptive(Strict):
     tolerance: float = Field(default=1e-8, ge=1e-13, le=1e-3, description="of every step, relative; absolute: 1/100")
 
 
-def check_engines(file: str, engines: Mapping[str, Adaptive]) -> None:
+def check_engines(scene_path: str, engine_tables: Mapping[str, Adaptive]) -> None:
     """Raise InputError for an engine, or an integrator of an engine, that cannot choose its own steps."""
-    for engine, adaptive in engines.items():
+    for engine, adaptive in engine_tables.items():
         if engine not in ADAPTIVE:
             allowed = "no engine with integrators that pick their own steps"
-            raise InputError(file, f"engines.{engine}", engine, allowed, tuple(ADAPTIVE))
+            raise InputError(scene_path, f"engines.{engine}", engine, allowed, tuple(ADAPTIVE))
         if adaptive.integrator not in ADAPTIVE[engine]:
             allowed = "no integrator of this engine that picks its own steps"
-            raise InputError(file, f"engines.{engine}.integrator", adaptive.integrator, allowed, ADAPTIVE[engine])
+            raise InputError(scene_path, f"engines.{engine}.integrator", adaptive.integrator, allowed, ADAPTIVE[engine])
 
 
-def plan_lines(engines: Mapping[str, Adaptive], step: float) -> list[tuple[str, str]]:
-    """Lines of a plan, heading and text, on the integrators that replace Runge-Kutta 4, with rows every ``step``
+def plan_lines(engine_tables: Mapping[str, Adaptive], row_spacing: float) -> list[tuple[str, str]]:
+    """Lines of a plan, heading and text, on the integrators that replace Runge-Kutta 4, with rows every ``row_spacing``
     (s)."""
     return [
         (
             engine,
             f"{adaptive.integrator} in its place, which picks its own steps to {adaptive.tolerance:g}, "
-            f"rows every {step:g} s",
+            f"rows every {row_spacing:g} s",
         )
-        for engine, adaptive in engines.items()
+        for engine, adaptive in engine_tables.items()
     ]

@@ -40,14 +40,14 @@ class ExportSubject:
     source: str
     axes: str
 
-    def comment(self, has: Sequence[str], omissions: Sequence[str]) -> str:
+    def comment(self, content_texts: Sequence[str], omissions: Sequence[str]) -> str:
         """Comment lines for the head of an exported file."""
         from importlib.metadata import version
 
         lines = [
             f"{self.title}",
             f"From the scene {self.source} by twinrig {version('twinrig')}. SI units. {self.axes}",
-            f"Has {', '.join(has)}.",
+            f"Has {', '.join(content_texts)}.",
             *(["Leaves out:"] if omissions else ["Leaves nothing out."]),
             *(f"  {text}" for text in omissions),
         ]
@@ -55,48 +55,53 @@ class ExportSubject:
 
 
 def exported_mujoco_model(
-    spec: "mujoco.MjSpec",
-    model: "mujoco.MjModel",
-    names: Mapping[str, str],
+    mujoco_spec: "mujoco.MjSpec",
+    mujoco_model: "mujoco.MjModel",
+    names_in_file: Mapping[str, str],
     export_subject: ExportSubject,
     omissions: Sequence[str],
 ) -> Exported:
-    """Exported MuJoCo model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
+    """Exported MuJoCo model that was compiled from a specification; names_in_file : see ``mujoco_export.mjcf``."""
     from models.engines.mujoco_export import item_counts, mjcf
 
-    has, missing = tuple(item_counts(model)), tuple(omissions)
-    return Exported(mjcf(spec, model, names, export_subject.title, export_subject.comment(has, missing)), has, missing)
+    has, missing = tuple(item_counts(mujoco_model)), tuple(omissions)
+    return Exported(
+        mjcf(mujoco_spec, mujoco_model, names_in_file, export_subject.title, export_subject.comment(has, missing)),
+        has,
+        missing,
+    )
 
 
 def exported_exudyn_system(
-    mbs: Any, coordinates: dict[str, int], export_subject: ExportSubject, omissions: Sequence[str]
+    mbs: Any, coordinate_indices: dict[str, int], export_subject: ExportSubject, omissions: Sequence[str]
 ) -> Exported:
-    """Exported assembled Exudyn system; coordinates : indices of the coordinates in Exudyn's vectors, by name."""
+    """Exported assembled Exudyn system; coordinate_indices : indices of the coordinates in Exudyn's vectors, by
+    name."""
     from models.engines.exudyn_export import item_counts, python_script
 
     has, missing = tuple(item_counts(mbs)), tuple(omissions)
-    return Exported(python_script(mbs, coordinates, export_subject.comment(has, missing)), has, missing)
+    return Exported(python_script(mbs, coordinate_indices, export_subject.comment(has, missing)), has, missing)
 
 
 def export_free_vehicle(
-    engine: str, driven: Driven, export_subject: ExportSubject, omissions: Sequence[str]
+    engine: str, loaded_vehicle: Driven, export_subject: ExportSubject, omissions: Sequence[str]
 ) -> Exported:
     """Exported free vehicle in "exudyn" or "mujoco", without the forces of the compiled kernel."""
     if engine == "exudyn":
         from models.engines.free_vehicle_exudyn import FreeExudyn
 
-        coordinates = {name: i for i, name in enumerate(coordinate_names(driven.vehicle))}
-        return exported_exudyn_system(FreeExudyn(driven).mbs, coordinates, export_subject, omissions)
+        coordinates = {name: i for i, name in enumerate(coordinate_names(loaded_vehicle.vehicle))}
+        return exported_exudyn_system(FreeExudyn(loaded_vehicle).mbs, coordinates, export_subject, omissions)
     from models.engines.free_vehicle_mujoco import compiled_from, specification_of
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
 
-    vehicle, lowered = realisable(driven.vehicle)
-    driven = replace(driven, vehicle=vehicle)
-    spec = specification_of(driven)
+    vehicle, lowered = realisable(loaded_vehicle.vehicle)
+    loaded_vehicle = replace(loaded_vehicle, vehicle=vehicle)
+    spec = specification_of(loaded_vehicle)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     return exported_mujoco_model(
-        spec, compiled_from(spec, driven), exported_names(vehicle), export_subject, [*omissions, *lowered]
+        spec, compiled_from(spec, loaded_vehicle), exported_names(vehicle), export_subject, [*omissions, *lowered]
     )
 
 
@@ -121,9 +126,9 @@ def coordinate_names(vehicle: SpatialVehicle) -> list[str]:
     return [f"{body} {freedom}" for body, freedom in vehicle.coordinates()]
 
 
-def elements_left_out(vehicle: SpatialVehicle, native: Iterable[str] = ()) -> list[str]:
-    """Texts that name the springs, bars and tyres of a vehicle, except those named in ``native``."""
-    kept = set(native)
+def elements_left_out(vehicle: SpatialVehicle, native_names: Iterable[str] = ()) -> list[str]:
+    """Texts that name the springs, bars and tyres of a vehicle, except those named in ``native_names``."""
+    kept = set(native_names)
     return [
         *(f"spring {spring.name!r}" for spring in vehicle.springs if spring.name not in kept),
         *(f"anti-roll bar {bar.name!r}" for bar in vehicle.bars if bar.name not in kept),

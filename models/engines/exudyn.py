@@ -90,20 +90,20 @@ def ground_marker(mbs: Any) -> Any:
     return _marker(mbs, mbs.AddNode(items.NodePointGround()), 0)
 
 
-def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
+def _marker(mbs: Any, node: Any, coordinate_index: int) -> Any:
     """Marker of one coordinate of a node."""
-    return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+    return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate_index))
 
 
 def _add_ground_spring(
-    build: PitchPlaneBuild, coordinate: tuple[str, str], element: Strut | PitchSpring, law: Any = None
+    exudyn_build: PitchPlaneBuild, coordinate: tuple[str, str], element: Strut | PitchSpring, force_law: Any = None
 ) -> None:
-    """Add a spring and damper between a coordinate and the ground; ``law`` replaces their force."""
-    keywords = {} if law is None else {"springForceUserFunction": law}
-    build.callbacks += len(keywords)
-    build.mbs.AddObject(
+    """Add a spring and damper between a coordinate and the ground; ``force_law`` replaces their force."""
+    keywords = {} if force_law is None else {"springForceUserFunction": force_law}
+    exudyn_build.callbacks += len(keywords)
+    exudyn_build.mbs.AddObject(
         items.CoordinateSpringDamper(
-            markerNumbers=[ground_marker(build.mbs), build.coordinate_markers[coordinate]],
+            markerNumbers=[ground_marker(exudyn_build.mbs), exudyn_build.coordinate_markers[coordinate]],
             stiffness=element.stiffness,
             damping=element.damping,
             **keywords,
@@ -111,29 +111,31 @@ def _add_ground_spring(
     )
 
 
-def _add_pitch_spring(build: PitchPlaneBuild, spring: PitchSpring) -> None:
+def _add_pitch_spring(exudyn_build: PitchPlaneBuild, pitch_spring: PitchSpring) -> None:
     """Add a pitch spring between chassis and ground; one with a dead band gets a force law as a callback.
 
     Exudyn has limit stops, but checks only once per step whether one is touched, not at every stage.
     """
 
     def moment(mbs: Any, t: float, item: int, angle: float, rate: float, *law: float) -> float:
-        (k, d, _), beyond = law, abs(angle) - spring.dead_band
+        (k, d, _), beyond = law, abs(angle) - pitch_spring.dead_band
         return k * math.copysign(beyond, angle) + d * rate if beyond >= 0 else 0.0
 
-    _add_ground_spring(build, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
+    _add_ground_spring(
+        exudyn_build, (pitch_spring.body, "pitch"), pitch_spring, moment if pitch_spring.dead_band else None
+    )
 
 
-def _add_pushing_tyre(build: PitchPlaneBuild, tyre: Strut, height: Reader, rate: Reader) -> None:
+def _add_pushing_tyre(exudyn_build: PitchPlaneBuild, tyre: Strut, read_height: Reader, read_rate: Reader) -> None:
     """Add a tyre that can lift off, on a road of given height (m, down) and rate, with a callback: Exudyn has no item
     that switches within a step."""
 
     def force(mbs: Any, t: float, item: int, position: float, speed: float, *law: float) -> float:
         k, d, _ = law
-        pressed = k * (position - height(mbs, t, 0.0))
-        return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
+        pressed = k * (position - read_height(mbs, t, 0.0))
+        return max(min(pressed + d * (speed - read_rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 
-    _add_ground_spring(build, (str(tyre.upper.body), "z"), tyre, force)
+    _add_ground_spring(exudyn_build, (str(tyre.upper.body), "z"), tyre, force)
 
 
 def _linear_vehicle(assembly: Assembly) -> PitchPlaneBuild:
@@ -167,31 +169,31 @@ def native_elements(assembly: Assembly) -> PitchPlaneBuild:
     return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear_vehicle(assembly)
 
 
-def coordinate_indices(build: PitchPlaneBuild, vehicle: Vehicle) -> list[int]:
+def coordinate_indices(exudyn_build: PitchPlaneBuild, vehicle: Vehicle) -> list[int]:
     """Index of each of the four coordinates in Exudyn's vector, once the system is assembled."""
     if vehicle.geometry == "linear":
         return [0, 1, 2, 3]
-    start = {name: build.mbs.GetNodeODE2Index(node) for name, node in build.nodes.items()}
+    start = {name: exudyn_build.mbs.GetNodeODE2Index(node) for name, node in exudyn_build.nodes.items()}
     return [start[body] + (1 if kind == "z" else 2) for body, kind in vehicle.coordinates()]
 
 
-def _apply_input(build: PitchPlaneBuild, assembly: Assembly, clock: SignalClock) -> None:
+def _apply_input(exudyn_build: PitchPlaneBuild, assembly: Assembly, signal_clock: SignalClock) -> None:
     """Apply the input signal as loads on the wheels, and on the chassis as well if forces act along its own axis."""
-    if clock.held:
-        build.mbs.SetPreStepUserFunction(clock.advance)
-        build.callbacks += 1
+    if signal_clock.held:
+        exudyn_build.mbs.SetPreStepUserFunction(signal_clock.advance)
+        exudyn_build.callbacks += 1
     tyres = {tyre.upper.body: tyre for tyre in assembly.vehicle.tyres}
     for i, axle in enumerate(assembly.vehicle.axles):
         if assembly.mode == "road":
             tyre = tyres[axle.wheel]
             if tyre.pushes_only:
                 continue
-            _add_load(build, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
-            _add_load(build, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
+            _add_load(exudyn_build, (axle.wheel, "z"), signal_clock.reader(i, tyre.stiffness))
+            _add_load(exudyn_build, (axle.wheel, "z"), signal_clock.reader(2 + i, tyre.damping))
         elif assembly.mode == "force-body":
-            _add_body_fixed_force(build, axle.wheel, axle.x, clock.reader(i, 1.0))
+            _add_body_fixed_force(exudyn_build, axle.wheel, axle.x, signal_clock.reader(i, 1.0))
         else:
-            _add_load(build, (axle.wheel, "z"), clock.reader(i, -1.0))
+            _add_load(exudyn_build, (axle.wheel, "z"), signal_clock.reader(i, -1.0))
 
 
 def _flat_road(mbs: Any, t: float, load: float) -> float:
@@ -199,46 +201,61 @@ def _flat_road(mbs: Any, t: float, load: float) -> float:
     return 0.0
 
 
-def _add_load(build: PitchPlaneBuild, coordinate: tuple[str, str], function: Any) -> None:
+def _add_load(exudyn_build: PitchPlaneBuild, coordinate: tuple[str, str], load_function: Any) -> None:
     """Add a load on a coordinate whose value (N, N m) a function gives."""
-    build.mbs.AddLoad(
-        items.LoadCoordinate(markerNumber=build.coordinate_markers[coordinate], load=0.0, loadUserFunction=function)
+    exudyn_build.mbs.AddLoad(
+        items.LoadCoordinate(
+            markerNumber=exudyn_build.coordinate_markers[coordinate], load=0.0, loadUserFunction=load_function
+        )
     )
-    build.callbacks += 1
+    exudyn_build.callbacks += 1
 
 
-def _add_body_fixed_force(build: PitchPlaneBuild, wheel: str, x: float, force: Reader) -> None:
+def _add_body_fixed_force(
+    exudyn_build: PitchPlaneBuild, wheel_body: str, axle_position: float, read_force: Reader
+) -> None:
     """Apply a wheel force f (up) along the chassis' vertical axis: the force f cos(pitch) on the wheel, and the pitch
     moment f x sin(pitch)^2 on the chassis."""
-    node = build.nodes["chassis"]
+    node = exudyn_build.nodes["chassis"]
 
     def pitch(mbs: Any) -> float:
         return mbs.GetNodeOutput(node, KINDS.Coordinates)[2]
 
-    _add_load(build, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
-    _add_load(build, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
+    _add_load(exudyn_build, (wheel_body, "z"), lambda mbs, t, load: -read_force(mbs, t, load) * np.cos(pitch(mbs)))
+    _add_load(
+        exudyn_build,
+        ("chassis", "pitch"),
+        lambda mbs, t, load: axle_position * read_force(mbs, t, load) * np.sin(pitch(mbs)) ** 2,
+    )
 
 
-def _add_constraints(build: PitchPlaneBuild, assembly: Assembly, settings: Settings) -> list[Any]:
+def _add_constraints(exudyn_build: PitchPlaneBuild, assembly: Assembly, run_settings: Settings) -> list[Any]:
     """Add constraints, which have Lagrange multipliers, for the prescribed coordinates; returns the constraints."""
     if not assembly.guided or assembly.input is None:
         return []
-    table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
+    table = assembly.input.sample(0.0, run_settings.step / 2, 2 * run_settings.steps + 1).T.tolist()
     places = [assembly.vehicle.coordinates()[i] for i in assembly.guided]
     paths, rates = table[2 : 2 + len(places)], table[2 + len(places) :]
-    return [_add_constraint(build, *path, 2.0 / settings.step) for path in zip(places, paths, rates, strict=False)]
+    return [
+        _add_constraint(exudyn_build, *path, 2.0 / run_settings.step)
+        for path in zip(places, paths, rates, strict=False)
+    ]
 
 
 def _add_constraint(
-    build: PitchPlaneBuild, coordinate: tuple[str, str], path: list[float], rate: list[float], per_time: float
+    exudyn_build: PitchPlaneBuild,
+    coordinate: tuple[str, str],
+    half_step_positions: list[float],
+    half_step_rates: list[float],
+    rows_per_second: float,
 ) -> Any:
     """Add a constraint by which a coordinate follows a path given at half steps."""
-    build.callbacks += 2
-    return build.mbs.AddObject(
+    exudyn_build.callbacks += 2
+    return exudyn_build.mbs.AddObject(
         items.CoordinateConstraint(
-            markerNumbers=[ground_marker(build.mbs), build.coordinate_markers[coordinate]],
-            offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
-            offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
+            markerNumbers=[ground_marker(exudyn_build.mbs), exudyn_build.coordinate_markers[coordinate]],
+            offsetUserFunction=lambda mbs, t, item, offset: half_step_positions[round(t * rows_per_second)],
+            offsetUserFunction_t=lambda mbs, t, item, offset: half_step_rates[round(t * rows_per_second)],
         )
     )
 
@@ -246,11 +263,11 @@ def _add_constraint(
 class ExudynModel:
     """Model of one pitch-plane assembly in an Exudyn system."""
 
-    def __init__(self, assembly: Assembly, settings: Settings) -> None:
-        self.assembly, self.settings = assembly, settings
+    def __init__(self, assembly: Assembly, run_settings: Settings) -> None:
+        self.assembly, self.settings = assembly, run_settings
         self.built = native_elements(assembly)
         if assembly.input is not None:
-            self.clock = SignalClock(assembly.input, settings)
+            self.clock = SignalClock(assembly.input, run_settings)
             _apply_input(self.built, assembly, self.clock)
         for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
             flat = assembly.input is None
@@ -259,8 +276,8 @@ class ExudynModel:
             )
             _add_pushing_tyre(self.built, tyre, height, rate)
         if assembly.moment is not None:
-            _add_load(self.built, ("chassis", "pitch"), SignalClock(assembly.moment, settings).reader(0, 1.0))
-        self.constraints = _add_constraints(self.built, assembly, settings)
+            _add_load(self.built, ("chassis", "pitch"), SignalClock(assembly.moment, run_settings).reader(0, 1.0))
+        self.constraints = _add_constraints(self.built, assembly, run_settings)
         p = assembly.parameters
         self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]
         mbs, kept = self.built.mbs, {"storeInternal": True, "writeToFile": False}
@@ -335,7 +352,7 @@ class ExudynModel:
         )
         return self._inertia * (wanted - free), self._inertia * wanted
 
-    def _consistent_start(self, options: Any) -> None:
+    def _consistent_start(self, solver_options: Any) -> None:
         """Set initial accelerations that are consistent with the prescribed coordinates.
 
         Exudyn leaves the constraint's own acceleration out of its initial values; the multiplier then
@@ -346,8 +363,8 @@ class ExudynModel:
         all_of_them = np.zeros(data.ODE2Size())
         all_of_them[self._columns] = self.acceleration(0.0, *np.split(self.assembly.initial, 2))
         data.SetODE2Coordinates_tt(all_of_them, initial)
-        options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
-        options.timeIntegration.generalizedAlpha.resetAccelerations = False
+        solver_options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
+        solver_options.timeIntegration.generalizedAlpha.resetAccelerations = False
 
     def _recorded_states(self) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) and states (n, 8) as the sensors stored them; Exudyn's y is the heave, its rotation the pitch."""
@@ -375,6 +392,6 @@ class ExudynModel:
         return enforced
 
 
-def build(assembly: Assembly, settings: Settings) -> ExudynModel:
+def build(assembly: Assembly, run_settings: Settings) -> ExudynModel:
     """The Exudyn model of a pitch-plane assembly."""
-    return ExudynModel(assembly, settings)
+    return ExudynModel(assembly, run_settings)

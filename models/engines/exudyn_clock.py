@@ -13,30 +13,30 @@ from models.engines.catalogue import CATALOGUE
 class SignalClock:
     """A signal as Exudyn's callbacks read it: by step, by half step or at any time."""
 
-    def __init__(self, signal: Signal, settings: Settings) -> None:
-        h, n = settings.step, settings.steps
+    def __init__(self, input_signal: Signal, run_settings: Settings) -> None:
+        h, n = run_settings.step, run_settings.steps
         self.per_time = 2.0 / h
         self.step = 0
-        nodes = CATALOGUE["exudyn"][settings.integrator].nodes
-        self.held = signal.held
+        nodes = CATALOGUE["exudyn"][run_settings.integrator].nodes
+        self.held = input_signal.held
         self.table: list[list[float]] = []
         self.steps: list[list[float]] = []
         if self.held:
-            self.steps = signal.sample(0.0, h, n).T.tolist()
+            self.steps = input_signal.sample(0.0, h, n).T.tolist()
         if not self.held and nodes != "any":
-            self.table = signal.sample(0.0, h / 2, 2 * n + 1).T.tolist()
-        self.signal = signal
+            self.table = input_signal.sample(0.0, h / 2, 2 * n + 1).T.tolist()
+        self.signal = input_signal
         self.latest = (-1.0, np.empty(0))
 
-    def reader(self, column: int, scale: float) -> Callable[[Any, float, float], float]:
-        """Callback (mbs, t, load) that returns ``scale`` times one channel of the signal."""
+    def reader(self, channel_index: int, value_factor: float) -> Callable[[Any, float, float], float]:
+        """Callback (mbs, t, load) that returns ``value_factor`` times one channel of the signal."""
         if self.held:
-            values = [scale * value for value in self.steps[column]]
+            values = [value_factor * value for value in self.steps[channel_index]]
             return lambda mbs, t, load: values[self.step]
         if self.table:
-            values, per_time = [scale * value for value in self.table[column]], self.per_time
+            values, per_time = [value_factor * value for value in self.table[channel_index]], self.per_time
             return lambda mbs, t, load: values[round(t * per_time)]
-        return lambda mbs, t, load: scale * self.at(t)[column]
+        return lambda mbs, t, load: value_factor * self.at(t)[channel_index]
 
     def at(self, t: float) -> np.ndarray:
         """All channels of the signal at one time t (s). The last values are stored, since all loads of a stage ask for

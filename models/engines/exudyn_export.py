@@ -65,14 +65,14 @@ if __name__ == "__main__":
 '''
 
 
-def python_script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
+def python_script(mbs: Any, coordinate_indices: dict[str, int], head_comment: str) -> str:
     """Text of a Python script that builds an assembled Exudyn system.
 
-    coordinates : place of every coordinate in Exudyn's vectors, by its name; comment : for people, at its head.
-    """
+    coordinate_indices : place of every coordinate in Exudyn's vectors, by its name; head_comment : for people, at its
+    head."""
     lines = _Writer(mbs).script_lines()
-    text = comment.replace("\\", "/").replace('"""', "'''")
-    return SCRIPT_TEMPLATE.format(comment=text, coordinates=coordinates, lines="\n".join(lines))
+    text = head_comment.replace("\\", "/").replace('"""', "'''")
+    return SCRIPT_TEMPLATE.format(comment=text, coordinates=coordinate_indices, lines="\n".join(lines))
 
 
 def item_counts(mbs: Any) -> Sequence[str]:
@@ -96,9 +96,9 @@ def items_with_functions(mbs: Any) -> tuple[str, ...]:
     )
 
 
-def _has_force_function(item: dict[str, Any]) -> bool:
+def _has_force_function(exudyn_item: dict[str, Any]) -> bool:
     """Whether an item calls a user function for its forces."""
-    return any(key.endswith(FUNCTION_SUFFIX) and value for key, value in item.items() if not key.startswith("V"))
+    return any(key.endswith(FUNCTION_SUFFIX) and value for key, value in exudyn_item.items() if not key.startswith("V"))
 
 
 @dataclass
@@ -124,34 +124,36 @@ class _Writer:
                     self.variable_of(kind, number)
         return self.lines
 
-    def item(self, kind: str, number: int) -> dict[str, Any]:
+    def item(self, item_kind: str, item_index: int) -> dict[str, Any]:
         """Exudyn's dictionary that describes an item."""
-        item: dict[str, Any] = getattr(self.mbs, f"Get{kind.capitalize()}")(number)
+        item: dict[str, Any] = getattr(self.mbs, f"Get{item_kind.capitalize()}")(item_index)
         return item
 
-    def _by_function(self, kind: str, number: int) -> bool:
+    def _by_function(self, item_kind: str, item_index: int) -> bool:
         """Whether the law of an item is given by a function, so that the item cannot be exported."""
-        item = self.item(kind, number)
-        return _has_force_function(item) and _class_name(kind, item) not in ITEMS_WITH_ADDED_FORCE
+        item = self.item(item_kind, item_index)
+        return _has_force_function(item) and _class_name(item_kind, item) not in ITEMS_WITH_ADDED_FORCE
 
-    def variable_of(self, kind: str, number: int) -> str:
+    def variable_of(self, item_kind: str, item_index: int) -> str:
         """Name of the script's variable for an item; the item is written now if it has not been."""
-        variable = f"{kind}{number}"
+        variable = f"{item_kind}{item_index}"
         if variable not in self.written:
             self.written.add(variable)
-            item = self.item(kind, number)
-            arguments = dict(self._arguments(kind, item))
+            item = self.item(item_kind, item_index)
+            arguments = dict(self._arguments(item_kind, item))
             if arguments.get("name") == repr(variable):  # which Exudyn gives what has none
                 del arguments["name"]
-            made = f"items.{_class_name(kind, item)}({', '.join(f'{key}={text}' for key, text in arguments.items())})"
-            self.lines.append(f"    {variable} = mbs.Add{kind.capitalize()}({made})")
-            self.counts[kind] += 1
+            made = (
+                f"items.{_class_name(item_kind, item)}({', '.join(f'{key}={text}' for key, text in arguments.items())})"
+            )
+            self.lines.append(f"    {variable} = mbs.Add{item_kind.capitalize()}({made})")
+            self.counts[item_kind] += 1
         return variable
 
-    def _arguments(self, kind: str, item: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    def _arguments(self, item_kind: str, exudyn_item: dict[str, Any]) -> Iterator[tuple[str, str]]:
         """Names and texts of an item's arguments that differ from Exudyn's defaults."""
-        usual = dict(getattr(items, _class_name(kind, item))())
-        for key, value in item.items():
+        usual = dict(getattr(items, _class_name(item_kind, exudyn_item))())
+        for key, value in exudyn_item.items():
             referred = REFERENCES.get(key.removesuffix("s"))
             if key not in usual or key.startswith("V") or key.endswith((FUNCTION_SUFFIX, *DERIVED_SUFFIXES)):
                 continue
@@ -164,25 +166,29 @@ class _Writer:
                 yield key, text
 
 
-def _class_name(kind: str, item: dict[str, Any]) -> str:
+def _class_name(item_kind: str, exudyn_item: dict[str, Any]) -> str:
     """Name of an item's class in exudyn.itemInterface."""
-    return f"{kind.capitalize()}{item[f'{kind}Type']}"
+    return f"{item_kind.capitalize()}{exudyn_item[f'{item_kind}Type']}"
 
 
-def _python_text(value: Any) -> str:
+def _python_text(script_value: Any) -> str:
     """Python text of a value in the script: matrices as arrays, Exudyn's own lists by their constructors."""
-    if isinstance(value, exu.Vector3DList | exu.Matrix3DList):
-        entries: Any = value  # Exudyn's type hints do not know that these are lists
+    if isinstance(script_value, exu.Vector3DList | exu.Matrix3DList):
+        entries: Any = script_value  # Exudyn's type hints do not know that these are lists
         inner = ", ".join(_python_text(np.asarray(entries[i]).tolist()) for i in range(len(entries)))
-        return f"exu.{type(value).__name__}([{inner}])" if len(entries) else "[]"
-    if isinstance(value, exu.MatrixContainer):
-        return _python_text(np.array(value.Convert2DenseMatrix()))
-    if isinstance(value, np.ndarray):
-        return f"np.array({value.tolist()!r})" if value.ndim > 1 and value.size else repr(value.ravel().tolist())
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_python_text, value))}]"
-    if hasattr(value, "name") and hasattr(type(value), "__members__"):
-        return f"exu.{type(value).__name__}.{value.name}"
-    if value is None or isinstance(value, bool | int | float | str):
-        return repr(value)
-    raise TypeError(f"{type(value).__name__} has no text in a script")
+        return f"exu.{type(script_value).__name__}([{inner}])" if len(entries) else "[]"
+    if isinstance(script_value, exu.MatrixContainer):
+        return _python_text(np.array(script_value.Convert2DenseMatrix()))
+    if isinstance(script_value, np.ndarray):
+        return (
+            f"np.array({script_value.tolist()!r})"
+            if script_value.ndim > 1 and script_value.size
+            else repr(script_value.ravel().tolist())
+        )
+    if isinstance(script_value, list | tuple):
+        return f"[{', '.join(map(_python_text, script_value))}]"
+    if hasattr(script_value, "name") and hasattr(type(script_value), "__members__"):
+        return f"exu.{type(script_value).__name__}.{script_value.name}"
+    if script_value is None or isinstance(script_value, bool | int | float | str):
+        return repr(script_value)
+    raise TypeError(f"{type(script_value).__name__} has no text in a script")

@@ -24,30 +24,35 @@ UserFunction = Callable[[Any, float, int, Any, Any], Any]
 a list."""
 
 
-def packed_forces(size: int, block: np.ndarray, write_forces: Callable[[int, float, int], Any]) -> UserFunction:
+def packed_forces(
+    coordinate_count: int, memory_block: np.ndarray, write_forces: Callable[[int, float, int], Any]
+) -> UserFunction:
     """User function of Exudyn that packs its lists into one block of doubles for ``write_forces(address, time, size)``.
     The block holds forces, positions and rates (size,) each, then a table.
 
     Exudyn calls Python and nothing else, and hands a user function lists: to pack both into one block, to let a
     compiled kernel work on its address and to return a list costs least.
     """
-    pack, raw = struct.Struct(f"{2 * size}d").pack_into, block.data.cast("B")[8 * size :]
-    answer, address = block[:size].data.tolist, block.ctypes.data
+    pack, raw = struct.Struct(f"{2 * coordinate_count}d").pack_into, memory_block.data.cast("B")[8 * coordinate_count :]
+    answer, address = memory_block[:coordinate_count].data.tolist, memory_block.ctypes.data
 
     def forces(mbs: Any, time: float, item: int, positions: Any, rates: Any) -> Any:
         pack(raw, 0, *positions, *rates)
-        write_forces(address, time, size)
+        write_forces(address, time, coordinate_count)
         return answer()
 
     return forces
 
 
-def add_node(mbs: Any, size: int) -> Any:
-    """New node of an Exudyn system with ``size`` coordinates, all zero."""
-    zero = [0.0] * size
+def add_node(mbs: Any, coordinate_count: int) -> Any:
+    """New node of an Exudyn system with ``coordinate_count`` coordinates, all zero."""
+    zero = [0.0] * coordinate_count
     return mbs.AddNode(
         items.NodeGenericODE2(
-            numberOfODE2Coordinates=size, referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero
+            numberOfODE2Coordinates=coordinate_count,
+            referenceCoordinates=zero,
+            initialCoordinates=zero,
+            initialCoordinates_t=zero,
         )
     )
 
@@ -122,33 +127,33 @@ def constraint_residuals(mbs: Any, q: np.ndarray) -> np.ndarray:
     return gaps
 
 
-def march_settings(settings: Settings) -> Any:
+def march_settings(run_settings: Settings) -> Any:
     """Exudyn's settings for a run in which sensors store every step."""
     options = quiet_settings()
-    options.solution.sensors.active, options.solution.sensors.writePeriod = True, settings.step
+    options.solution.sensors.active, options.solution.sensors.writePeriod = True, run_settings.step
     ti = options.timeIntegration
-    ti.automaticStepSize = CATALOGUE["exudyn"][settings.integrator].adaptive
-    ti.relativeTolerance, ti.absoluteTolerance = settings.tolerance, settings.tolerance * 1e-2
-    ti.generalizedAlpha.spectralRadius = settings.spectral_radius
+    ti.automaticStepSize = CATALOGUE["exudyn"][run_settings.integrator].adaptive
+    ti.relativeTolerance, ti.absoluteTolerance = run_settings.tolerance, run_settings.tolerance * 1e-2
+    ti.generalizedAlpha.spectralRadius = run_settings.spectral_radius
     ti.newton.relativeTolerance, ti.newton.absoluteTolerance = 1e-8, 1e-10
     return options
 
 
-def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
-    """Run Exudyn's solver over the duration with ``options``, by default those of ``march_settings``. Returns the
-    solver's failure message, empty if there is none."""
-    options = options or march_settings(settings)
-    ti = options.timeIntegration
-    ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
+def solve(mbs: Any, run_settings: Settings, solver_options: Any = None) -> str:
+    """Run Exudyn's solver over the duration with ``solver_options``, by default those of ``march_settings``. Returns
+    the solver's failure message, empty if there is none."""
+    solver_options = solver_options or march_settings(run_settings)
+    ti = solver_options.timeIntegration
+    ti.numberOfSteps, ti.endTime, ti.verboseMode = run_settings.steps, run_settings.duration, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
-    with simulation_progress(lambda: mbs.systemData.GetTime() / settings.duration):
-        return solver_failure(mbs, settings.integrator, options)
+    with simulation_progress(lambda: mbs.systemData.GetTime() / run_settings.duration):
+        return solver_failure(mbs, run_settings.integrator, solver_options)
 
 
-def solver_failure(mbs: Any, integrator: str, options: Any) -> str:
+def solver_failure(mbs: Any, integrator: str, solver_options: Any) -> str:
     """Run Exudyn's solver; returns a phrase on how it failed, empty if it succeeded."""
     try:
-        done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, integrator))
+        done = mbs.SolveDynamic(solver_options, solverType=getattr(exu.DynamicSolverType, integrator))
     except (exu.ExudynError, RuntimeError, ValueError) as error:
         if "KeyboardInterrupt" in str(error):
             raise KeyboardInterrupt from error

@@ -48,23 +48,23 @@ class TreeBuild:
     frames: dict[str, np.ndarray] = field(default_factory=dict)
     callbacks: int = 0
 
-    def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
-        """Marker of a point (m) on a body, made once. ``turning``: whether the body's axes or rotation are needed as
-        well."""
-        apart = turning and body is not None and self.links[body][1] is None
+    def marker(self, body: str | None, point: Vector, with_rotation: bool = False) -> Any:
+        """Marker of a point (m) on a body, made once. ``with_rotation``: whether the body's axes or rotation are needed
+        as well."""
+        apart = with_rotation and body is not None and self.links[body][1] is None
         key = (body, point, apart or (body, point, True) in self.markers)
         if key not in self.markers:
             self.markers[key] = self.mbs.AddMarker(self._new_marker(*key))
         return self.markers[key]
 
-    def _new_marker(self, body: str | None, point: Vector, turning: bool) -> Any:
+    def _new_marker(self, body: str | None, point: Vector, with_rotation: bool) -> Any:
         """Exudyn item of a marker of a point (m) on a body; None means the ground."""
         if body is None:
             return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
         tree, link, origin = self.links[body]
         local = self.in_body_axes(body, np.subtract(point, origin))
         if link is None:
-            kind = items.MarkerBodyRigid if turning else items.MarkerBodyPosition
+            kind = items.MarkerBodyRigid if with_rotation else items.MarkerBodyPosition
             return kind(bodyNumber=tree, localPosition=local)
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
@@ -79,47 +79,49 @@ class TreeBuild:
         frame = lists.HT(rotation=(self.frames[body].T @ axes).tolist(), translation=local.tolist())
         return self.mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localHT=frame))
 
-    def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
+    def reader(self, body: str, freedom: str, variable_type: Any = KINDS.Coordinates) -> Callable[[], float]:
         """Function that reads a body's coordinate, or its rate, at the current stage; it returns 0 if the body does not
         have the coordinate."""
         if (body, freedom) not in self.coordinate_nodes:
             return lambda: 0.0
         read, (node, index) = self.mbs.GetNodeOutput, self.coordinate_nodes[body, freedom]
         if self.size(node) == 1:  # Exudyn gives a number, no array
-            return lambda: read(node, kind)
-        return lambda: read(node, kind)[index]
+            return lambda: read(node, variable_type)
+        return lambda: read(node, variable_type)[index]
 
-    def size(self, node: Any) -> int:
+    def size(self, exudyn_node: Any) -> int:
         """Number of coordinates of a node."""
-        return sum(node == each for each, _ in self.coordinate_nodes.values())
+        return sum(exudyn_node == each for each, _ in self.coordinate_nodes.values())
 
-    def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:
+    def in_body_axes(self, body: str | None, design_vector: np.ndarray) -> np.ndarray:
         """A vector (3,), given in the design position along the axes of space, in the axes that Exudyn uses for a
         body."""
         if body is None:
-            return vector
+            return design_vector
         if self.links[body][1] is not None:
-            return self.frames[body].T @ vector
-        return np.array(SLIDER_AXES[self.vehicle.body(body).freedoms[0]]).T @ vector
+            return self.frames[body].T @ design_vector
+        return np.array(SLIDER_AXES[self.vehicle.body(body).freedoms[0]]).T @ design_vector
 
-    def coordinate(self, node: Any, index: int) -> Any:
+    def coordinate(self, exudyn_node: Any, coordinate_index: int) -> Any:
         """Marker of one coordinate of a node."""
-        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=exudyn_node, coordinate=coordinate_index))
 
-    def spring(self, first: Any, second: Any, **law: Any) -> None:
+    def spring(self, first_marker: Any, second_marker: Any, **spring_law: Any) -> None:
         """Add a native spring-damper between two points along the axes of space, or one whose force is a function of
         position and speed."""
-        self.mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[first, second], **law))
-        self.callbacks += "springForceUserFunction" in law
+        self.mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[first_marker, second_marker], **spring_law))
+        self.callbacks += "springForceUserFunction" in spring_law
 
-    def connect(self, name: str, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
+    def connect(
+        self, connector_name: str, first_marker: Any, second_marker: Any, force_law: Callable[[Any, Any], list[float]]
+    ) -> None:
         """Connect two points by a force law. The force on the first point (N, axes of space) depends on the second
         point's relative position and velocity."""
         self.spring(
-            first,
-            second,
-            name=name,
-            springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate),
+            first_marker,
+            second_marker,
+            name=connector_name,
+            springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: force_law(apart, rate),
         )
 
 
@@ -145,13 +147,13 @@ class Link:
         self.mass, self.centre = mass, centre
 
 
-def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
+def add_tree(tree_build: TreeBuild, bodies: list[Body]) -> None:
     """Add a body without parent and all bodies that it carries: a link per coordinate, the mass of each body on its
     last link.
 
     A rider without freedoms adds its mass to the last link of what it rides on.
     """
-    part = replace(build.vehicle, bodies=tuple(bodies))
+    part = replace(tree_build.vehicle, bodies=tuple(bodies))
     rows, places, ends = (
         joints(part),
         part.coordinates(),
@@ -163,7 +165,7 @@ def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
     for body in bodies:
         last, origin = ends[body.name]
         links[last].load(body, np.subtract(body.position, origin))
-    node = build.mbs.AddNode(
+    node = tree_build.mbs.AddNode(
         items.NodeGenericODE2(
             referenceCoordinates=zero,
             initialCoordinates=zero,
@@ -171,10 +173,10 @@ def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
             numberOfODE2Coordinates=len(links),
         )
     )
-    tree = build.mbs.AddObject(
+    tree = tree_build.mbs.AddObject(
         items.ObjectKinematicTree(
             nodeNumber=node,
-            gravity=[0, 0, -build.vehicle.gravity],
+            gravity=[0, 0, -tree_build.vehicle.gravity],
             jointTypes=[JOINT_TYPES[freedom] for _, freedom in places],
             linkParents=below.tolist(),
             jointTransformations=lists.Matrix3DList([b.T @ a for a, b in zip(axes, base, strict=True)]),
@@ -184,19 +186,19 @@ def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
             linkMasses=[link.mass for link in links],
         )
     )
-    build.links |= {name: (tree, *end) for name, end in ends.items()}
-    build.frames |= {name: axes[end[0]] for name, end in ends.items()}
-    build.coordinate_nodes |= {place: (node, i) for i, place in enumerate(places)}
+    tree_build.links |= {name: (tree, *end) for name, end in ends.items()}
+    tree_build.frames |= {name: axes[end[0]] for name, end in ends.items()}
+    tree_build.coordinate_nodes |= {place: (node, i) for i, place in enumerate(places)}
 
 
-def add_slider(build: TreeBuild, body: Body) -> None:
+def add_slider(tree_build: TreeBuild, body: Body) -> None:
     """Add a body on the ground that has one sliding coordinate and carries no other body. As trees of one link, the
     bodies of a car would take 1.6 times as long."""
     still, (freedom,) = [0.0], body.freedoms
-    node = build.mbs.AddNode(
+    node = tree_build.mbs.AddNode(
         items.Node1D(referenceCoordinates=still, initialCoordinates=still, initialVelocities=still)
     )
-    mass = build.mbs.AddObject(
+    mass = tree_build.mbs.AddObject(
         items.Mass1D(
             nodeNumber=node,
             mass=body.mass,
@@ -204,8 +206,13 @@ def add_slider(build: TreeBuild, body: Body) -> None:
             referenceRotation=SLIDER_AXES[freedom],
         )
     )
-    build.links[body.name], build.coordinate_nodes[body.name, freedom] = (mass, None, body.position), (node, 0)
-    if freedom == "z" and build.vehicle.gravity:
-        build.mbs.AddLoad(
-            items.LoadCoordinate(markerNumber=build.coordinate(node, 0), load=-body.mass * build.vehicle.gravity)
+    tree_build.links[body.name], tree_build.coordinate_nodes[body.name, freedom] = (
+        (mass, None, body.position),
+        (node, 0),
+    )
+    if freedom == "z" and tree_build.vehicle.gravity:
+        tree_build.mbs.AddLoad(
+            items.LoadCoordinate(
+                markerNumber=tree_build.coordinate(node, 0), load=-body.mass * tree_build.vehicle.gravity
+            )
         )

@@ -98,9 +98,9 @@ class FreeModel(ABC):
         return self.driven.numbers
 
     @contextmanager
-    def at_step(self, step: float) -> Iterator[None]:
-        """Context in which a caller can march the engine in steps of ``step`` (s)."""
-        self.step = step
+    def at_step(self, time_step: float) -> Iterator[None]:
+        """Context in which a caller can march the engine in steps of ``time_step`` (s)."""
+        self.step = time_step
         yield
 
     def compiled(self) -> Any:
@@ -137,11 +137,21 @@ class Plain(FreeModel):
     """The independent reference: equations of a vehicle in plain Python, integrated with numpy; it has no table of
     numbers."""
 
-    def __init__(self, engine: str, equations: "Acceleration", size: int, settings: Settings | None = None) -> None:
-        """equations : function that gives accelerations (n,) at a time (s), positions and rates (n,); engine : name of
-        a run.
-        """
-        self.ENGINE, self.equations, self.size, self.settings = engine, equations, size, settings  # type: ignore[misc]
+    def __init__(
+        self,
+        engine: str,
+        acceleration_function: "Acceleration",
+        coordinate_count: int,
+        run_settings: Settings | None = None,
+    ) -> None:
+        """acceleration_function : function that gives accelerations (n,) at a time (s), positions and rates (n,);
+        engine : name of a run."""
+        self.ENGINE, self.equations, self.size, self.settings = (
+            engine,
+            acceleration_function,
+            coordinate_count,
+            run_settings,
+        )  # type: ignore[misc]
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), from positions and rates (n,)."""
@@ -159,39 +169,39 @@ class Plain(FreeModel):
         return march(self.equations, q, v, steps, step)
 
 
-def free_model(engine: str, driven: Driven, settings: Settings | None = None) -> FreeModel:
-    """The free vehicle in "exudyn" or "mujoco"; ``settings`` are needed for runs, not for single steps."""
+def free_model(engine: str, loaded_vehicle: Driven, run_settings: Settings | None = None) -> FreeModel:
+    """The free vehicle in "exudyn" or "mujoco"; ``run_settings`` are needed for runs, not for single steps."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
-    model: FreeModel = getattr(_engine_module(engine), f"Free{engine.capitalize()}")(driven, settings)
+    model: FreeModel = getattr(_engine_module(engine), f"Free{engine.capitalize()}")(loaded_vehicle, run_settings)
     return model
 
 
-def native_elements_and_joints(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(engine: str, loaded_vehicle: Driven) -> tuple[tuple[str, ...], int]:
     """Names of the springs, mounts and bars that a built model of an engine itself computes, and the number of its
     joints.
 
     Counted in the model; it is built without its callback, for which numba would compile.
     """
-    elements_and_joints: tuple[tuple[str, ...], int] = _engine_module(engine).native_elements_and_joints(driven)
+    elements_and_joints: tuple[tuple[str, ...], int] = _engine_module(engine).native_elements_and_joints(loaded_vehicle)
     return elements_and_joints
 
 
 def native_share(
-    vehicle: SpatialVehicle, native: Mapping[str, tuple[NativePart, ...]] | None = None
+    vehicle: SpatialVehicle, native_parts: Mapping[str, tuple[NativePart, ...]] | None = None
 ) -> tuple[tuple[str, str], ...]:
     """Lines of a plan, heading and text, on the joints and springs that each engine computes natively, and on why
     others are not native, counted in built models. The vehicle's springs act along axes that turn with their carrier's
     heading.
 
     Such springs act along axes that turn with the carrier only, while both their ends roll and pitch relative to it.
-    Elements along coordinates are native. native : further parts of each engine, of springs that keep to other
+    Elements along coordinates are native. native_parts : further parts of each engine, of springs that keep to other
     bodies.
     """
     along, bars, lines = joint_parts(vehicle), len(vehicle.bars), []
     count = len(vehicle.springs) + len(along)
     for engine in ENGINES:
-        parts = (*along, *(native or {}).get(engine, ()))
+        parts = (*along, *(native_parts or {}).get(engine, ()))
         names, joints = native_elements_and_joints(engine, Driven(vehicle, np.zeros(3), np.zeros(1), None, None, parts))
         told = f"{engine}: bodies and {joints} joints, {len(names)} of {count} springs and {bars} bars"
         lines.append(("native", told))

@@ -35,10 +35,10 @@ from models.engines.native_parts import rotors
 from models.vehicles.spatial_linear import Preloads
 
 
-def native_elements_and_joints(driven: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(loaded_vehicle: Driven) -> tuple[tuple[str, ...], int]:
     """Names of the elements that have an object in the built system, and the number of joints of its tree."""
-    model = FreeExudyn(driven)
-    names = built_elements(model.mbs, [part.element.name for part in driven.parts])
+    model = FreeExudyn(loaded_vehicle)
+    names = built_elements(model.mbs, [part.element.name for part in loaded_vehicle.parts])
     return names, len(model.mbs.GetObject(model.tree)["jointTypes"])
 
 
@@ -47,35 +47,43 @@ class FreeExudyn(FreeModel):
 
     ENGINE = "exudyn"
 
-    def __init__(self, driven: Driven, settings: Settings | None = None) -> None:
-        self.driven, self.size, self.settings, bodies = driven, driven.size, settings, driven.vehicle.bodies
+    def __init__(self, loaded_vehicle: Driven, run_settings: Settings | None = None) -> None:
+        self.driven, self.size, self.settings, bodies = (
+            loaded_vehicle,
+            loaded_vehicle.size,
+            run_settings,
+            loaded_vehicle.vehicle.bodies,
+        )
         self._container = exu.SystemContainer()
         mbs: Any = self._container.AddSystem()
-        self.mbs, built = mbs, TreeBuild(driven.vehicle, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround()))
+        self.mbs, built = (
+            mbs,
+            TreeBuild(loaded_vehicle.vehicle, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround())),
+        )
         add_tree(built, list(bodies))
         self.tree = built.links[bodies[0].name][0]
-        self._block = np.concatenate((np.zeros(3 * self.size), driven.numbers))
-        mbs.SetObjectParameter(self.tree, "gravity", driven.gravity.tolist())
-        if driven.has_kernel:
-            forces = packed_forces(self.size, self._block, driven.block)
+        self._block = np.concatenate((np.zeros(3 * self.size), loaded_vehicle.numbers))
+        mbs.SetObjectParameter(self.tree, "gravity", loaded_vehicle.gravity.tolist())
+        if loaded_vehicle.has_kernel:
+            forces = packed_forces(self.size, self._block, loaded_vehicle.block)
             mbs.SetObjectParameter(self.tree, "forceUserFunction", forces)
         node = next(iter(built.coordinate_nodes.values()))[0]
-        add_parts(built, node, driven.parts)
-        add_rotors(built, node, rotors(driven.vehicle))
-        for spring in driven.ground_springs:
+        add_parts(built, node, loaded_vehicle.parts)
+        add_rotors(built, node, rotors(loaded_vehicle.vehicle))
+        for spring in loaded_vehicle.ground_springs:
             add_ground_spring(built, spring)
-        for line in driven.line_springs:
+        for line in loaded_vehicle.line_springs:
             add_line_spring(built, line)
-        for load in driven.body_loads:
+        for load in loaded_vehicle.body_loads:
             add_body_load(built, load)
-        for turning in driven.turning_springs:
+        for turning in loaded_vehicle.turning_springs:
             add_turning_spring(built, turning)
         coordinates = CoordinateConnectors(built, node)
-        for friction in driven.frictions:
+        for friction in loaded_vehicle.frictions:
             coordinates.add_friction(friction)
-        for coupling in driven.couplings:
+        for coupling in loaded_vehicle.couplings:
             coordinates.add_coupling(coupling)
-        for connection in driven.connections:
+        for connection in loaded_vehicle.connections:
             add_connection(built, connection)
         self._sensors = add_state_sensors(mbs, [node])
         mbs.Assemble()

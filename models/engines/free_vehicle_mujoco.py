@@ -52,68 +52,68 @@ def mergeable_carriers(vehicle: SpatialVehicle) -> dict[str, str]:
     return only
 
 
-def specification_of(driven: Driven) -> mujoco.MjSpec:
+def specification_of(loaded_vehicle: Driven) -> mujoco.MjSpec:
     """MuJoCo specification with bodies, joints, springs and space for the callback's numbers, which ``compiled_from``
     fills in."""
-    spec = spec_of(driven.vehicle, 1e-3, _merged_bodies(driven))
-    add_parts(spec, driven.vehicle, driven.parts)
-    add_rotors(spec, driven.vehicle, rotors(driven.vehicle))
-    for spring in driven.ground_springs:
-        add_ground_spring(spec, driven.vehicle, spring)
-    for line in driven.line_springs:
-        add_line_spring(spec, driven.vehicle, line)
-    for load in driven.body_loads:
-        add_body_load(spec, driven.vehicle, load)
-    for turning in driven.turning_springs:
-        add_turning_spring(spec, driven.vehicle, turning)
-    add_constraints(spec, driven.vehicle, driven.frictions, driven.couplings)
-    for connection in driven.connections:
-        add_connection(spec, driven.vehicle, connection)
-    spec.option.gravity = driven.gravity
-    spec.add_numeric(name="vehicle", size=driven.numbers.size, data=[0.0])
+    spec = spec_of(loaded_vehicle.vehicle, 1e-3, _merged_bodies(loaded_vehicle))
+    add_parts(spec, loaded_vehicle.vehicle, loaded_vehicle.parts)
+    add_rotors(spec, loaded_vehicle.vehicle, rotors(loaded_vehicle.vehicle))
+    for spring in loaded_vehicle.ground_springs:
+        add_ground_spring(spec, loaded_vehicle.vehicle, spring)
+    for line in loaded_vehicle.line_springs:
+        add_line_spring(spec, loaded_vehicle.vehicle, line)
+    for load in loaded_vehicle.body_loads:
+        add_body_load(spec, loaded_vehicle.vehicle, load)
+    for turning in loaded_vehicle.turning_springs:
+        add_turning_spring(spec, loaded_vehicle.vehicle, turning)
+    add_constraints(spec, loaded_vehicle.vehicle, loaded_vehicle.frictions, loaded_vehicle.couplings)
+    for connection in loaded_vehicle.connections:
+        add_connection(spec, loaded_vehicle.vehicle, connection)
+    spec.option.gravity = loaded_vehicle.gravity
+    spec.add_numeric(name="vehicle", size=loaded_vehicle.numbers.size, data=[0.0])
     return spec
 
 
-def _merged_bodies(driven: Driven) -> dict[str, str]:
+def _merged_bodies(loaded_vehicle: Driven) -> dict[str, str]:
     """Bodies that are merged with the only body that they carry: those of ``mergeable_carriers`` at which no spring or
     constraint ends."""
-    end_bodies_of_springs = [body for line in driven.line_springs for body, _ in line.ends]
-    end_bodies_of_springs += [body for connection in driven.connections for body, _ in connection.ends]
-    end_bodies_of_springs += [body for each in driven.turning_springs for body in each.bodies]
-    end_bodies_of_springs += [load.body for load in driven.body_loads]
-    bearing = end_bodies(driven.parts) | {body for body in end_bodies_of_springs if body is not None}
-    return {name: rider for name, rider in mergeable_carriers(driven.vehicle).items() if name not in bearing}
+    end_bodies_of_springs = [body for line in loaded_vehicle.line_springs for body, _ in line.ends]
+    end_bodies_of_springs += [body for connection in loaded_vehicle.connections for body, _ in connection.ends]
+    end_bodies_of_springs += [body for each in loaded_vehicle.turning_springs for body in each.bodies]
+    end_bodies_of_springs += [load.body for load in loaded_vehicle.body_loads]
+    bearing = end_bodies(loaded_vehicle.parts) | {body for body in end_bodies_of_springs if body is not None}
+    return {name: rider for name, rider in mergeable_carriers(loaded_vehicle.vehicle).items() if name not in bearing}
 
 
-def compiled_from(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
+def compiled_from(mujoco_spec: mujoco.MjSpec, loaded_vehicle: Driven) -> mujoco.MjModel:
     """MuJoCo model compiled from the specification of ``specification_of``, with all its numbers but without the
     callback."""
-    model = spec.compile()
-    model.numeric_data[:] = driven.numbers
-    places = MujocoIndices(driven.vehicle, model, _merged_bodies(driven))
-    if not np.array_equal(places.columns, np.arange(driven.size)):
+    model = mujoco_spec.compile()
+    model.numeric_data[:] = loaded_vehicle.numbers
+    places = MujocoIndices(loaded_vehicle.vehicle, model, _merged_bodies(loaded_vehicle))
+    if not np.array_equal(places.columns, np.arange(loaded_vehicle.size)):
         raise ValueError("the bodies are not in the order of a walk through their tree")
     with without_warnings():  # a hinge with a ball joint of one body has no inertia but its rotor, which comes next
-        set_masses(model, places, driven.vehicle.bodies)
-    set_rotors(model, rotors(driven.vehicle))
-    if driven.tied or driven.frictions:  # how soft constraints are depends on all inertias
+        set_masses(model, places, loaded_vehicle.vehicle.bodies)
+    set_rotors(model, rotors(loaded_vehicle.vehicle))
+    if loaded_vehicle.tied or loaded_vehicle.frictions:  # how soft constraints are depends on all inertias
         model.dof_simplenum[:] = model.body_simple[:] = 0  # else rotors of slides would not count
         mujoco.mj_setConst(model, mujoco.MjData(model))
     keep_small_turns(model)  # last, since mj_setConst looks for them, too
-    set_laws(model, driven.parts)
-    set_line_springs(model, driven.line_springs)
+    set_laws(model, loaded_vehicle.parts)
+    set_line_springs(model, loaded_vehicle.line_springs)
     return model
 
 
-def compiled_model(driven: Driven) -> mujoco.MjModel:
+def compiled_model(loaded_vehicle: Driven) -> mujoco.MjModel:
     """Compiled MuJoCo model of a free vehicle with bodies, joints, springs and the callback's numbers, but without the
     callback."""
-    return compiled_from(specification_of(driven), driven)
+    return compiled_from(specification_of(loaded_vehicle), loaded_vehicle)
 
 
-def native_elements_and_joints(driven: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(loaded_vehicle: Driven) -> tuple[tuple[str, ...], int]:
     """Names of the elements that have a tendon or an actuator in the built model, and the number of its joints."""
-    model = compiled_model(driven)
+    model = compiled_model(loaded_vehicle)
     return built_elements(model), int(model.njnt)
 
 
@@ -122,11 +122,11 @@ class FreeMujoco(FreeModel):
 
     ENGINE = "mujoco"
 
-    def __init__(self, driven: Driven, settings: Settings | None = None) -> None:
-        self.driven, self.size, self.settings = driven, driven.size, settings
-        self.model = compiled_model(driven)
+    def __init__(self, loaded_vehicle: Driven, run_settings: Settings | None = None) -> None:
+        self.driven, self.size, self.settings = loaded_vehicle, loaded_vehicle.size, run_settings
+        self.model = compiled_model(loaded_vehicle)
         self.data = mujoco.MjData(self.model)
-        self.law = kernel_law(driven.kernel) if driven.has_kernel else None
+        self.law = kernel_law(loaded_vehicle.kernel) if loaded_vehicle.has_kernel else None
         self._marcher = Marcher(self.model)
         check_offsets(self.model, self.data)
 
@@ -136,9 +136,9 @@ class FreeMujoco(FreeModel):
         return self.model.numeric_data
 
     @contextmanager
-    def at_step(self, step: float) -> Iterator[None]:
-        """Context for a march in steps of ``step`` (s), in which the callback is installed."""
-        self.model.opt.timestep = step
+    def at_step(self, time_step: float) -> Iterator[None]:
+        """Context for a march in steps of ``time_step`` (s), in which the callback is installed."""
+        self.model.opt.timestep = time_step
         with installed(self.law):
             yield
 
@@ -181,7 +181,7 @@ class FreeMujoco(FreeModel):
         with installed(self.law):
             return np.vstack((start, self._marcher.run(start[None], steps)[0]))
 
-    def _stepped(self, q: np.ndarray, v: np.ndarray, step: float) -> np.ndarray:
+    def _stepped(self, q: np.ndarray, v: np.ndarray, time_step: float) -> np.ndarray:
         """State (2 n,) after one step (s), without the overhead of a loop; RunFailed where MuJoCo resets itself to time
         zero."""
         data = self.data
@@ -189,6 +189,6 @@ class FreeMujoco(FreeModel):
         with installed(self.law):
             mujoco.mj_step(self.model, data)
         after = np.concatenate((data.qpos, data.qvel))
-        if data.time < 0.5 * step or not np.isfinite(after).all():
+        if data.time < 0.5 * time_step or not np.isfinite(after).all():
             raise RunFailed("mujoco", GAVE_UP, data.time)
         return after

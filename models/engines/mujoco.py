@@ -32,18 +32,20 @@ INTEGRATORS = {
 """MuJoCo's number of each integrator."""
 
 
-def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
+def specification(
+    vehicle: Vehicle, run_settings: Settings, prescribed_coordinates: Collection[int] = ()
+) -> mujoco.MjSpec:
     """MuJoCo specification with bodies and joints of the vehicle, without joints for the prescribed coordinates
-    ``guided``, which stay at zero."""
+    ``prescribed_coordinates``, which stay at zero."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = [0, 0, vehicle.gravity]
-    spec.option.timestep = settings.step
-    spec.option.integrator = INTEGRATORS[settings.integrator]
+    spec.option.timestep = run_settings.step
+    spec.option.integrator = INTEGRATORS[run_settings.integrator]
     off = mujoco.mjtDisableBit
     spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
     places = {axle.wheel: axle.x for axle in vehicle.axles}
-    joints = {place for i, place in enumerate(vehicle.coordinates()) if i not in guided}
+    joints = {place for i, place in enumerate(vehicle.coordinates()) if i not in prescribed_coordinates}
     for body in vehicle.bodies:
         body_spec = spec.worldbody.add_body(
             name=body.name,
@@ -70,20 +72,22 @@ def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] 
     return spec
 
 
-def _add_suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set[tuple[str, str]]) -> None:
+def _add_suspension(
+    mujoco_spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, free_joints: set[tuple[str, str]]
+) -> None:
     """Add a suspension strut: as a fixed tendon with linear geometry, or as a site actuator with exact geometry."""
     if vehicle.geometry == "linear":
-        tendon = spec.add_tendon(name=strut.name, springlength=[0, 0])
+        tendon = mujoco_spec.add_tendon(name=strut.name, springlength=[0, 0])
         tendon.stiffness[0], tendon.damping[0] = strut.stiffness, strut.damping
         upper, lower = strut.upper.body, strut.lower.body
         arms = {(upper, "z"): 1.0, (lower, "z"): -1.0, (upper, "pitch"): -strut.upper.x}
         for (body, kind), arm in arms.items():
-            if (body, kind) in joints:
+            if (body, kind) in free_joints:
                 tendon.wrap_joint(f"{body} {kind}", arm)
         return
-    spec.body(strut.upper.body).add_site(name=f"{strut.name} upper", pos=[strut.upper.x, 0, 0])
-    spec.body(strut.lower.body).add_site(name=f"{strut.name} lower")
-    spec.add_actuator(
+    mujoco_spec.body(strut.upper.body).add_site(name=f"{strut.name} upper", pos=[strut.upper.x, 0, 0])
+    mujoco_spec.body(strut.lower.body).add_site(name=f"{strut.name} lower")
+    mujoco_spec.add_actuator(
         name=strut.name,
         target=f"{strut.name} upper",
         refsite=f"{strut.name} lower",
@@ -110,10 +114,10 @@ class ModelInput:
     tyres: tuple[float, ...] = ()
 
 
-def _model_input(assembly: Assembly, settings: Settings) -> ModelInput:
+def _model_input(assembly: Assembly, run_settings: Settings) -> ModelInput:
     """The model's input, with a callback where native items cannot apply it: for tables, forces that turn, and springs
     or tyres that lose contact."""
-    signal, h, n = assembly.input, settings.step, settings.steps
+    signal, h, n = assembly.input, run_settings.step, run_settings.steps
     slack = any(spring.dead_band for spring in assembly.vehicle.pitch_springs)
     slack = slack or any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
     held = signal.sample(0.0, h, n)[:, :2] if signal is not None and signal.held else None
@@ -141,33 +145,35 @@ def _model_input(assembly: Assembly, settings: Settings) -> ModelInput:
     return ModelInput(forces, held, None, table_law())
 
 
-def _generalised_forces(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
+def _generalised_forces(assembly: Assembly, input_rows: np.ndarray) -> np.ndarray:
     """Generalised forces (rows, 2 or 3) in N on the free heave coordinates that the input causes; motors apply forces
     that are held over a step."""
     if assembly.mode == "road":
         tyres = assembly.vehicle.tyres
-        pushes = [tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i] for i, tyre in enumerate(tyres)]
+        pushes = [
+            tyre.stiffness * input_rows[:, i] + tyre.damping * input_rows[:, 2 + i] for i, tyre in enumerate(tyres)
+        ]
         return np.column_stack(pushes)
     held = assembly.input is not None and assembly.input.held
-    forces = np.zeros((len(inputs), 2)) if held else -inputs[:, :2]
+    forces = np.zeros((len(input_rows), 2)) if held else -input_rows[:, :2]
     if not assembly.guided:
         return forces
-    guidance = _guidance_forces(assembly, inputs)
+    guidance = _guidance_forces(assembly, input_rows)
     guidance[:, :2] += forces
     return guidance
 
 
-def _guidance_forces(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
+def _guidance_forces(assembly: Assembly, input_rows: np.ndarray) -> np.ndarray:
     """Generalised forces (rows, 2 or 3) in N on the free heave coordinates that the prescribed coordinates cause
     through the struts."""
     count = len(assembly.guided)
-    path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
+    path, rate = (input_rows[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
     z, pitch, dz, turn = (
         (path[:, 0], path[:, 1], rate[:, 0], rate[:, 1]) if count == 2 else (0.0, path[:, 0], 0.0, rate[:, 0])
     )
     exact = assembly.vehicle.geometry == "exact"
     sine, cosine = (np.sin(pitch), np.cos(pitch)) if exact else (pitch, np.ones_like(pitch))
-    forces = np.zeros((len(inputs), 3))
+    forces = np.zeros((len(input_rows), 3))
     names = [body.name for body in assembly.vehicle.bodies]
     for strut in assembly.vehicle.struts:
         force = strut.stiffness * (z - strut.upper.x * sine) + strut.damping * (dz - strut.upper.x * turn * cosine)
@@ -177,11 +183,11 @@ def _guidance_forces(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 
 def _compiled_model(
-    assembly: Assembly, settings: Settings, model_input: ModelInput, guided: Collection[int] = ()
+    assembly: Assembly, run_settings: Settings, model_input: ModelInput, prescribed_coordinates: Collection[int] = ()
 ) -> mujoco.MjModel:
     """The compiled MuJoCo model. Its numeric data hold the input table, after the numbers that ``mujoco_callback``
     reads."""
-    spec = specification(assembly.vehicle, settings, guided)
+    spec = specification(assembly.vehicle, run_settings, prescribed_coordinates)
     gear = 0.0 if model_input.arms is not None else -1.0
     for axle in (
         assembly.vehicle.axles if model_input.controls is not None else ()
@@ -200,7 +206,7 @@ def _compiled_model(
     motors = len(spec.actuators) - 2 if model_input.controls is not None else -1
     slack = [spring for spring in assembly.vehicle.pitch_springs if spring.dead_band]
     springs = [value for spring in slack for value in (spring.stiffness, spring.damping, spring.dead_band)]
-    header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms, len(springs), *springs]
+    header = [2.0 / run_settings.step, table.shape[1], len(table), motors, *arms, len(springs), *springs]
     content = np.concatenate((header, model_input.tyres, table.ravel()))
     spec.add_numeric(name="input", size=len(content), data=[0.0])
     model = spec.compile()
@@ -212,16 +218,16 @@ class MujocoModel:
     """Model of one pitch-plane assembly in MuJoCo; a second model, with all joints, computes the force and moment of a
     prescribed motion."""
 
-    def __init__(self, assembly: Assembly, settings: Settings) -> None:
-        self.assembly, self.settings = assembly, settings
+    def __init__(self, assembly: Assembly, run_settings: Settings) -> None:
+        self.assembly, self.settings = assembly, run_settings
         self.signal: Any = assembly.input
         self.guided = list(assembly.guided)
         self.free = [i for i in range(4) if i not in self.guided]
-        self.drive = _model_input(assembly, settings)
+        self.drive = _model_input(assembly, run_settings)
         for table in (self.drive.table, self.drive.controls):  # the discrete integrator skips a force that is no number
             if table is not None and not np.isfinite(table).all():
                 raise RunFailed("mujoco", "the input holds an infinite value or one that is not a number")
-        self.model = _compiled_model(assembly, settings, self.drive, self.guided)
+        self.model = _compiled_model(assembly, run_settings, self.drive, self.guided)
         self.data = mujoco.MjData(self.model)
         if self.drive.law is not None:
             from models.engines.mujoco_layout import check_offsets
@@ -241,7 +247,7 @@ class MujocoModel:
         guard("mujoco", times, states, self.settings.duration)
         check_landings("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
-        guard("mujoco", times, states, self.settings.duration, enforced=enforced)
+        guard("mujoco", times, states, self.settings.duration, enforcing_forces=enforced)
         calls = n * FORCE_CALLS.get(self.settings.integrator, 1)
         return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
@@ -263,12 +269,12 @@ class MujocoModel:
             out[self.guided] = self.signal.at(time)[-len(self.guided) :]
         return out
 
-    def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step: int) -> np.ndarray:
+    def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step_index: int) -> np.ndarray:
         """Accelerations of the coordinates that are not prescribed, at a time (s) and state within a given step of the
         run."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q[self.free], v[self.free]
         if self.drive.controls is not None:
-            self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]
+            self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step_index, len(self.drive.controls) - 1)]
         mujoco.mj_forward(self.model, self.data)
         return self.data.qacc
 
@@ -300,6 +306,6 @@ class MujocoModel:
         return {"degrees of freedom": self.model.nv, "native items": native, "callbacks": law}
 
 
-def build(assembly: Assembly, settings: Settings) -> MujocoModel:
+def build(assembly: Assembly, run_settings: Settings) -> MujocoModel:
     """The MuJoCo model of a pitch-plane assembly."""
-    return MujocoModel(assembly, settings)
+    return MujocoModel(assembly, run_settings)

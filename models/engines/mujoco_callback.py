@@ -36,7 +36,7 @@ would know the machine code again."""
 
 
 @cache
-def kernel_law(kernel: Any) -> Any:
+def kernel_law(force_kernel: Any) -> Any:
     """MuJoCo callback that passes MuJoCo's data to a compiled kernel of (numbers, time, positions, rates, forces).
 
     All but the time (s) are pointers to doubles, the numbers those of the model. It is kept on disk if the kernel is.
@@ -52,19 +52,21 @@ def kernel_law(kernel: Any) -> Any:
             array_at(data, passive),
         )
 
-    of_kernel = FunctionType(law.__code__, globals() | {"forces": kernel}, "law", None, law.__closure__)
-    if kernel.stats.cache_path is None:
+    of_kernel = FunctionType(law.__code__, globals() | {"forces": force_kernel}, "law", None, law.__closure__)
+    if force_kernel.stats.cache_path is None:
         return cfunc(CALLBACK)(of_kernel)
-    return callback(named_closure(of_kernel, kernel.__module__.replace(".", "_"), kernel.__name__), CALLBACK)
+    return callback(
+        named_closure(of_kernel, force_kernel.__module__.replace(".", "_"), force_kernel.__name__), CALLBACK
+    )
 
 
 @register_jitable
-def _springs(header, force, pitch, rate):
+def _springs(table_header, pitch_forces, pitch, pitch_rate):
     """Add the moments (N m) of the pitch springs whose dead band the pitch exceeds."""
-    for i in range(HEADER, HEADER + int(header[6]), 3):
-        beyond = abs(pitch[3]) - header[i + 2]
+    for i in range(HEADER, HEADER + int(table_header[6]), 3):
+        beyond = abs(pitch[3]) - table_header[i + 2]
         if beyond >= 0.0:
-            force[3] -= header[i] * np.copysign(beyond, pitch[3]) + header[i + 1] * rate[3]
+            pitch_forces[3] -= table_header[i] * np.copysign(beyond, pitch[3]) + table_header[i + 1] * pitch_rate[3]
 
 
 @cache

@@ -30,14 +30,14 @@ DIGITS = 17
 """Number of digits from which every double is read back exactly."""
 
 
-def add_shapes(spec: mujoco.MjSpec, masses: Mapping[str, float]) -> None:
+def add_shapes(mujoco_spec: mujoco.MjSpec, shown_masses: Mapping[str, float]) -> None:
     """Add a box without contact and mass to bodies of a specification, so that they are seen; masses (kg) by body set
     the sizes."""
-    spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [0.5, 0.5, 0.5]
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    for i, (name, mass) in enumerate(masses.items()):
+    mujoco_spec.visual.headlight.ambient = mujoco_spec.visual.headlight.diffuse = [0.5, 0.5, 0.5]
+    mujoco_spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    for i, (name, mass) in enumerate(shown_masses.items()):
         half = max(LEAST_HALF_WIDTH, 0.5 * (mass / SHAPE_DENSITY) ** (1 / 3))
-        spec.body(name).add_geom(
+        mujoco_spec.body(name).add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=[1.6 * half, 0.8 * half, 0.6 * half],
             rgba=SHAPE_COLOURS[i % len(SHAPE_COLOURS)],
@@ -47,36 +47,41 @@ def add_shapes(spec: mujoco.MjSpec, masses: Mapping[str, float]) -> None:
         )
 
 
-def mjcf(spec: mujoco.MjSpec, model: mujoco.MjModel, names: Mapping[str, str], title: str, comment: str) -> str:
+def mjcf(
+    mujoco_spec: mujoco.MjSpec,
+    mujoco_model: mujoco.MjModel,
+    names_in_file: Mapping[str, str],
+    model_title: str,
+    head_comment: str,
+) -> str:
     """Text of an MJCF file with the structure of a specification and the numbers of the model compiled from it.
 
-    names : what bodies and joints are called in the file, by their names in the specification; title : of the model;
-    comment : for people, at its head.
-    """
-    _make_readable(model)
-    spec.copy_back(model)
-    spec.modelname = title
+    names_in_file : what bodies and joints are called in the file, by their names in the specification; model_title : of
+    the model; head_comment : for people, at its head."""
+    _make_readable(mujoco_model)
+    mujoco_spec.copy_back(mujoco_model)
+    mujoco_spec.modelname = model_title
     with _all_digits():
-        root = ElementTree.fromstring(spec.to_xml())
+        root = ElementTree.fromstring(mujoco_spec.to_xml())
     for numbers in root.findall("custom"):  # which twinrig's callback reads
         root.remove(numbers)
     for element in root.iter():
         for key in ("name", "joint") if element.tag == "joint" else ("name",) if element.tag == "body" else ():
             if (value := element.get(key)) is not None:
-                element.set(key, names.get(value, value))
+                element.set(key, names_in_file.get(value, value))
     ElementTree.indent(root)
-    note = comment.replace("--", "- -")
+    note = head_comment.replace("--", "- -")
     return f"<!--\n{note}\n-->\n{ElementTree.tostring(root, encoding='unicode')}\n"
 
 
-def _make_readable(model: mujoco.MjModel) -> None:
+def _make_readable(mujoco_model: mujoco.MjModel) -> None:
     """Change the numbers of a model that MuJoCo's compiler would refuse or read with another meaning."""
-    model.body_mass[1:] = np.maximum(model.body_mass[1:], LEAST_MASS)
-    model.body_inertia[1:] = np.maximum(model.body_inertia[1:], LEAST_MASS)
-    idle = (model.actuator_gainprm[:, 0] == 0.0) & (model.actuator_biasprm[:, 1] == 0.0)
-    model.actuator_gainprm[idle & (model.actuator_biasprm[:, 2] > 0.0), 0] = IDLE_GAIN
-    unset = model.tendon_lengthspring == UNSET_SPRING_LENGTH
-    model.tendon_lengthspring[unset] = np.nextafter(UNSET_SPRING_LENGTH, 0.0)
+    mujoco_model.body_mass[1:] = np.maximum(mujoco_model.body_mass[1:], LEAST_MASS)
+    mujoco_model.body_inertia[1:] = np.maximum(mujoco_model.body_inertia[1:], LEAST_MASS)
+    idle = (mujoco_model.actuator_gainprm[:, 0] == 0.0) & (mujoco_model.actuator_biasprm[:, 1] == 0.0)
+    mujoco_model.actuator_gainprm[idle & (mujoco_model.actuator_biasprm[:, 2] > 0.0), 0] = IDLE_GAIN
+    unset = mujoco_model.tendon_lengthspring == UNSET_SPRING_LENGTH
+    mujoco_model.tendon_lengthspring[unset] = np.nextafter(UNSET_SPRING_LENGTH, 0.0)
 
 
 @contextmanager
@@ -91,7 +96,12 @@ def _all_digits() -> Iterator[None]:
         library._mjPRIVATE__set_xml_precision(before)
 
 
-def item_counts(model: mujoco.MjModel) -> Sequence[str]:
+def item_counts(mujoco_model: mujoco.MjModel) -> Sequence[str]:
     """Texts with the numbers of bodies, joints, tendons and actuators in a MuJoCo model."""
-    kinds = (("bodies", model.nbody - 1), ("joints", model.njnt), ("tendons", model.ntendon), ("actuators", model.nu))
+    kinds = (
+        ("bodies", mujoco_model.nbody - 1),
+        ("joints", mujoco_model.njnt),
+        ("tendons", mujoco_model.ntendon),
+        ("actuators", mujoco_model.nu),
+    )
     return [f"{count} {kind}" for kind, count in kinds if count]

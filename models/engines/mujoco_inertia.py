@@ -31,28 +31,30 @@ def realisable(vehicle: SpatialVehicle) -> tuple[SpatialVehicle, list[str]]:
     return replace(vehicle, bodies=bodies), [sentence for sentence in lowered if sentence]
 
 
-def _is_physical(tensor: np.ndarray) -> bool:
+def _is_physical(inertia_tensor: np.ndarray) -> bool:
     """Whether a mass distribution can have this inertia tensor (3, 3); zero inertia counts, too."""
-    least, middle, largest = np.linalg.eigvalsh(tensor)
+    least, middle, largest = np.linalg.eigvalsh(inertia_tensor)
     return bool(least >= 0.0 and least + middle >= (1.0 + MARGIN) * largest)
 
 
-def _replace_by_equivalent(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarray]) -> None:
+def _replace_by_equivalent(vehicle: SpatialVehicle, body: Body, inertia_tensors: dict[str, np.ndarray]) -> None:
     """Replace an inertia tensor by one with the same motion, which is possible for bodies that turn about one axis at
     most, and for rotors.
 
     A rotor is as heavy about every axis across its axle: what is added there is constant in the axes of its carrier,
     and is taken from the heaviest body that always lies parallel to these.
     """
-    tensor = tensors[body.name]
+    tensor = inertia_tensors[body.name]
     axes = {turn for name in vehicle.chain(body.name) for turn in _turning_freedoms(vehicle.body(name))}
     if len(axes) <= 1:
         place = "xyz".index(axes.pop()[1]) if axes else 0
-        tensors[body.name] = float(tensor[place, place]) * np.eye(3)
+        inertia_tensors[body.name] = float(tensor[place, place]) * np.eye(3)
     elif len(_turning_freedoms(body)) == 1 and np.count_nonzero(tensor) == 1 and body.parent is not None:
         across = (0.5 + MARGIN) * (tensor.max() * np.eye(3) - tensor)
-        tensors[body.name] = tensor + across
-        tensors[max(_parallel_bodies(vehicle, body.parent), key=lambda name: float(np.trace(tensors[name])))] -= across
+        inertia_tensors[body.name] = tensor + across
+        inertia_tensors[
+            max(_parallel_bodies(vehicle, body.parent), key=lambda name: float(np.trace(inertia_tensors[name])))
+        ] -= across
 
 
 def _turning_freedoms(body: Body) -> list[str]:
@@ -60,34 +62,34 @@ def _turning_freedoms(body: Body) -> list[str]:
     return [freedom for freedom in body.freedoms if freedom.startswith("r")]
 
 
-def _parallel_bodies(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
-    """Names of the bodies whose axes always remain parallel to those of ``name``."""
+def _parallel_bodies(vehicle: SpatialVehicle, body_name: str) -> Sequence[str]:
+    """Names of the bodies whose axes always remain parallel to those of ``body_name``."""
 
-    def turning_ancestor(name: str) -> str:
-        body = vehicle.body(name)
-        return name if _turning_freedoms(body) or body.parent is None else turning_ancestor(body.parent)
+    def turning_ancestor(body_name: str) -> str:
+        body = vehicle.body(body_name)
+        return body_name if _turning_freedoms(body) or body.parent is None else turning_ancestor(body.parent)
 
-    return [body.name for body in vehicle.bodies if turning_ancestor(body.name) == turning_ancestor(name)]
+    return [body.name for body in vehicle.bodies if turning_ancestor(body.name) == turning_ancestor(body_name)]
 
 
-def _lower_largest_moment(name: str, tensors: dict[str, np.ndarray]) -> str:
+def _lower_largest_moment(body_name: str, inertia_tensors: dict[str, np.ndarray]) -> str:
     """Lower the largest principal moment of inertia of a body to one that a mass distribution can have. Returns a
     sentence on the change, empty where it is only rounding."""
-    moments, axes = np.linalg.eigh(tensors[name])
+    moments, axes = np.linalg.eigh(inertia_tensors[body_name])
     largest, axis = float(moments[2]), axes[:, 2]
     moments = np.maximum(moments, 0.0)
     moments[2] = (moments[0] + moments[1]) / (1.0 + 2.0 * MARGIN)
-    tensors[name] = axes * moments @ axes.T
+    inertia_tensors[body_name] = axes * moments @ axes.T
     if largest - moments[2] < REPORTED_SHARE * largest:
         return ""
     where = ", ".join(f"{part:.3g}" for part in axis)
     return (
-        f"{largest - moments[2]:.4g} kg m^2 of the inertia of {name!r} about its axis ({where}), which is "
+        f"{largest - moments[2]:.4g} kg m^2 of the inertia of {body_name!r} about its axis ({where}), which is "
         f"{largest:.6g} kg m^2: no distribution of mass has that beside the two other moments, and MuJoCo refuses it"
     )
 
 
-def _rows(tensor: np.ndarray) -> tuple[Vector, Vector, Vector]:
+def _rows(inertia_tensor: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """The rows of a tensor (3, 3) as tuples."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = tensor.tolist()
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia_tensor.tolist()
     return (xx, xy, xz), (yx, yy, yz), (zx, zy, zz)

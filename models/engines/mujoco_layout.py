@@ -27,49 +27,52 @@ _SCALARS = {
 """C type of each scalar type that MuJoCo's description names."""
 
 
-def _ctype(node: ast_nodes.ValueType | ast_nodes.PointerType | ast_nodes.ArrayType) -> type:
+def _ctype(field_type: ast_nodes.ValueType | ast_nodes.PointerType | ast_nodes.ArrayType) -> type:
     """C type (``ctypes``) of a field in MuJoCo's description of its structures."""
-    if isinstance(node, ast_nodes.PointerType):
+    if isinstance(field_type, ast_nodes.PointerType):
         return ctypes.c_void_p
-    if isinstance(node, ast_nodes.ArrayType):
-        kind = _ctype(node.inner_type)
-        for extent in reversed(node.extents):
+    if isinstance(field_type, ast_nodes.ArrayType):
+        kind = _ctype(field_type.inner_type)
+        for extent in reversed(field_type.extents):
             kind = kind * extent
         return kind
-    if isinstance(node, ast_nodes.AnonymousStructDecl):
-        return _structure(node.fields)
-    if node.name in structs.STRUCTS:
-        return layout(node.name)
-    if node.name in enums.ENUMS:
+    if isinstance(field_type, ast_nodes.AnonymousStructDecl):
+        return _structure(field_type.fields)
+    if field_type.name in structs.STRUCTS:
+        return layout(field_type.name)
+    if field_type.name in enums.ENUMS:
         return ctypes.c_int
-    return _SCALARS[node.name]
+    return _SCALARS[field_type.name]
 
 
-def _structure(fields: tuple) -> type:
+def _structure(structure_fields: tuple) -> type:
     """``ctypes.Structure`` with these fields of MuJoCo's description."""
-    pairs = [(field.name, _ctype(field.type)) for field in fields]
+    pairs = [(field.name, _ctype(field.type)) for field in structure_fields]
     return type("Layout", (ctypes.Structure,), {"_fields_": pairs})
 
 
 @cache
-def layout(name: str) -> type:
+def layout(structure_name: str) -> type:
     """``ctypes.Structure`` of a MuJoCo structure, for example ``mjData``."""
-    return _structure(structs.STRUCTS[name].fields)
+    return _structure(structs.STRUCTS[structure_name].fields)
 
 
-def offset(structure: str, field: str) -> int:
+def offset(structure_name: str, field_name: str) -> int:
     """Offset (bytes) of a field within a MuJoCo structure."""
-    return getattr(layout(structure), field).offset
+    return getattr(layout(structure_name), field_name).offset
 
 
-def offsets(*fields: str) -> list[int]:
+def offsets(*field_names: str) -> list[int]:
     """Offsets (bytes) of fields by their names: ``numeric_data`` within MuJoCo's model, all others within its data."""
-    return [offset("mjModel" if field == "numeric_data" else "mjData", field) for field in fields]
+    return [offset("mjModel" if field == "numeric_data" else "mjData", field) for field in field_names]
 
 
-def check_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def check_offsets(mujoco_model: mujoco.MjModel, mujoco_data: mujoco.MjData) -> None:
     """Compare computed offsets with the addresses of MuJoCo's arrays in Python; raises RuntimeError on a mismatch."""
-    arrays = (("mjModel", model, ("numeric_data", "qpos0")), ("mjData", data, ("qfrc_passive", "qvel", "qpos")))
+    arrays = (
+        ("mjModel", mujoco_model, ("numeric_data", "qpos0")),
+        ("mjData", mujoco_data, ("qfrc_passive", "qvel", "qpos")),
+    )
     for structure, owner, fields in arrays:
         for field in fields:
             pointer = ctypes.c_void_p.from_address(owner._address + offset(structure, field))

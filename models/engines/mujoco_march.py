@@ -19,54 +19,56 @@ GAVE_UP = "the engine gave up, since the motion grew without bound: shorten the 
 """Failure message of a run in which MuJoCo reset itself to time zero."""
 
 
-def warning_text(data: mujoco.MjData) -> str:
+def warning_text(mujoco_data: mujoco.MjData) -> str:
     """Text that lists MuJoCo's own warnings; empty if there are none."""
-    names = [mujoco.mjtWarning(i).name for i in range(len(data.warning)) if data.warning[i].number]
+    names = [mujoco.mjtWarning(i).name for i in range(len(mujoco_data.warning)) if mujoco_data.warning[i].number]
     return f"; MuJoCo warned {', '.join(names)}" if names else ""
 
 
-def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, controls: np.ndarray) -> np.ndarray:
-    """Positions and rates (steps + 1, 2 n) from the state ``start`` (2 n,), with controls (steps, nu) held over each
-    step, or without controls (steps, 0).
+def march(
+    mujoco_model: mujoco.MjModel, mujoco_data: mujoco.MjData, start_state: np.ndarray, controls: np.ndarray
+) -> np.ndarray:
+    """Positions and rates (steps + 1, 2 n) from the state ``start_state`` (2 n,), with controls (steps, nu) held over
+    each step, or without controls (steps, 0).
 
     In chunks, so that a run that has failed is not carried to its end. RunFailed where MuJoCo stops, starts again at
     time zero or warns; the guard names a worse reason if there is one.
     """
-    steps, step = len(controls), model.opt.timestep
-    path, times = np.empty((steps + 1, 1 + start.size)), step * np.arange(steps + 1)
-    path[0, 0], path[0, 1:] = 0.0, start
-    for warning in data.warning:
+    steps, step = len(controls), mujoco_model.opt.timestep
+    path, times = np.empty((steps + 1, 1 + start_state.size)), step * np.arange(steps + 1)
+    path[0, 0], path[0, 1:] = 0.0, start_state
+    for warning in mujoco_data.warning:
         warning.number = 0
-    with without_warnings(), simulation_progress(lambda: data.time / times[-1]):
+    with without_warnings(), simulation_progress(lambda: mujoco_data.time / times[-1]):
         for first, last in _chunks(steps):
             rows, held = path[first + 1 : last + 1], controls[None, first:last] if controls.size else None
-            rollout.rollout(model, data, path[None, first], held, nstep=len(rows), state=rows[None])
+            rollout.rollout(mujoco_model, mujoco_data, path[None, first], held, nstep=len(rows), state=rows[None])
             late = np.abs(rows[:, 0] - times[first + 1 : last + 1]) > 1e-6 * times[-1]
-            if late.any() or warning_text(data):
+            if late.any() or warning_text(mujoco_data):
                 end = first + (int(np.argmax(late)) if late.any() else len(rows))
                 guard("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
-                raise RunFailed("mujoco", f"{GAVE_UP}{warning_text(data)}", times[end], path[end, 1:])
+                raise RunFailed("mujoco", f"{GAVE_UP}{warning_text(mujoco_data)}", times[end], path[end, 1:])
     return path[:, 1:]
 
 
-def _chunks(steps: int) -> Iterator[tuple[int, int]]:
+def _chunks(step_count: int) -> Iterator[tuple[int, int]]:
     """First and last row of each chunk of a run."""
-    for first in range(0, steps, STEPS_PER_CHUNK):
-        yield first, min(first + STEPS_PER_CHUNK, steps)
+    for first in range(0, step_count, STEPS_PER_CHUNK):
+        yield first, min(first + STEPS_PER_CHUNK, step_count)
 
 
 class Marcher:
     """Runner of one MuJoCo model, in one thread or several."""
 
-    def __init__(self, compiled_model: mujoco.MjModel, threads: int = 1) -> None:
-        self.model, self._data = compiled_model, [mujoco.MjData(compiled_model) for _ in range(threads)]
+    def __init__(self, compiled_model: mujoco.MjModel, thread_count: int = 1) -> None:
+        self.model, self._data = compiled_model, [mujoco.MjData(compiled_model) for _ in range(thread_count)]
 
-    def run(self, states: np.ndarray, steps: int) -> np.ndarray:
-        """States (n, steps, 2 m) of n runs that start at ``states`` (n, 2 m); RunFailed unless all are finite."""
-        whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
-        with simulation_progress(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
-            path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
-        late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
+    def run(self, start_states: np.ndarray, step_count: int) -> np.ndarray:
+        """States (n, steps, 2 m) of n runs that start at ``start_states`` (n, 2 m); RunFailed unless all are finite."""
+        whole = np.concatenate((np.zeros((len(start_states), 1)), start_states), axis=1)
+        with simulation_progress(lambda: self._data[0].time / (step_count * self.model.opt.timestep)):
+            path = rollout.rollout(self.model, self._data, whole, nstep=step_count)[0][..., : 1 + 2 * self.model.nv]
+        late = path[:, -1, 0] < (step_count - 0.5) * self.model.opt.timestep
         failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up
         if failed.any():
             failed_path = path[int(failed.argmax())]

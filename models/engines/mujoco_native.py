@@ -60,44 +60,44 @@ def _library() -> ctypes.CDLL:
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco*"))))
 
 
-def native(model: "mujoco.MjModel", data: "mujoco.MjData") -> Native:
+def native(mujoco_model: "mujoco.MjModel", mujoco_data: "mujoco.MjData") -> Native:
     """``Native`` of a MuJoCo model and its data, for compiled functions; both must outlive the result."""
     from models.engines.mujoco_layout import offset
 
-    time = ctypes.c_double.from_address(data._address + offset("mjData", "time"))
+    time = ctypes.c_double.from_address(mujoco_data._address + offset("mjData", "time"))
     forward, step = (
         ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0 for name in ("mj_forward", "mj_step")
     )
     return Native(
-        data.qpos,
-        data.qvel,
-        data.qacc,
+        mujoco_data.qpos,
+        mujoco_data.qvel,
+        mujoco_data.qacc,
         np.ctypeslib.as_array(ctypes.pointer(time), (1,)),
         forward,
         step,
-        model._address,
-        data._address,
+        mujoco_model._address,
+        mujoco_data._address,
     )
 
 
 @lean
-def accelerate(native, q, v, out):
-    """Fill ``out`` (n,) with the accelerations at positions q and rates v (n,)."""
+def accelerate(native_model, q, v, accelerations):
+    """Fill ``accelerations`` (n,) with the accelerations at positions q and rates v (n,)."""
     for i in range(q.size):
-        native.place[i], native.rate[i] = q[i], v[i]
-    _call(native.forward, native.model, native.data)
+        native_model.place[i], native_model.rate[i] = q[i], v[i]
+    _call(native_model.forward, native_model.model, native_model.data)
     for i in range(q.size):
-        out[i] = native.acceleration[i]
+        accelerations[i] = native_model.acceleration[i]
 
 
 @lean
-def march(native, q, v):
+def march(native_model, q, v):
     """Advance positions q and rates v (n,), in place, by one step of the MuJoCo model; returns False where MuJoCo
     resets itself to time zero."""
     for i in range(q.size):
-        native.place[i], native.rate[i] = q[i], v[i]
-    native.time[0] = 1.0
-    _call(native.step, native.model, native.data)
+        native_model.place[i], native_model.rate[i] = q[i], v[i]
+    native_model.time[0] = 1.0
+    _call(native_model.step, native_model.model, native_model.data)
     for i in range(q.size):
-        q[i], v[i] = native.place[i], native.rate[i]
-    return native.time[0] > 1.0
+        q[i], v[i] = native_model.place[i], native_model.rate[i]
+    return native_model.time[0] > 1.0

@@ -22,7 +22,7 @@ def without_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def installed(callback: Any) -> Iterator[None]:
+def installed(compiled_callback: Any) -> Iterator[None]:
     """Context in which a compiled MuJoCo callback, or none, is installed: MuJoCo's callbacks are global to the process.
 
     Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it. RunFailed where another one is.
@@ -30,10 +30,10 @@ def installed(callback: Any) -> Iterator[None]:
     if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
         raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
     with without_warnings():
-        if callback is None:
+        if compiled_callback is None:
             yield
             return
-        mujoco.set_mjcb_passive(callback.ctypes)
+        mujoco.set_mjcb_passive(compiled_callback.ctypes)
         try:
             yield
         finally:

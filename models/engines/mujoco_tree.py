@@ -19,22 +19,23 @@ NO_CARRIERS: Mapping[str, str] = {}
 """Merged bodies (name of the carrier to name of the carried body) of a vehicle in which none are merged."""
 
 
-def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NO_CARRIERS) -> mujoco.MjSpec:
+def spec_of(
+    vehicle: SpatialVehicle, time_step: float, merged_carriers: Mapping[str, str] = NO_CARRIERS
+) -> mujoco.MjSpec:
     """MuJoCo specification with the vehicle's bodies and joints; masses and inertias are 1 until ``set_masses`` sets
     them.
 
-    Their names are numbers: a user's body may be called "world". carriers : bodies that are one with the only one that
-    rides on them, whose frame and name they get.
-    """
+    Their names are numbers: a user's body may be called "world". merged_carriers : bodies that are merged with the
+    only body that they carry, whose frame and name they get."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = [0, 0, -vehicle.gravity]
-    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.timestep, spec.option.integrator = time_step, mujoco.mjtIntegrator.mjINT_RK4
     off = mujoco.mjtDisableBit
     spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
-    for body in (body for body in vehicle.bodies if body.name not in carriers):
-        joined = [part for part in vehicle.bodies if _merged(carriers, part.name) == body.name]
+    for body in (body for body in vehicle.bodies if body.name not in merged_carriers):
+        joined = [part for part in vehicle.bodies if _merged(merged_carriers, part.name) == body.name]
         parent = joined[0].parent
         below = spec.worldbody if parent is None else spec.body(numbers[parent])
         built = below.add_body(
@@ -56,11 +57,11 @@ def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = 
     return spec
 
 
-def _merged(carriers: Mapping[str, str], name: str) -> str:
+def _merged(merged_carriers: Mapping[str, str], body_name: str) -> str:
     """Name of the body with which a body is merged in MuJoCo; the body itself if it is not merged."""
-    while name in carriers:
-        name = carriers[name]
-    return name
+    while body_name in merged_carriers:
+        body_name = merged_carriers[body_name]
+    return body_name
 
 
 def principal_inertias(body: Body) -> tuple[np.ndarray, np.ndarray]:
@@ -83,30 +84,34 @@ class MujocoIndices:
     """
 
     def __init__(
-        self, vehicle: SpatialVehicle, model: mujoco.MjModel, carriers: Mapping[str, str] = NO_CARRIERS
+        self, vehicle: SpatialVehicle, mujoco_model: mujoco.MjModel, merged_carriers: Mapping[str, str] = NO_CARRIERS
     ) -> None:
         order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
-        self.bodies = {name: int(model.body(order[_merged(carriers, name)]).id) for name in order}
+        self.bodies = {name: int(mujoco_model.body(order[_merged(merged_carriers, name)]).id) for name in order}
         self.joints: dict[tuple[str, str], int] = {
-            (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()
+            (name, freedom): int(mujoco_model.joint(f"{order[name]} {freedom}").id)
+            for name, freedom in vehicle.coordinates()
         }
         self.columns = np.array(list(self.joints.values()))
 
 
-def keep_small_turns(model: mujoco.MjModel) -> None:
+def keep_small_turns(mujoco_model: mujoco.MjModel) -> None:
     """Make MuJoCo apply rotations and offsets of inertia and site frames that nearly coincide with the body's frame;
     its compiler ignores them, which moves a link on angles of ten digits by 1e-9."""
     for part, place in (("body", "ipos"), ("site", "pos")):
-        same = getattr(model, f"{part}_sameframe")
-        turn, shift = getattr(model, f"{part}_{'i' * (part == 'body')}quat"), getattr(model, f"{part}_{place}")
+        same = getattr(mujoco_model, f"{part}_sameframe")
+        turn, shift = (
+            getattr(mujoco_model, f"{part}_{'i' * (part == 'body')}quat"),
+            getattr(mujoco_model, f"{part}_{place}"),
+        )
         same[turn[:, 1:].any(axis=1) | (shift.any(axis=1) & (same != mujoco.mjtSameFrame.mjSAMEFRAME_BODYROT))] = 0
 
 
-def set_masses(model: mujoco.MjModel, indices: MujocoIndices, bodies: Iterable[Body]) -> None:
+def set_masses(mujoco_model: mujoco.MjModel, mujoco_indices: MujocoIndices, bodies: Iterable[Body]) -> None:
     """Set masses and principal inertias in a MuJoCo model; merged bodies get the sum."""
-    model.body_mass[1:] = model.body_inertia[1:] = 0.0
+    mujoco_model.body_mass[1:] = mujoco_model.body_inertia[1:] = 0.0
     for body in bodies:
-        number = indices.bodies[body.name]
-        model.body_mass[number] += body.mass
-        model.body_inertia[number] += principal_inertias(body)[0]
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+        number = mujoco_indices.bodies[body.name]
+        mujoco_model.body_mass[number] += body.mass
+        mujoco_model.body_inertia[number] += principal_inertias(body)[0]
+    mujoco.mj_setConst(mujoco_model, mujoco.MjData(mujoco_model))

@@ -42,10 +42,14 @@ LAW_PREFIX, ROTOR_PREFIX, NAME_SEPARATOR = "native law: ", "rotors: ", "; "
 name."""
 
 
-def add_parts(build: TreeBuild, node: Any, parts: Sequence[NativePart]) -> None:
-    """Add all native parts to an Exudyn system with one tree, whose coordinates are in ``node``."""
-    coordinates, trees, axial = CoordinateConnectors(build, node), _Trees(build, node), list[Axial]()
-    for part in parts:
+def add_parts(tree_build: TreeBuild, exudyn_node: Any, native_parts: Sequence[NativePart]) -> None:
+    """Add all native parts to an Exudyn system with one tree, whose coordinates are in ``exudyn_node``."""
+    coordinates, trees, axial = (
+        CoordinateConnectors(tree_build, exudyn_node),
+        _Trees(tree_build, exudyn_node),
+        list[Axial](),
+    )
+    for part in native_parts:
         if isinstance(part.travel, CoordinateTravel):
             coordinates.add(part.element, part.travel)
         else:
@@ -54,9 +58,9 @@ def add_parts(build: TreeBuild, node: Any, parts: Sequence[NativePart]) -> None:
         trees.add(group)
 
 
-def add_rotors(build: TreeBuild, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+def add_rotors(tree_build: TreeBuild, exudyn_node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
     """Add inertias (kg, kg m^2) that move with sums of coordinates, as one mass matrix in addition to the tree's."""
-    size = build.size(node)
+    size = tree_build.size(exudyn_node)
     mass = np.zeros((size, size))
     for _, travel, inertia in rotors:
         row = np.zeros(size)
@@ -66,73 +70,79 @@ def add_rotors(build: TreeBuild, node: Any, rotors: Sequence[tuple[str, Coordina
         names = ROTOR_PREFIX + NAME_SEPARATOR.join(_without_separator(name) for name, _, _ in rotors)
         nothing = np.zeros((size, size))
         matrices = {"massMatrix": mass, "stiffnessMatrix": nothing, "dampingMatrix": nothing}
-        build.mbs.AddObject(
-            items.ObjectGenericODE2(name=names, nodeNumbers=[node], forceVector=np.zeros(size), **matrices)
+        tree_build.mbs.AddObject(
+            items.ObjectGenericODE2(name=names, nodeNumbers=[exudyn_node], forceVector=np.zeros(size), **matrices)
         )
 
 
-def add_ground_spring(build: TreeBuild, spring: GroundSpring) -> None:
+def add_ground_spring(tree_build: TreeBuild, ground_spring: GroundSpring) -> None:
     """Add a spring-damper between the ground and a body's point along the axes of space, and the load at this point."""
-    foot, tip = build.marker(None, spring.anchor), build.marker(spring.body, spring.point)
-    if any(spring.stiffness + spring.damping):
-        build.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
-    if np.any(spring.load):
-        build.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
+    foot, tip = (
+        tree_build.marker(None, ground_spring.anchor),
+        tree_build.marker(ground_spring.body, ground_spring.point),
+    )
+    if any(ground_spring.stiffness + ground_spring.damping):
+        tree_build.spring(foot, tip, stiffness=ground_spring.stiffness, damping=ground_spring.damping)
+    if np.any(ground_spring.load):
+        tree_build.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=ground_spring.load))
 
 
-def add_line_spring(build: TreeBuild, spring: LineSpring) -> None:
+def add_line_spring(tree_build: TreeBuild, line_spring: LineSpring) -> None:
     """Add a spring-damper along the line between two points. Exudyn needs a free length above 0; a constant force
     compensates for it."""
-    length = spring.length if spring.length > 0.0 else 1.0
-    build.mbs.AddObject(
+    length = line_spring.length if line_spring.length > 0.0 else 1.0
+    tree_build.mbs.AddObject(
         items.SpringDamper(
-            markerNumbers=[build.marker(*end) for end in spring.ends],
+            markerNumbers=[tree_build.marker(*end) for end in line_spring.ends],
             referenceLength=length,
-            stiffness=spring.stiffness,
-            damping=spring.damping,
-            force=spring.stiffness * (length - spring.length),
+            stiffness=line_spring.stiffness,
+            damping=line_spring.damping,
+            force=line_spring.stiffness * (length - line_spring.length),
         )
     )
 
 
-def add_body_load(build: TreeBuild, load: BodyLoad) -> None:
+def add_body_load(tree_build: TreeBuild, body_load: BodyLoad) -> None:
     """Add a force and a moment that turn with a body."""
-    marker, axes = build.marker(load.body, load.point, True), {"bodyFixed": True}
-    force, moment = (build.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
+    marker, axes = tree_build.marker(body_load.body, body_load.point, True), {"bodyFixed": True}
+    force, moment = (tree_build.in_body_axes(body_load.body, vector) for vector in (body_load.force, body_load.moment))
     if force.any():
-        build.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=force, **axes))
+        tree_build.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=force, **axes))
     if moment.any():
-        build.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
+        tree_build.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
 
 
-def add_turning_spring(build: TreeBuild, spring: TurningSpring) -> None:
+def add_turning_spring(tree_build: TreeBuild, turning_spring: TurningSpring) -> None:
     """Add a rotational spring-damper between frames of two bodies; it measures the rotation as a vector, not by
     angles."""
-    ends = zip(spring.bodies, spring.axes, strict=True)
-    places = {body: (0.0, 0.0, 0.0) if body is None else build.vehicle.body(body).position for body in spring.bodies}
+    ends = zip(turning_spring.bodies, turning_spring.axes, strict=True)
+    places = {
+        body: (0.0, 0.0, 0.0) if body is None else tree_build.vehicle.body(body).position
+        for body in turning_spring.bodies
+    }
     turning = np.diag((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
-    build.mbs.AddObject(
+    tree_build.mbs.AddObject(
         items.RigidBodySpringDamper(
-            markerNumbers=[build.frame_marker(body, places[body], axes) for body, axes in ends],
-            stiffness=spring.stiffness * turning,
-            damping=spring.damping * turning,
+            markerNumbers=[tree_build.frame_marker(body, places[body], axes) for body, axes in ends],
+            stiffness=turning_spring.stiffness * turning,
+            damping=turning_spring.damping * turning,
             useIntrinsicFormulation=True,
         )
     )
 
 
-def add_connection(build: TreeBuild, connection: Connection) -> None:
+def add_connection(tree_build: TreeBuild, connection: Connection) -> None:
     """Add a spherical joint between points of two bodies, or a rigid joint between frames of both."""
     if connection.axes is None:
-        markers = [build.marker(*end) for end in connection.ends]
-        build.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
+        markers = [tree_build.marker(*end) for end in connection.ends]
+        tree_build.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
         return
     ends = zip(connection.ends, connection.axes, strict=True)
-    markers = [build.frame_marker(*end, axes) for end, axes in ends]
-    build.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[1] * 6))
+    markers = [tree_build.frame_marker(*end, axes) for end, axes in ends]
+    tree_build.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[1] * 6))
 
 
-def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
+def built_elements(mbs: Any, element_names: Sequence[str]) -> tuple[str, ...]:
     """Names of the given elements for which an assembled Exudyn system has an object."""
     objects = [mbs.GetObject(i)["name"] for i in range(mbs.systemData.NumberOfObjects())]
     listed = {
@@ -141,24 +151,24 @@ def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
         if each.startswith(LAW_PREFIX)
         for name in each.removeprefix(LAW_PREFIX).split(NAME_SEPARATOR)
     }
-    return tuple(name for name in elements if _without_separator(name) in listed)
+    return tuple(name for name in element_names if _without_separator(name) in listed)
 
 
-def _object_name(*elements: Element) -> str:
+def _object_name(*element_names: Element) -> str:
     """Name of the Exudyn object that represents these elements."""
-    return LAW_PREFIX + NAME_SEPARATOR.join(_without_separator(element.name) for element in elements)
+    return LAW_PREFIX + NAME_SEPARATOR.join(_without_separator(element.name) for element in element_names)
 
 
-def _without_separator(name: str) -> str:
+def _without_separator(element_name: str) -> str:
     """An element's name without the separator that stands between names."""
-    return name.replace(NAME_SEPARATOR, " ")
+    return element_name.replace(NAME_SEPARATOR, " ")
 
 
-def _groups_at_one_place(parts: Sequence[Axial]) -> list[list[Axial]]:
+def _groups_at_one_place(native_parts: Sequence[Axial]) -> list[list[Axial]]:
     """Groups of parts that one connector can represent: along different axes x, y, z at the same points. Every other
     part is a group by itself."""
     groups = dict[object, list[Axial]]()
-    for i, (element, travel) in enumerate(parts):
+    for i, (element, travel) in enumerate(native_parts):
         places = (travel.frame, travel.body, *travel.foot, *travel.tip)
         key: object = places if np.count_nonzero(travel.axis) == 1 else i
         if any(np.any(travel.axis * other.axis) for _, other in groups.get(key, ())):
@@ -177,34 +187,34 @@ def _preload_travel(element: Element) -> float:
     return element.preload / element.stiffness if element.stiffness else 0.0
 
 
-def _connector_law(group: Sequence[Axial]) -> dict[str, Any]:
+def _connector_law(axial_parts: Sequence[Axial]) -> dict[str, Any]:
     """Name, stiffness, damping and offset (3,) of one connector for parts along different axes; a part's axis may point
     backwards."""
     stiffness, damping, offset = np.zeros((3, 3))
-    for element, travel in group:
+    for element, travel in axial_parts:
         stiffness += element.stiffness * travel.axis**2
         damping += element.damping * travel.axis**2
         offset += (travel.design - _preload_travel(element)) * travel.axis
-    names = _object_name(*(element for element, _ in group))
+    names = _object_name(*(element for element, _ in axial_parts))
     return {"name": names, "stiffness": stiffness, "damping": damping, "offset": offset}
 
 
 class CoordinateConnectors:
     """Builder of connectors and constraints between coordinates of one Exudyn node."""
 
-    def __init__(self, build: TreeBuild, node: Any) -> None:
-        self.built, self.node, self.markers = build, node, dict[int, Any]()
+    def __init__(self, tree_build: TreeBuild, exudyn_node: Any) -> None:
+        self.built, self.node, self.markers = tree_build, exudyn_node, dict[int, Any]()
 
-    def add(self, element: Element, travel: CoordinateTravel) -> None:
+    def add(self, element: Element, coordinate_travel: CoordinateTravel) -> None:
         """Add one connector for an element, or a matrix object where more than two coordinates take part."""
-        if len(travel.coordinates) > 2:
-            return self._add_matrix(element, travel)
-        if not travel.coordinates:
+        if len(coordinate_travel.coordinates) > 2:
+            return self._add_matrix(element, coordinate_travel)
+        if not coordinate_travel.coordinates:
             return
         if element.preload and not element.stiffness:
-            self._add_loads(element, travel)
-        first, *others = [self._marker(i) for i in travel.coordinates]
-        factor, *rest = travel.factors
+            self._add_loads(element, coordinate_travel)
+        first, *others = [self._marker(i) for i in coordinate_travel.coordinates]
+        factor, *rest = coordinate_travel.factors
         other, against = (others[0], -rest[0]) if others else (self._ground_marker(), 1.0)
         self.built.mbs.AddObject(
             items.CoordinateSpringDamperExt(
@@ -235,16 +245,16 @@ class CoordinateConnectors:
             items.CoordinateConstraint(markerNumbers=markers, factor1=coupling.ratio, offset=-coupling.offset)
         )
 
-    def _add_loads(self, element: Element, travel: CoordinateTravel) -> None:
+    def _add_loads(self, element: Element, coordinate_travel: CoordinateTravel) -> None:
         """Add the constant force of an element as loads, since a spring without stiffness has none."""
-        for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
+        for coordinate, factor in zip(coordinate_travel.coordinates, coordinate_travel.factors, strict=True):
             load = items.LoadCoordinate(markerNumber=self._marker(coordinate), load=-factor * element.preload)
             self.built.mbs.AddLoad(load)
 
-    def _add_matrix(self, element: Element, travel: CoordinateTravel) -> None:
+    def _add_matrix(self, element: Element, coordinate_travel: CoordinateTravel) -> None:
         """Add an element whose travel is a sum of more than two coordinates, as a stiffness and damping matrix."""
         row = np.zeros(self.built.size(self.node))
-        row[list(travel.coordinates)] = travel.factors
+        row[list(coordinate_travel.coordinates)] = coordinate_travel.factors
         self.built.mbs.AddObject(
             items.ObjectGenericODE2(
                 name=_object_name(element),
@@ -256,11 +266,11 @@ class CoordinateConnectors:
             )
         )
 
-    def _marker(self, coordinate: int) -> Any:
+    def _marker(self, coordinate_index: int) -> Any:
         """Marker of a coordinate, made once."""
-        if coordinate not in self.markers:
-            self.markers[coordinate] = self.built.coordinate(self.node, coordinate)
-        return self.markers[coordinate]
+        if coordinate_index not in self.markers:
+            self.markers[coordinate_index] = self.built.coordinate(self.node, coordinate_index)
+        return self.markers[coordinate_index]
 
     def _ground_marker(self) -> Any:
         """Marker of a coordinate that is fixed to the ground, made once."""
@@ -273,12 +283,12 @@ class _Trees:
     """Additional trees of links, one for each body in which axes of connectors are fixed, and connectors from the
     ground to them."""
 
-    def __init__(self, build: TreeBuild, node: Any) -> None:
-        self.built, self.node, self.trees = build, node, dict[str, Any]()
+    def __init__(self, tree_build: TreeBuild, exudyn_node: Any) -> None:
+        self.built, self.node, self.trees = tree_build, exudyn_node, dict[str, Any]()
 
-    def add(self, group: Sequence[Axial]) -> None:
+    def add(self, axial_parts: Sequence[Axial]) -> None:
         """Add one connector for a group of parts, from the foot's position on the ground to the tip."""
-        (element, travel), *others = group
+        (element, travel), *others = axial_parts
         mbs, (link, origin) = self.built.mbs, last_coordinate_and_joint(self.built.vehicle, travel.body)
         foot = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.built.ground, localPosition=travel.foot.tolist()))
         tip = mbs.AddMarker(
@@ -289,7 +299,7 @@ class _Trees:
             )
         )
         if others or np.count_nonzero(travel.axis) == 1:
-            mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[foot, tip], **_connector_law(group)))
+            mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[foot, tip], **_connector_law(axial_parts)))
             return
         mbs.AddObject(
             items.LinearSpringDamper(
@@ -301,21 +311,21 @@ class _Trees:
             )
         )
 
-    def _tree(self, frame: str) -> Any:
+    def _tree(self, frame_body: str) -> Any:
         """Tree of the links that a body carries, attached to the ground where the body is in the design position; made
         once per body."""
-        if frame not in self.trees:
-            self.trees[frame] = self.built.mbs.AddObject(self._new_tree(frame))
-        return self.trees[frame]
+        if frame_body not in self.trees:
+            self.trees[frame_body] = self.built.mbs.AddObject(self._new_tree(frame_body))
+        return self.trees[frame_body]
 
-    def _new_tree(self, frame: str) -> Any:
+    def _new_tree(self, frame_body: str) -> Any:
         """Exudyn item of the tree of links that a body carries."""
         vehicle = self.built.vehicle
         rows, places = joints(vehicle), vehicle.coordinates()
         parents, offsets = rows[:, 1].astype(int), rows[:, 2:].copy()
         for i, (name, _) in enumerate(places):
-            carried = frame in vehicle.chain(name)[1:]
-            if not carried or (vehicle.body(name).parent == frame and places[i - 1][0] != name):
+            carried = frame_body in vehicle.chain(name)[1:]
+            if not carried or (vehicle.body(name).parent == frame_body and places[i - 1][0] != name):
                 parents[i], offsets[i] = -1, vehicle.body(name).position
         count = len(places)
         return items.ObjectKinematicTree(

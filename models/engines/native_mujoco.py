@@ -54,110 +54,110 @@ class AffineForce(NamedTuple):
     high: float = UNLIMITED_FORCE
 
 
-def end_bodies(parts: Sequence[NativePart]) -> set[str]:
+def end_bodies(native_parts: Sequence[NativePart]) -> set[str]:
     """Names of bodies that carry sites of the parts, so that MuJoCo must not merge them with the bodies that they
     carry."""
-    axial = [part.travel for part in parts if isinstance(part.travel, AxialTravel)]
+    axial = [part.travel for part in native_parts if isinstance(part.travel, AxialTravel)]
     return {name for travel in axial for name in (travel.frame, travel.body)}
 
 
-def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[NativePart]) -> None:
+def add_parts(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, native_parts: Sequence[NativePart]) -> None:
     """Add tendons, sites and actuators for native parts to a specification of ``mujoco_tree.spec_of``; ``set_laws``
     sets their values."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
-    for i, part in enumerate(parts):
+    for i, part in enumerate(native_parts):
         travel, name = part.travel, f"{i}{NAME_SEPARATOR}{part.element.name}"
         if isinstance(travel, CoordinateTravel):
-            tendon = spec.add_tendon(name=name)
+            tendon = mujoco_spec.add_tendon(name=name)
             for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
                 tendon.wrap_joint(joints[coordinate], factor)
             of = {"trntype": mujoco.mjtTrn.mjTRN_TENDON, "target": name}
         else:
             for end, body, place in (("foot", travel.frame, travel.foot), ("tip", travel.body, travel.tip)):
-                spec.body(numbers[body]).add_site(name=f"{end} {i}", pos=place - vehicle.body(body).position)
+                mujoco_spec.body(numbers[body]).add_site(name=f"{end} {i}", pos=place - vehicle.body(body).position)
             of = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": f"tip {i}", "refsite": f"foot {i}"}
             of["gear"] = [*travel.axis, 0.0, 0.0, 0.0]
         for k, _ in enumerate(affine_forces(part)):
-            actuator = spec.add_actuator(name=f"{i}.{k}{NAME_SEPARATOR}{part.element.name}", **of)
+            actuator = mujoco_spec.add_actuator(name=f"{i}.{k}{NAME_SEPARATOR}{part.element.name}", **of)
             actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
 
 
 def add_rotors(
-    spec: mujoco.MjSpec, vehicle: SpatialVehicle, rotors: Sequence[tuple[str, CoordinateTravel, float]]
+    mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, rotors: Sequence[tuple[str, CoordinateTravel, float]]
 ) -> None:
     """Add tendons for inertias along sums of coordinates to a specification; ``set_rotors`` sets their values."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for i, (name, travel, _) in enumerate(rotors):
-        tendon = spec.add_tendon(name=f"{ROTOR_PREFIX}{i}{NAME_SEPARATOR}{name}")
+        tendon = mujoco_spec.add_tendon(name=f"{ROTOR_PREFIX}{i}{NAME_SEPARATOR}{name}")
         for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
             tendon.wrap_joint(joints[coordinate], factor)
 
 
-def set_rotors(model: mujoco.MjModel, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+def set_rotors(mujoco_model: mujoco.MjModel, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
     """Write the inertias (kg, kg m^2) along sums of coordinates into the compiled MuJoCo model."""
     for i, (name, _, inertia) in enumerate(rotors):
-        model.tendon_armature[model.tendon(f"{ROTOR_PREFIX}{i}{NAME_SEPARATOR}{name}").id] = inertia
+        mujoco_model.tendon_armature[mujoco_model.tendon(f"{ROTOR_PREFIX}{i}{NAME_SEPARATOR}{name}").id] = inertia
 
 
-def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:
+def add_ground_spring(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, ground_spring: GroundSpring) -> None:
     """Add an actuator along each axis of space in which a ground spring acts, between sites on the body and on the
     ground."""
-    number = len(spec.sites)
+    number = len(mujoco_spec.sites)
     tip, foot = f"ground spring {number}", f"ground {number}"
-    _add_site(spec, vehicle, tip, spring.body, spring.point)
-    _add_site(spec, vehicle, foot, None, spring.anchor)
-    for i, load in enumerate(spring.load):
-        if spring.stiffness[i] or spring.damping[i] or load:
-            strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
+    _add_site(mujoco_spec, vehicle, tip, ground_spring.body, ground_spring.point)
+    _add_site(mujoco_spec, vehicle, foot, None, ground_spring.anchor)
+    for i, load in enumerate(ground_spring.load):
+        if ground_spring.stiffness[i] or ground_spring.damping[i] or load:
+            strut = mujoco_spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
             strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[i], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
-            strut.biasprm[:3] = load, -spring.stiffness[i], -spring.damping[i]
+            strut.biasprm[:3] = load, -ground_spring.stiffness[i], -ground_spring.damping[i]
 
 
-def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSpring) -> None:
+def add_line_spring(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, line_spring: LineSpring) -> None:
     """Add a spatial tendon between two sites; ``set_line_springs`` sets its stiffness, damping and length."""
-    number, tendon = len(spec.sites), spec.add_tendon(name=f"{LINE_SPRING_PREFIX}{spring.name}")
-    for i, end in enumerate(spring.ends):
+    number, tendon = len(mujoco_spec.sites), mujoco_spec.add_tendon(name=f"{LINE_SPRING_PREFIX}{line_spring.name}")
+    for i, end in enumerate(line_spring.ends):
         site = f"end {number + i}"
-        _add_site(spec, vehicle, site, *end)
+        _add_site(mujoco_spec, vehicle, site, *end)
         tendon.wrap_site(site)
 
 
 def add_constraints(
-    spec: mujoco.MjSpec, vehicle: SpatialVehicle, frictions: Sequence[DryFriction], couplings: Sequence[Coupling]
+    mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, frictions: Sequence[DryFriction], couplings: Sequence[Coupling]
 ) -> None:
     """Add dry friction of joints, and equality constraints between joints; MuJoCo makes both soft."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for friction in frictions:
-        joint = spec.joint(joints[friction.coordinate])
+        joint = mujoco_spec.joint(joints[friction.coordinate])
         joint.frictionloss = friction.force
         joint.solref_friction[:], joint.solimp_friction[:] = friction.solref, friction.solimp
     for coupling in couplings:
-        equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joints[coupling.driven])
+        equality = mujoco_spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joints[coupling.driven])
         if coupling.driver is not None:
             equality.name2 = joints[coupling.driver]
         equality.data[:2] = coupling.offset, coupling.ratio
         equality.solref[:], equality.solimp[:] = coupling.solref, coupling.solimp
     if frictions or couplings:
-        _allow_constraints(spec)
+        _allow_constraints(mujoco_spec)
 
 
-def _allow_constraints(spec: mujoco.MjSpec) -> None:
+def _allow_constraints(mujoco_spec: mujoco.MjSpec) -> None:
     """Switch MuJoCo's constraint solver on, with a tight tolerance."""
-    spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    spec.option.tolerance = SOLVER_TOLERANCE
+    mujoco_spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    mujoco_spec.option.tolerance = SOLVER_TOLERANCE
 
 
-def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Connection) -> None:
+def add_connection(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Connection) -> None:
     """Add a soft equality constraint between two sites: of their positions, or of their positions and axes."""
     axes = connection.axes or (np.eye(3), np.eye(3))
-    first = len(spec.sites)
+    first = len(mujoco_spec.sites)
     for i, ((body, point), columns) in enumerate(zip(connection.ends, axes, strict=True)):
-        _add_site(spec, vehicle, f"joint {first + i}", body, point).quat = _quaternion(columns)
+        _add_site(mujoco_spec, vehicle, f"joint {first + i}", body, point).quat = _quaternion(columns)
     kinds, turns = mujoco.mjtEq, connection.axes is not None
-    equality = spec.add_equality(
+    equality = mujoco_spec.add_equality(
         type=kinds.mjEQ_WELD if turns else kinds.mjEQ_CONNECT,
         objtype=mujoco.mjtObj.mjOBJ_SITE,
         name1=f"joint {first}",
@@ -165,30 +165,34 @@ def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Con
     )
     equality.data[10] = connection.torque_scale
     equality.solref[:], equality.solimp[:] = connection.solref, connection.solimp
-    _allow_constraints(spec)
+    _allow_constraints(mujoco_spec)
 
 
-def add_body_load(spec: mujoco.MjSpec, vehicle: SpatialVehicle, load: BodyLoad) -> None:
+def add_body_load(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, body_load: BodyLoad) -> None:
     """Add an actuator that applies a constant force and moment at a site of a body and turns with it."""
-    site = f"load {len(spec.sites)}"
-    _add_site(spec, vehicle, site, load.body, load.point)
-    push = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=site)
-    push.gear[:], push.gainprm[0], push.biastype = (*load.force, *load.moment), 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+    site = f"load {len(mujoco_spec.sites)}"
+    _add_site(mujoco_spec, vehicle, site, body_load.body, body_load.point)
+    push = mujoco_spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=site)
+    push.gear[:], push.gainprm[0], push.biastype = (
+        (*body_load.force, *body_load.moment),
+        0.0,
+        mujoco.mjtBias.mjBIAS_AFFINE,
+    )
     push.biasprm[0] = 1.0
 
 
-def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: TurningSpring) -> None:
+def add_turning_spring(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, turning_spring: TurningSpring) -> None:
     """Add an actuator about each axis of a site on the first body; its length is the rotation vector's component along
     this axis."""
-    number = len(spec.sites)
+    number = len(mujoco_spec.sites)
     foot, tip = f"turn {number}", f"turn {number + 1}"
-    for name, body, axes in zip((foot, tip), spring.bodies, spring.axes, strict=True):
+    for name, body, axes in zip((foot, tip), turning_spring.bodies, turning_spring.axes, strict=True):
         place = (0.0, 0.0, 0.0) if body is None else vehicle.body(body).position
-        _add_site(spec, vehicle, name, body, place).quat = _quaternion(axes)
+        _add_site(mujoco_spec, vehicle, name, body, place).quat = _quaternion(axes)
     for gear in np.eye(6)[3:]:
-        twist = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
+        twist = mujoco_spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
         twist.gear[:], twist.gainprm[0], twist.biastype = gear, 0.0, mujoco.mjtBias.mjBIAS_AFFINE
-        twist.biasprm[1:3] = -spring.stiffness, -spring.damping
+        twist.biasprm[1:3] = -turning_spring.stiffness, -turning_spring.damping
 
 
 def _quaternion(axes: np.ndarray) -> np.ndarray:
@@ -198,53 +202,63 @@ def _quaternion(axes: np.ndarray) -> np.ndarray:
     return quaternion
 
 
-def _add_site(spec: mujoco.MjSpec, vehicle: SpatialVehicle, name: str, body: str | None, point: Vector) -> Any:
+def _add_site(
+    mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, site_name: str, body: str | None, point: Vector
+) -> Any:
     """Add a site to a body (None: the ground) at a point (m) of the design position."""
     if body is None:
-        return spec.worldbody.add_site(name=name, pos=point)
+        return mujoco_spec.worldbody.add_site(name=site_name, pos=point)
     number = [each.name for each in vehicle.bodies].index(body)
-    return spec.body(str(number)).add_site(name=name, pos=np.subtract(point, vehicle.body(body).position))
+    return mujoco_spec.body(str(number)).add_site(name=site_name, pos=np.subtract(point, vehicle.body(body).position))
 
 
-def set_line_springs(model: mujoco.MjModel, springs: Sequence[LineSpring]) -> None:
+def set_line_springs(mujoco_model: mujoco.MjModel, line_springs: Sequence[LineSpring]) -> None:
     """Write stiffness, damping and free length of the line springs into the compiled MuJoCo model."""
-    for spring in springs:
-        tendon = model.tendon(f"{LINE_SPRING_PREFIX}{spring.name}").id
-        model.tendon_stiffness[tendon], model.tendon_damping[tendon] = spring.stiffness, spring.damping
-        model.tendon_lengthspring[tendon] = spring.length
+    for spring in line_springs:
+        tendon = mujoco_model.tendon(f"{LINE_SPRING_PREFIX}{spring.name}").id
+        mujoco_model.tendon_stiffness[tendon], mujoco_model.tendon_damping[tendon] = spring.stiffness, spring.damping
+        mujoco_model.tendon_lengthspring[tendon] = spring.length
 
 
-def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:
+def set_laws(mujoco_model: mujoco.MjModel, native_parts: Sequence[NativePart]) -> None:
     """Write stiffness, damping, preload and curves of all native parts into the compiled MuJoCo model."""
-    model.actuator_gainprm[:] = 0.0
-    for i, part in enumerate(parts):
+    mujoco_model.actuator_gainprm[:] = 0.0
+    for i, part in enumerate(native_parts):
         element = part.element
         if isinstance(part.travel, CoordinateTravel):
-            tendon = model.tendon(f"{i}{NAME_SEPARATOR}{element.name}").id
-            model.tendon_stiffness[tendon], model.tendon_damping[tendon] = element.stiffness, element.damping
-            model.tendon_lengthspring[tendon] = -element.preload / element.stiffness if element.stiffness else 0.0
+            tendon = mujoco_model.tendon(f"{i}{NAME_SEPARATOR}{element.name}").id
+            mujoco_model.tendon_stiffness[tendon], mujoco_model.tendon_damping[tendon] = (
+                element.stiffness,
+                element.damping,
+            )
+            mujoco_model.tendon_lengthspring[tendon] = (
+                -element.preload / element.stiffness if element.stiffness else 0.0
+            )
         for k, force in enumerate(affine_forces(part)):
-            actuator = model.actuator(f"{i}.{k}{NAME_SEPARATOR}{element.name}").id
-            model.actuator_biasprm[actuator, :3] = force[:3]
-            model.actuator_forcelimited[actuator] = (force.low, force.high) != (-UNLIMITED_FORCE, UNLIMITED_FORCE)
-            model.actuator_forcerange[actuator] = force.low, force.high
+            actuator = mujoco_model.actuator(f"{i}.{k}{NAME_SEPARATOR}{element.name}").id
+            mujoco_model.actuator_biasprm[actuator, :3] = force[:3]
+            mujoco_model.actuator_forcelimited[actuator] = (force.low, force.high) != (
+                -UNLIMITED_FORCE,
+                UNLIMITED_FORCE,
+            )
+            mujoco_model.actuator_forcerange[actuator] = force.low, force.high
 
 
-def built_elements(model: mujoco.MjModel) -> tuple[str, ...]:
+def built_elements(mujoco_model: mujoco.MjModel) -> tuple[str, ...]:
     """Names of the elements that have a tendon or an actuator in a MuJoCo model, each once."""
-    tendons = [model.tendon(i).name for i in range(model.ntendon)]
-    actuators = [model.actuator(i).name for i in range(model.nu)]
+    tendons = [mujoco_model.tendon(i).name for i in range(mujoco_model.ntendon)]
+    actuators = [mujoco_model.actuator(i).name for i in range(mujoco_model.nu)]
     return tuple(dict.fromkeys(name.split(NAME_SEPARATOR, 1)[1] for name in (*tendons, *actuators)))
 
 
-def affine_forces(part: NativePart) -> list[AffineForce]:
+def affine_forces(native_part: NativePart) -> list[AffineForce]:
     """Forces of actuators on the length L of a part, beyond the force of the tendon's own spring, with d = L less its
     design value.
 
     They draw it together: where the element presses with F, they are -F.
     """
-    axial, e = isinstance(part.travel, AxialTravel), part.element
-    design = part.travel.design if isinstance(part.travel, AxialTravel) else 0.0
+    axial, e = isinstance(native_part.travel, AxialTravel), native_part.element
+    design = native_part.travel.design if isinstance(native_part.travel, AxialTravel) else 0.0
     stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
     preload = e.preload if axial or not e.stiffness else 0.0
     line = np.array([preload, stiffness, damping]) + sum(_first_pieces(e), np.zeros(3))
@@ -263,10 +277,11 @@ def _first_pieces(element: Element) -> Iterator[np.ndarray]:
             yield line
 
 
-def _corner_forces(curve: Curve | None, place: int) -> Iterator[AffineForce]:
-    """Force -bend max(x - corner, 0) for every corner of a curve; x is the travel if ``place`` is 1, its rate if 2."""
-    _, _, corners, bends = curve.hinges() if curve else (0.0, 0.0, (), ())
+def _corner_forces(force_curve: Curve | None, length_or_rate_index: int) -> Iterator[AffineForce]:
+    """Force -bend max(x - corner, 0) for every corner of a curve; x is the travel if ``length_or_rate_index`` is 1, its
+    rate if 2."""
+    _, _, corners, bends = force_curve.hinges() if force_curve else (0.0, 0.0, (), ())
     for corner, bend in zip(corners, bends, strict=True):
         low, high = (-UNLIMITED_FORCE, 0.0) if bend > 0.0 else (0.0, UNLIMITED_FORCE)
-        slope, damping = (-bend, 0.0) if place == 1 else (0.0, -bend)
+        slope, damping = (-bend, 0.0) if length_or_rate_index == 1 else (0.0, -bend)
         yield AffineForce(bend * corner, slope, damping, low, high)

@@ -193,11 +193,11 @@ class Division:
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
+def divide(vehicle_tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
     """Division of the elements of a vehicle's tree between an engine ("exudyn" or "mujoco") and the compiled forces."""
     native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
     for element in elements:
-        travel = travel_of(tree, element)
+        travel = travel_of(vehicle_tree, element)
         still = isinstance(travel, CoordinateTravel) and not travel.coordinates
         if travel is None or still:
             shared.append(element)
@@ -249,24 +249,30 @@ def rotors(vehicle: SpatialVehicle) -> list[tuple[str, CoordinateTravel, float]]
     ]
 
 
-def _coordinate_numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple[int, ...]:
+def _coordinate_numbers(vehicle: SpatialVehicle, joint_element: JointElement) -> tuple[int, ...]:
     """Numbers, in the tree's order, of the coordinates of a joint element."""
     places = {place: i for i, place in enumerate(vehicle.coordinates())}
-    return tuple(places[place] for place in element.coordinates)
+    return tuple(places[place] for place in joint_element.coordinates)
 
 
-def _joint_force(element: JointElement) -> Element:
+def _joint_force(joint_element: JointElement) -> Element:
     """The force law of a joint element, as an element without points."""
-    still, gains = np.zeros(3), (element.stiffness, element.damping, element.preload)
-    return Element(element.name, "", "", still, still, still, *gains, frame="")
+    still, gains = np.zeros(3), (joint_element.stiffness, joint_element.damping, joint_element.preload)
+    return Element(joint_element.name, "", "", still, still, still, *gains, frame="")
 
 
-def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
+def travel_of(vehicle_tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
     """The travel of an element in a form that an engine may have, along coordinates or along an axis; None if it has
     neither form."""
-    first, two = (_bodies_up_to_frame(tree, end, element.frame) for end in (element.first_body, element.second_body))
-    if first is not None and two is not None and not any(_turns_on_carrier(tree, body) for body in (*first, *two)):
-        return _along_coordinates(tree, element, first, two)
+    first, two = (
+        _bodies_up_to_frame(vehicle_tree, end, element.frame) for end in (element.first_body, element.second_body)
+    )
+    if (
+        first is not None
+        and two is not None
+        and not any(_turns_on_carrier(vehicle_tree, body) for body in (*first, *two))
+    ):
+        return _along_coordinates(vehicle_tree, element, first, two)
     if element.frame == element.second_body and first is not None:
         return AxialTravel(
             element.second_body, element.second_point, element.first_body, element.first_point, -element.axis
@@ -278,26 +284,26 @@ def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | Axia
     return None
 
 
-def _turns_on_carrier(tree: SpatialVehicle, body: str) -> bool:
+def _turns_on_carrier(vehicle_tree: SpatialVehicle, body: str) -> bool:
     """Whether a body can turn relative to the body that carries it."""
-    return any(freedom.startswith("r") for freedom in tree.body(body).freedoms)
+    return any(freedom.startswith("r") for freedom in vehicle_tree.body(body).freedoms)
 
 
-def _bodies_up_to_frame(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | None:
-    """The bodies in the chain from ``body`` to the one carried directly by ``frame``; None where the frame does not
-    carry the body."""
-    chain = tree.chain(body)
-    return chain[: chain.index(frame)] if frame in chain else None
+def _bodies_up_to_frame(vehicle_tree: SpatialVehicle, body: str, frame_body: str) -> tuple[str, ...] | None:
+    """The bodies in the chain from ``body`` to the one carried directly by ``frame_body``; None where the frame does
+    not carry the body."""
+    chain = vehicle_tree.chain(body)
+    return chain[: chain.index(frame_body)] if frame_body in chain else None
 
 
 def _along_coordinates(
-    tree: SpatialVehicle, element: Element, first: tuple[str, ...], second: tuple[str, ...]
+    vehicle_tree: SpatialVehicle, element: Element, first_chain: tuple[str, ...], second_chain: tuple[str, ...]
 ) -> CoordinateTravel:
     """Travel along the sliding coordinates of the bodies between the frame and either end; slides that move both ends
     cancel."""
     factors = dict[int, float]()
-    for number, (body, freedom) in enumerate(tree.coordinates()):
-        ends = int(body in second) - int(body in first)
+    for number, (body, freedom) in enumerate(vehicle_tree.coordinates()):
+        ends = int(body in second_chain) - int(body in first_chain)
         if factor := ends * float(element.axis[FREEDOMS.index(freedom) % 3]):
             factors[number] = factor
     return CoordinateTravel(tuple(factors), tuple(factors.values()))

@@ -41,14 +41,14 @@ HIGHEST_ORDER = 20
 """Largest order of convergence that an outside integrator may claim."""
 
 
-def register(name: str) -> None:
+def register(engine_name: str) -> None:
     """Import the class that ``module:Class`` names and add it to the catalogue; raises InputError if it cannot be
     used."""
-    outside_class = _outside_class(name)
+    outside_class = _outside_class(engine_name)
     order = getattr(outside_class, "order", None)
     if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= HIGHEST_ORDER:
         raise _unusable_engine(
-            name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST_ORDER}"
+            engine_name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST_ORDER}"
         )
     integrates = callable(getattr(outside_class, "integrate", None))
     missing = (
@@ -58,72 +58,83 @@ def register(name: str) -> None:
     )
     if missing:
         raise _unusable_engine(
-            name,
+            engine_name,
             f"has no {' and no '.join(missing)}(): an engine has run() and acceleration(time, "
             "state), an integrator has integrate(f, times, start, tolerance)",
         )
     constrained = bool(getattr(outside_class, "constraints", False))
-    CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or constrained)}
-    RECOMMENDED[name], OUTSIDE_CLASSES[name] = name, outside_class
+    CATALOGUE[engine_name] = {engine_name: Integrator(order, "any", constraints=integrates or constrained)}
+    RECOMMENDED[engine_name], OUTSIDE_CLASSES[engine_name] = engine_name, outside_class
 
 
-def _unusable_engine(name: str, why: str) -> InputError:
+def _unusable_engine(engine_name: str, reason_text: str) -> InputError:
     """InputError on an outside engine that cannot be used."""
-    return InputError("--engine", "", name, why)
+    return InputError("--engine", "", engine_name, reason_text)
 
 
-def _outside_class(name: str) -> type:
+def _outside_class(engine_name: str) -> type:
     """The class that ``module:Class`` names, imported; raises InputError if that fails."""
-    module, _, attribute = name.partition(":")
+    module, _, attribute = engine_name.partition(":")
     if not all(part.isidentifier() for part in (*module.split("."), attribute)):
-        raise _unusable_engine(name, "must read module:Class, for mine.py in this folder for example mine:Scipy")
+        raise _unusable_engine(engine_name, "must read module:Class, for mine.py in this folder for example mine:Scipy")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     try:
         outside_class = getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
-        raise _unusable_engine(name, f"there is no module {error.name!r} here, nor among the installed ones") from None
+        raise _unusable_engine(
+            engine_name, f"there is no module {error.name!r} here, nor among the installed ones"
+        ) from None
     except AttributeError:
-        raise _unusable_engine(name, f"the module {module} has no {attribute}") from None
+        raise _unusable_engine(engine_name, f"the module {module} has no {attribute}") from None
     except (Exception, SystemExit) as error:
-        raise _unusable_engine(name, f"the module {module} cannot be imported: {_error_text(error)}") from None
+        raise _unusable_engine(engine_name, f"the module {module} cannot be imported: {_error_text(error)}") from None
     if not isinstance(outside_class, type):
-        raise _unusable_engine(name, f"{attribute} is no class")
+        raise _unusable_engine(engine_name, f"{attribute} is no class")
     return outside_class
 
 
-def _error_text(error: BaseException) -> str:
+def _error_text(exception: BaseException) -> str:
     """Class and message of an exception, as text."""
-    return f"{type(error).__name__}: {error}".rstrip(": ")
+    return f"{type(exception).__name__}: {exception}".rstrip(": ")
 
 
-def build(name: str, assembly: Assembly, settings: Settings) -> Model:
+def build(engine_name: str, assembly: Assembly, run_settings: Settings) -> Model:
     """Model of an assembly by an outside class: as an engine, or as an integrator of the reference's equations."""
-    outside_class = OUTSIDE_CLASSES[name]
+    outside_class = OUTSIDE_CLASSES[engine_name]
     if callable(getattr(outside_class, "integrate", None)):
-        return OutsideIntegrator(assembly, settings, name, _call_engine(name, "building it", outside_class).integrate)
-    return OutsideEngine(name, _call_engine(name, "building it", outside_class, assembly, settings), assembly, settings)
+        return OutsideIntegrator(
+            assembly, run_settings, engine_name, _call_engine(engine_name, "building it", outside_class).integrate
+        )
+    return OutsideEngine(
+        engine_name,
+        _call_engine(engine_name, "building it", outside_class, assembly, run_settings),
+        assembly,
+        run_settings,
+    )
 
 
-def _call_engine(name: str, action: str, function: Callable, *arguments: Any) -> Any:
+def _call_engine(engine_name: str, action_text: str, engine_function: Callable, *function_arguments: Any) -> Any:
     """Result of a function of an outside engine; raises RunFailed for any exception other than the project's own."""
     try:
-        return function(*arguments)
+        return engine_function(*function_arguments)
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        raise RunFailed(name, f"{action} raised {_error_text(error)}") from error
+        raise RunFailed(engine_name, f"{action_text} raised {_error_text(error)}") from error
 
 
-def _returned_array(name: str, action: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _returned_array(
+    engine_name: str, action_text: str, returned_value: Any, wanted_shape: tuple[int, ...]
+) -> np.ndarray:
     """The value that an outside engine returned, as an array of this shape; raises RunFailed if it has no such
     shape."""
     try:
-        numbers = np.asarray(value if value is not None else "nothing", dtype=float)
+        numbers = np.asarray(returned_value if returned_value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
-        raise RunFailed(name, f"{action} gave {type(value).__name__} instead of numbers") from None
-    if numbers.shape != shape:
-        raise RunFailed(name, f"{action} gave the shape {numbers.shape} instead of {shape}")
+        raise RunFailed(engine_name, f"{action_text} gave {type(returned_value).__name__} instead of numbers") from None
+    if numbers.shape != wanted_shape:
+        raise RunFailed(engine_name, f"{action_text} gave the shape {numbers.shape} instead of {wanted_shape}")
     return numbers
 
 
@@ -142,7 +153,7 @@ class OutsideIntegrator(Reference):
         guard(self.name, times, states, self.settings.duration)
         self._guide(states)
         enforced = self._enforced(times, states)
-        guard(self.name, times, states, self.settings.duration, enforced=enforced)
+        guard(self.name, times, states, self.settings.duration, enforcing_forces=enforced)
         return Trajectory(times, states, enforced, {"steps": self.settings.steps, "force calls": calls})
 
     def _march(self, times: np.ndarray) -> tuple[np.ndarray, int]:
@@ -161,15 +172,17 @@ class OutsideIntegrator(Reference):
                 raise RunFailed(self.name, "the state became infinite or not a number", start)
         return states, calls[0]
 
-    def _rhs(self, start: float, end: float, calls: list[int]) -> Callable[[float, np.ndarray], np.ndarray]:
+    def _rhs(
+        self, start_time: float, end_time: float, call_counter: list[int]
+    ) -> Callable[[float, np.ndarray], np.ndarray]:
         """Right-hand side (t, y) -> y' over one piece between knots, which counts its calls."""
-        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
+        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start_time, end_time)
 
         def rhs(t: float, y: np.ndarray) -> np.ndarray:
-            calls[0] += 1
+            call_counter[0] += 1
             dy = derivative(np.ascontiguousarray(y, dtype=float), at(t), p)
             if not math.isfinite(dy.sum()):
-                raise RunFailed(self.name, "the derivative became infinite or not a number", start)
+                raise RunFailed(self.name, "the derivative became infinite or not a number", start_time)
             return dy
 
         return rhs
@@ -195,7 +208,7 @@ class OutsideEngine:
         enforced = getattr(answer, "enforced", None)
         if self.assembly.guided:
             enforced = _returned_array(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
-        guard(self.name, times, states, self.settings.duration, enforced=enforced)
+        guard(self.name, times, states, self.settings.duration, enforcing_forces=enforced)
         return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -217,15 +230,17 @@ ERROR_MARGIN, SMALLEST_BOUND, LARGEST_BOUND = 100.0, 1e-5, 0.1
 at least SMALLEST_BOUND (methods interpolate between steps to 3e-6) and at most LARGEST_BOUND."""
 
 
-def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: Trajectory) -> str:
+def beside_reference(engine: str, assembly: Assembly, run_settings: Settings, outside_trajectory: Trajectory) -> str:
     """Text on the difference of a run from the reference; raises RunFailed where the run's order and step cannot
     explain the difference."""
     try:
-        truth = _reference_run(assembly, replace(settings, integrator="DOP853", tolerance=REFERENCE_TOLERANCE))
+        truth = _reference_run(assembly, replace(run_settings, integrator="DOP853", tolerance=REFERENCE_TOLERANCE))
     except (InputError, RunFailed) as error:
         return f"nothing was compared with it: the reference gives no run of this scene ({error})"
-    gap, where = relative_gap(run, truth)
-    allowed = min(max(ERROR_MARGIN * _expected_error(engine, assembly, settings, truth), SMALLEST_BOUND), LARGEST_BOUND)
+    gap, where = relative_gap(outside_trajectory, truth)
+    allowed = min(
+        max(ERROR_MARGIN * _expected_error(engine, assembly, run_settings, truth), SMALLEST_BOUND), LARGEST_BOUND
+    )
     if not gap <= allowed:
         raise RunFailed(
             engine,
@@ -236,32 +251,32 @@ def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: T
     return f"states within {gap:.1e} of the largest motion from the reference"
 
 
-def relative_gap(run: Trajectory, truth: Trajectory) -> tuple[float, float]:
-    """Largest difference of the states (n, 8) between two runs, divided by the largest motion in ``truth`` of the same
-    kind, and the time (s) at which it occurs.
+def relative_gap(trajectory: Trajectory, reference_trajectory: Trajectory) -> tuple[float, float]:
+    """Largest difference of the states (n, 8) between two runs, divided by the largest motion in
+    ``reference_trajectory`` of the same kind, and the time (s) at which it occurs.
 
     Kinds are heights, pitch, and the rates of each; where nothing moves, a millimetre or milliradian counts.
     """
-    states = CubicSpline(truth.times, truth.states)(run.times)
-    motion = np.abs(truth.states - truth.states[0]).max(axis=0)
+    states = CubicSpline(reference_trajectory.times, reference_trajectory.states)(trajectory.times)
+    motion = np.abs(reference_trajectory.states - reference_trajectory.states[0]).max(axis=0)
     sizes = np.concatenate([np.full(3, motion[:3].max()), motion[3:4], np.full(3, motion[4:7].max()), motion[7:]])
-    gaps = (np.abs(run.states - states) / np.maximum(sizes, 1e-3)).max(axis=1)
+    gaps = (np.abs(trajectory.states - states) / np.maximum(sizes, 1e-3)).max(axis=1)
     worst = int(gaps.argmax())
-    return float(gaps[worst]), float(run.times[worst])
+    return float(gaps[worst]), float(trajectory.times[worst])
 
 
-def _reference_run(assembly: Assembly, settings: Settings) -> Trajectory:
+def _reference_run(assembly: Assembly, run_settings: Settings) -> Trajectory:
     """Trajectory of an assembly by the reference."""
-    return protocol.build("reference", assembly, settings).run()
+    return protocol.build("reference", assembly, run_settings).run()
 
 
-def _expected_error(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+def _expected_error(engine: str, assembly: Assembly, run_settings: Settings, reference_trajectory: Trajectory) -> float:
     """Relative error that the stated order and step of an outside engine make likely; its tolerance if it is
     adaptive."""
     if getattr(OUTSIDE_CLASSES[engine], "adaptive", False):
-        return settings.tolerance
+        return run_settings.tolerance
     try:
-        gap, _ = relative_gap(_reference_run(assembly, replace(settings, integrator="RK4")), truth)
+        gap, _ = relative_gap(_reference_run(assembly, replace(run_settings, integrator="RK4")), reference_trajectory)
     except (InputError, RunFailed):
         return LARGEST_BOUND  # too coarse for RK4: only what no step explains is told
-    return float(gap ** (min(CATALOGUE[engine][settings.integrator].order, 4) / 4))
+    return float(gap ** (min(CATALOGUE[engine][run_settings.integrator].order, 4) / 4))

@@ -24,63 +24,62 @@ FLAT_ROAD_INPUT = np.zeros((1, 4))
 """Input of a vehicle on a flat road: one row of zeros."""
 
 
-def compiled_closure(function: Any, key: tuple) -> Any:
+def compiled_closure(closure: Any, cache_key: tuple) -> Any:
     """A compiled closure with its own index in numba's cache, which closures of one factory would otherwise share."""
-    function = named_closure(function, *key)
-    return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
+    closure = named_closure(closure, *cache_key)
+    return njit(cache=True, nogil=True, error_model="numpy")(closure)  # no check for masses of zero: there are none
 
 
-def _compile_fixed(rhs, key):
+def _compile_fixed(right_hand_side, cache_key):
     """Compiled march with fixed classical Runge-Kutta steps for one right-hand side."""
 
-    def march(y, step, count, inputs, rows, p, states):
-        """March with classical Runge-Kutta steps. ``rows`` gives the distances to the rows of the input at the middle,
-        at the end and at the next step.
-        """
+    def march(start_state, time_step, step_count, input_table, row_offsets, parameters, states):
+        """March with classical Runge-Kutta steps. ``row_offsets`` gives the distances to the rows of the input at the
+        middle, at the end and at the next step."""
         k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
         stage = np.empty(8)
         for j in range(8):  # a row assigned at once takes seconds to compile
-            states[0, j] = y[j]
-        to_middle, to_end, to_next = rows
-        for i in range(count):
+            states[0, j] = start_state[j]
+        to_middle, to_end, to_next = row_offsets
+        for i in range(step_count):
             row = i * to_next
-            middle, end = inputs[row + to_middle], inputs[row + to_end]
-            rhs(y, inputs[row], p, k1)
+            middle, end = input_table[row + to_middle], input_table[row + to_end]
+            right_hand_side(start_state, input_table[row], parameters, k1)
             for j in range(8):
-                stage[j] = y[j] + 0.5 * step * k1[j]
-            rhs(stage, middle, p, k2)
+                stage[j] = start_state[j] + 0.5 * time_step * k1[j]
+            right_hand_side(stage, middle, parameters, k2)
             for j in range(8):
-                stage[j] = y[j] + 0.5 * step * k2[j]
-            rhs(stage, middle, p, k3)
+                stage[j] = start_state[j] + 0.5 * time_step * k2[j]
+            right_hand_side(stage, middle, parameters, k3)
             for j in range(8):
-                stage[j] = y[j] + step * k3[j]
-            rhs(stage, end, p, k4)
+                stage[j] = start_state[j] + time_step * k3[j]
+            right_hand_side(stage, end, parameters, k4)
             for j in range(8):
-                y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
-                states[i + 1, j] = y[j]
+                start_state[j] += time_step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
+                states[i + 1, j] = start_state[j]
 
-    return compiled_closure(march, key)
+    return compiled_closure(march, cache_key)
 
 
-def _compile_single(rhs, key):
+def _compile_single(right_hand_side, cache_key):
     """Compiled function (y, u, p) -> dy (8,) for one right-hand side."""
 
-    def derivative(y, u, p):
-        dy, copy = np.empty(8), y.copy()
-        rhs(copy, u, p, dy)
+    def derivative(state, inputs, parameters):
+        dy, copy = np.empty(8), state.copy()
+        right_hand_side(copy, inputs, parameters, dy)
         return dy
 
-    return compiled_closure(derivative, key)
+    return compiled_closure(derivative, cache_key)
 
 
-def _summed_right_hand_side(rhs, added):
-    """Right-hand side with the terms of ``added`` added to those of ``rhs``."""
+def _summed_right_hand_side(right_hand_side, added_terms):
+    """Right-hand side with the terms of ``added_terms`` added to those of ``right_hand_side``."""
 
-    def total(y, u, p, dy):
-        rhs(y, u, p, dy)
-        added(y, u, p, dy)
+    def total(state, inputs, parameters, state_rates):
+        right_hand_side(state, inputs, parameters, state_rates)
+        added_terms(state, inputs, parameters, state_rates)
 
-    return register_jitable(named_closure(total, rhs.__name__, added.__name__))
+    return register_jitable(named_closure(total, right_hand_side.__name__, added_terms.__name__))
 
 
 @dataclass
@@ -112,7 +111,7 @@ class Reference:
         guard("reference", times, states, self.settings.duration)
         check_landings("reference", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states)
-        guard("reference", times, states, self.settings.duration, enforced=enforced)
+        guard("reference", times, states, self.settings.duration, enforcing_forces=enforced)
         return Trajectory(times, states, enforced, counts)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -178,33 +177,33 @@ class Reference:
         self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
 
-    def _pieces_between_knots(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
+    def _pieces_between_knots(self, times: np.ndarray, last_time: float) -> Iterator[tuple[float, float, slice]]:
         """Start and end (s) of each piece between knots of the input, and the slice of ``times`` (n,) within it."""
         knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
         small = 1e-9 * self.settings.step
-        for start, end in pairwise((0.0, *knots, last)):
+        for start, end in pairwise((0.0, *knots, last_time)):
             yield start, end, slice(*np.searchsorted(times, (start + small, end + small)))
 
-    def _march_piece(self, start: float, end: float, y: np.ndarray, dense: bool):
+    def _march_piece(self, start_time: float, end_time: float, start_state: np.ndarray, with_dense_output: bool):
         """Solution by scipy's adaptive solver between two knots of the input, from the state y (8,)."""
         from scipy.integrate import solve_ivp
 
-        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
+        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start_time, end_time)
 
         def rhs(t, y):
             dy = derivative(y, at(t), p)
             if not math.isfinite(dy.sum()):  # scipy's explicit solvers would halve their step for ever
-                raise RunFailed("reference", "the derivative became infinite or not a number", start)
+                raise RunFailed("reference", "the derivative became infinite or not a number", start_time)
             return dy
 
         tolerance = max(self.settings.tolerance, 3e-14)
         longest = math.inf if self._input is None else self._input.resolution
         solution = solve_ivp(
             rhs,
-            (start, end),
-            y,
+            (start_time, end_time),
+            start_state,
             method=self.settings.integrator,
-            dense_output=dense,
+            dense_output=with_dense_output,
             rtol=tolerance,
             atol=tolerance * 1e-2,
             max_step=longest,
@@ -213,10 +212,10 @@ class Reference:
             raise RunFailed("reference", solution.message, solution.t[-1], solution.y[:, -1])
         return solution
 
-    def _reader(self, start: float, end: float) -> Callable[[float], np.ndarray]:
+    def _reader(self, start_time: float, end_time: float) -> Callable[[float], np.ndarray]:
         """Function of time (s) that reads the input within one piece between knots. Held forces keep their value in its
         middle; other inputs vary."""
-        middle = self._input_at(0.5 * (start + end))
+        middle = self._input_at(0.5 * (start_time + end_time))
         if self._input is None or (self._input.held and self._input.channels == 2):
             return lambda t: middle
         if self._input.held:
@@ -242,29 +241,31 @@ _SINGLE: dict[tuple, Any] = {}
 """Compiled right-hand sides by mode, geometry and added terms."""
 
 
-def _right_hand_side(mode: str, geometry: str, *added: str):
+def _right_hand_side(input_mode: str, geometry: str, *added_terms: str):
     """Right-hand side of the equations for one mode and geometry, with the added terms."""
-    return reduce(_summed_right_hand_side, (ADDED_TERMS[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
+    return reduce(
+        _summed_right_hand_side, (ADDED_TERMS[name] for name in added_terms), RIGHT_HAND_SIDES[input_mode, geometry]
+    )
 
 
-def march_of(mode: str, geometry: str, *added: str):
-    """The compiled fixed-step march for one mode and geometry with the terms ``added``, compiled at the first
+def march_of(input_mode: str, geometry: str, *added_terms: str):
+    """The compiled fixed-step march for one mode and geometry with the terms ``added_terms``, compiled at the first
     request."""
-    key = (mode, geometry, *added)
+    key = (input_mode, geometry, *added_terms)
     if key not in _FIXED:
         _FIXED[key] = _compile_fixed(_right_hand_side(*key), key)
     return _FIXED[key]
 
 
-def derivative_of(mode: str, geometry: str, *added: str):
-    """The compiled right-hand side (y, u, p) -> dy (8,) for one mode and geometry with the terms ``added``, compiled at
-    the first request."""
-    key = (mode, geometry, *added)
+def derivative_of(input_mode: str, geometry: str, *added_terms: str):
+    """The compiled right-hand side (y, u, p) -> dy (8,) for one mode and geometry with the terms ``added_terms``,
+    compiled at the first request."""
+    key = (input_mode, geometry, *added_terms)
     if key not in _SINGLE:
         _SINGLE[key] = _compile_single(_right_hand_side(*key), key)
     return _SINGLE[key]
 
 
-def build(assembly: Assembly, settings: Settings) -> Reference:
+def build(assembly: Assembly, run_settings: Settings) -> Reference:
     """The reference model of a pitch-plane assembly."""
-    return Reference(assembly, settings)
+    return Reference(assembly, run_settings)

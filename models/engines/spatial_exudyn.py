@@ -34,13 +34,13 @@ class SpatialExudyn:
     """A spatial vehicle in one Exudyn system."""
 
     def __init__(
-        self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
+        self, vehicle: SpatialVehicle, run_settings: Settings | None, speed: float | None, road_rows: np.ndarray | None
     ) -> None:
-        self.vehicle, self.settings = vehicle, settings
+        self.vehicle, self.settings = vehicle, run_settings
         self.size = len(vehicle.coordinates())
-        per_time = 2.0 / settings.step if settings is not None and road is not None else 0.0
+        per_time = 2.0 / run_settings.step if run_settings is not None and road_rows is not None else 0.0
         self._flat = np.zeros((1, 2 * len(vehicle.tyres)))
-        self.road = RoadRows(self._flat if road is None else road, per_time)
+        self.road = RoadRows(self._flat if road_rows is None else road_rows, per_time)
         self.built = assemble(vehicle, speed, self.road)
         mbs = self.mbs = self.built.mbs
         places = [self.built.coordinate_nodes[place] for place in vehicle.coordinates()]
@@ -48,18 +48,18 @@ class SpatialExudyn:
         mbs.Assemble()
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
 
-    def _values_in_exudyn_order(self, values: np.ndarray) -> np.ndarray:
+    def _values_in_exudyn_order(self, coordinate_values: np.ndarray) -> np.ndarray:
         """Coordinates or rates (n,) in Exudyn's order, tree by tree."""
         out = np.empty(self.size)
-        out[self._columns] = values
+        out[self._columns] = coordinate_values
         return out
 
-    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road_row: np.ndarray | None = None) -> np.ndarray:
         """Accelerations (n,) from Exudyn's own residual and mass matrix at a time (s), positions and rates (n,);
-        ``road`` (2 w,) replaces the road's row at this time: heights (m), then rates (m/s) under w tyres."""
-        if road is None:
+        ``road_row`` (2 w,) replaces the road's row at this time: heights (m), then rates (m/s) under w tyres."""
+        if road_row is None:
             return np.linalg.solve(*self._mass_and_force(q, v, time))
-        with self.road.fixed_row(road):
+        with self.road.fixed_row(road_row):
             return np.linalg.solve(*self._mass_and_force(q, v))
 
     def _mass_and_force(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -84,13 +84,13 @@ class SpatialExudyn:
         motion = EngineKinematics(self.vehicle, self._point_jacobian, self._rotation_jacobian)
         return linear_vehicle("exudyn", self.vehicle, motion, parts[1][0], damping, stiffness, self._road_columns())
 
-    def _linearised(self, step: float) -> list[np.ndarray]:
+    def _linearised(self, small_step: float) -> list[np.ndarray]:
         """Exudyn's matrices [M, K, D] from forward differences with this step (m, rad), which may be negative."""
         options, exceptions = quiet_settings(), exu.special.exceptions
         numerical, checks = options.staticSolver.newton.numericalDifferentiation, exceptions.parameterRangeChecks
         numerical.forODE2 = numerical.doSystemWideDifferentiation = True
         exceptions.parameterRangeChecks = False  # a negative step is outside of the range
-        numerical.relativeEpsilon, numerical.minimumCoordinateSize = step, 1.0
+        numerical.relativeEpsilon, numerical.minimumCoordinateSize = small_step, 1.0
         exceptions.parameterRangeChecks = checks
         rows = np.ix_(self._columns, self._columns)
         return [np.asarray(part)[rows] for part in self.mbs.ComputeLinearizedSystem(simulationSettings=options)]
@@ -113,13 +113,13 @@ class SpatialExudyn:
         """Jacobian (3, n) of a body's angular velocity in the design position."""
         return self._jacobian(self.built.marker(body, self.vehicle.body(body).position, True), KINDS.AngularVelocity)
 
-    def _jacobian(self, marker: Any, kind: Any) -> np.ndarray:
+    def _jacobian(self, marker: Any, variable_type: Any) -> np.ndarray:
         """Jacobian (3, n) of a marker in the design position: its velocity for a unit rate of each coordinate."""
         data, columns = self.mbs.systemData, []
         data.SetODE2Coordinates(np.zeros(self.size))
         for unit in np.eye(self.size):
             data.SetODE2Coordinates_t(self._values_in_exudyn_order(unit))
-            columns.append(np.array(self.mbs.GetMarkerOutput(marker, kind)))
+            columns.append(np.array(self.mbs.GetMarkerOutput(marker, variable_type)))
         return np.column_stack(columns)
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
@@ -134,13 +134,13 @@ class SpatialExudyn:
         note = solve(self.mbs, settings)
         return checked_trajectory("exudyn", settings, *self._recorded_states(settings), note, solver_counts(self.mbs))
 
-    def _recorded_states(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    def _recorded_states(self, run_settings: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Times (m,) in s and states (m, 2 n) from the sensors. Times are multiples of the step, as Exudyn's own sum
         ends 1e-13 early."""
         read = self.mbs.GetSensorStoredData
         halves = [np.hstack([read(sensor)[:, 1:] for sensor in sensors])[:, self._columns] for sensors in self._sensors]
-        stored, times = read(self._sensors[0][0])[:, 0], settings.step * np.arange(len(halves[0]))
-        times = times if np.allclose(stored, times, rtol=0, atol=1e-9 * settings.duration) else stored
+        stored, times = read(self._sensors[0][0])[:, 0], run_settings.step * np.arange(len(halves[0]))
+        times = times if np.allclose(stored, times, rtol=0, atol=1e-9 * run_settings.duration) else stored
         return times, np.hstack(halves)
 
     def plan(self) -> dict[str, int]:

@@ -46,17 +46,17 @@ class RoadRows:
     rows_per_second: float
     computed_forces: list[RoadForces] = field(default_factory=list)
 
-    def forces(self, by_road: np.ndarray) -> RoadForces:
-        """Forces at all rows of the road for one callback, with the factors ``by_road`` (2 w, k)."""
-        self.computed_forces.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
+    def forces(self, road_factors: np.ndarray) -> RoadForces:
+        """Forces at all rows of the road for one callback, with the factors ``road_factors`` (2 w, k)."""
+        self.computed_forces.append(RoadForces(road_factors, (self.rows @ road_factors).tolist()))
         return self.computed_forces[-1]
 
     @contextmanager
-    def fixed_row(self, row: np.ndarray) -> Iterator[None]:
+    def fixed_row(self, road_row: np.ndarray) -> Iterator[None]:
         """Context in which one row (2 w,) of the road is used at all times."""
         before, per_time, self.rows_per_second = [each.rows for each in self.computed_forces], self.rows_per_second, 0.0
         for each in self.computed_forces:
-            each.rows = [(row @ each.by_road).tolist()]
+            each.rows = [(road_row @ each.by_road).tolist()]
         try:
             yield
         finally:
@@ -65,30 +65,34 @@ class RoadRows:
                 each.rows = rows
 
 
-def _add_spring(build: TreeBuild, spring: SpringDamper) -> None:
+def _add_spring(tree_build: TreeBuild, spring: SpringDamper) -> None:
     """Add a spring-damper: native where Exudyn has an item for it, that is along a global axis, or along any axis of a
     body that never turns."""
-    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.preloads.parts[spring.name]
+    axis, ends, held = (
+        np.array(spring.axis),
+        [spring.first_body, spring.second_body],
+        tree_build.preloads.parts[spring.name],
+    )
     upright = np.count_nonzero(axis) == 1
     first, two = (
-        build.marker(end, point, not upright)
+        tree_build.marker(end, point, not upright)
         for end, point in zip(ends, (spring.first_point, spring.second_point), strict=True)
     )
     rest = np.subtract(spring.second_point, spring.first_point)
     curved = spring.travel_force or spring.rate_force or spring.friction
-    if curved or not (upright or any(not build.vehicle.turns(end) for end in ends)):
-        return build.connect(f"spring {spring.name!r}", first, two, _spring_law(spring, axis, rest, held))
+    if curved or not (upright or any(not tree_build.vehicle.turns(end) for end in ends)):
+        return tree_build.connect(f"spring {spring.name!r}", first, two, _spring_law(spring, axis, rest, held))
     sunk = held / spring.stiffness if spring.stiffness else 0.0
     if upright:
         diagonal = axis**2
         law = {"stiffness": spring.stiffness * diagonal, "damping": spring.damping * diagonal}
-        return build.spring(first, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
-    sign = -1 if build.vehicle.turns(spring.first_body) else 1  # the axis is one of the first marker's body
-    build.mbs.AddObject(
+        return tree_build.spring(first, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
+    sign = -1 if tree_build.vehicle.turns(spring.first_body) else 1  # the axis is one of the first marker's body
+    tree_build.mbs.AddObject(
         items.LinearSpringDamper(
             name=f"spring {spring.name!r}",
             markerNumbers=[first, two][::sign],
-            axisMarker0=sign * build.in_body_axes(ends[::sign][0], axis),
+            axisMarker0=sign * tree_build.in_body_axes(ends[::sign][0], axis),
             stiffness=spring.stiffness,
             damping=spring.damping,
             offset=float(axis @ rest) - sunk,
@@ -97,17 +101,17 @@ def _add_spring(build: TreeBuild, spring: SpringDamper) -> None:
 
 
 def _spring_law(
-    spring: SpringDamper, axis: np.ndarray, length_at_rest: np.ndarray, preload: float
+    spring: SpringDamper, spring_axis: np.ndarray, length_at_rest: np.ndarray, preload: float
 ) -> Callable[[Any, Any], list[float]]:
     """Force law of a spring-damper with all its terms, for a callback: force (3,) in N from relative position and
     velocity of its ends."""
-    (ax, ay, az), design = axis.tolist(), float(axis @ length_at_rest)
+    (ax, ay, az), design = spring_axis.tolist(), float(spring_axis @ length_at_rest)
     k, c, dry, dry_rate = spring.stiffness, spring.damping, spring.friction, spring.friction_rate
     travel_force, rate_force = spring.travel_force, spring.rate_force
 
-    def law(apart: Any, rates: Any) -> list[float]:
-        travel = ax * apart[0] + ay * apart[1] + az * apart[2] - design
-        rate = ax * rates[0] + ay * rates[1] + az * rates[2]
+    def law(relative_position: Any, relative_velocity: Any) -> list[float]:
+        travel = ax * relative_position[0] + ay * relative_position[1] + az * relative_position[2] - design
+        rate = ax * relative_velocity[0] + ay * relative_velocity[1] + az * relative_velocity[2]
         force = preload + k * travel + c * rate
         if travel_force is not None:
             force += travel_force(travel)
@@ -120,15 +124,15 @@ def _spring_law(
     return law
 
 
-def _add_bar(build: TreeBuild, bar: AntiRollBar) -> None:
+def _add_bar(tree_build: TreeBuild, bar: AntiRollBar) -> None:
     """Add an anti-roll bar: vertical forces at its two points, and a moment on the body's roll coordinate."""
-    left, right = build.marker(bar.left, bar.point_left), build.marker(bar.right, bar.point_right)
-    roll, turning = build.reader(bar.body, "rx"), build.reader(bar.body, "rx", KINDS.Coordinates_t)
+    left, right = tree_build.marker(bar.left, bar.point_left), tree_build.marker(bar.right, bar.point_right)
+    roll, turning = tree_build.reader(bar.body, "rx"), tree_build.reader(bar.body, "rx", KINDS.Coordinates_t)
     rest, held, track, read = (
         bar.point_right[2] - bar.point_left[2],
-        build.preloads.parts[bar.name],
+        tree_build.preloads.parts[bar.name],
         bar.track,
-        build.mbs,
+        tree_build.mbs,
     )
     k, c = bar.stiffness, bar.damping
 
@@ -143,62 +147,62 @@ def _add_bar(build: TreeBuild, bar: AntiRollBar) -> None:
         return moment(heights[0] - heights[1], rates[0] - rates[1])
 
     name = f"anti-roll bar {bar.name!r}"
-    build.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
-    if (bar.body, "rx") in build.coordinate_nodes:
-        node, index = build.coordinate_nodes[bar.body, "rx"]
-        still = build.coordinate(build.mbs.AddNode(items.NodePointGround()), 0)
-        rolling = build.coordinate(node, index)
-        build.mbs.AddObject(
+    tree_build.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
+    if (bar.body, "rx") in tree_build.coordinate_nodes:
+        node, index = tree_build.coordinate_nodes[bar.body, "rx"]
+        still = tree_build.coordinate(tree_build.mbs.AddNode(items.NodePointGround()), 0)
+        rolling = tree_build.coordinate(node, index)
+        tree_build.mbs.AddObject(
             items.CoordinateSpringDamper(
                 name=f"{name}, on {bar.body!r}", markerNumbers=[still, rolling], springForceUserFunction=on_body
             )
         )
-        build.callbacks += 1
+        tree_build.callbacks += 1
 
 
-def _add_turning_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
-    """Add a tyre on a body that turns: a spring-damper to flat ground, and the road's force as a load; ``by_road`` (2
-    w,) : factors of this force (N)."""
-    marker, held = build.marker(tyre.body, tyre.point), build.preloads.tyres[tyre.name]
+def _add_turning_tyre(tree_build: TreeBuild, tyre: Tyre, road_factors: np.ndarray, road_rows: RoadRows) -> None:
+    """Add a tyre on a body that turns: a spring-damper to flat ground, and the road's force as a load; ``road_factors``
+    (2 w,) : factors of this force (N)."""
+    marker, held = tree_build.marker(tyre.body, tyre.point), tree_build.preloads.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     law = {"stiffness": [0, 0, tyre.stiffness], "damping": [0, 0, tyre.damping], "offset": [0, 0, sunk]}
-    build.spring(build.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
-    force = road.forces(np.outer(by_road, (0.0, 0.0, 1.0)))
-    build.mbs.AddLoad(
+    tree_build.spring(tree_build.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
+    force = road_rows.forces(np.outer(road_factors, (0.0, 0.0, 1.0)))
+    tree_build.mbs.AddLoad(
         items.LoadForceVector(
             name=f"road under the tyre {tyre.name!r}, flat here",
             markerNumber=marker,
-            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.rows_per_second)],
+            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road_rows.rows_per_second)],
         )
     )
-    build.callbacks += 1
+    tree_build.callbacks += 1
 
 
-def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
+def _add_steady_tyres(tree_build: TreeBuild, tyres: list[Tyre], road_factors: np.ndarray, road_rows: RoadRows) -> None:
     """Add all tyres on bodies that never turn: matrices over the coordinates that lift them, and one callback.
 
-    by_road : (2 w, tyres), what the road adds to each (N).
+    road_factors : (2 w, tyres), what the road adds to each (N).
     """
     lifts = [
         [
-            build.coordinate_nodes[name, "z"]
-            for name in build.vehicle.chain(tyre.body)
-            if (name, "z") in build.coordinate_nodes
+            tree_build.coordinate_nodes[name, "z"]
+            for name in tree_build.vehicle.chain(tyre.body)
+            if (name, "z") in tree_build.coordinate_nodes
         ]
         for tyre in tyres
     ]
     nodes = list(dict.fromkeys(node for places in lifts for node, _ in places))
     if not nodes:
         return
-    sizes = [build.size(node) for node in nodes]
+    sizes = [tree_build.size(node) for node in nodes]
     first = dict(zip(nodes, np.cumsum([0, *sizes]), strict=False))
     rows = np.zeros((len(tyres), sum(sizes)))
     for row, places in zip(rows, lifts, strict=True):
         for node, index in places:
             row[first[node] + index] = 1.0
-    stiffness, damping, held = np.array([(t.stiffness, t.damping, build.preloads.tyres[t.name]) for t in tyres]).T
-    force = road.forces(by_road @ rows)
-    build.mbs.AddObject(
+    stiffness, damping, held = np.array([(t.stiffness, t.damping, tree_build.preloads.tyres[t.name]) for t in tyres]).T
+    force = road_rows.forces(road_factors @ rows)
+    tree_build.mbs.AddObject(
         items.ObjectGenericODE2(
             name=f"tyres {', '.join(repr(tyre.name) for tyre in tyres)}",
             nodeNumbers=nodes,
@@ -206,51 +210,58 @@ def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, 
             stiffnessMatrix=rows.T * stiffness @ rows,
             **({"dampingMatrix": rows.T * damping @ rows} if damping.any() else {}),
             **({"forceVector": rows.T @ held} if held.any() else {}),
-            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.rows_per_second)],
+            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road_rows.rows_per_second)],
         )
     )
-    build.callbacks += 1
+    tree_build.callbacks += 1
 
 
-def _add_pushing_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
-    """Add a tyre that may leave the road, its whole law as a callback; ``by_road`` (2 w, 2) selects height and rate
-    under the tyre."""
-    k, c, held, rest = tyre.stiffness, tyre.damping, build.preloads.tyres[tyre.name], tyre.point[2]
-    under = road.forces(by_road)
+def _add_pushing_tyre(tree_build: TreeBuild, tyre: Tyre, road_factors: np.ndarray, road_rows: RoadRows) -> None:
+    """Add a tyre that may leave the road, its whole law as a callback; ``road_factors`` (2 w, 2) selects height and
+    rate under the tyre."""
+    k, c, held, rest = tyre.stiffness, tyre.damping, tree_build.preloads.tyres[tyre.name], tyre.point[2]
+    under = road_rows.forces(road_factors)
 
     def law(mbs: Any, t: float, item: int, position: Any, speed: Any, *_: Any) -> list[float]:
-        height, rate = under.rows[round(t * road.rows_per_second)]
+        height, rate = under.rows[round(t * road_rows.rows_per_second)]
         elastic = held + k * (height - position[2] + rest)
         return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
 
-    on_road = build.marker(None, (tyre.point[0], tyre.point[1], 0.0))
+    on_road = tree_build.marker(None, (tyre.point[0], tyre.point[1], 0.0))
     name = f"tyre {tyre.name!r}, which only pushes"
-    build.spring(on_road, build.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
+    tree_build.spring(on_road, tree_build.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
 
 
-def _add_tyres(build: TreeBuild, road: RoadRows) -> None:
+def _add_tyres(tree_build: TreeBuild, road_rows: RoadRows) -> None:
     """Add all tyres of the vehicle."""
-    tyres, turns, count = build.vehicle.tyres, build.vehicle.turns, len(build.vehicle.tyres)
+    tyres, turns, count = tree_build.vehicle.tyres, tree_build.vehicle.turns, len(tree_build.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
     steady = [i for i, tyre in enumerate(tyres) if not (tyre.pushes_only or turns(tyre.body))]
     if steady:
-        _add_steady_tyres(build, [tyres[i] for i in steady], by_road[:, steady], road)
+        _add_steady_tyres(tree_build, [tyres[i] for i in steady], by_road[:, steady], road_rows)
     for i, tyre in enumerate(tyres):
         if tyre.pushes_only:
-            _add_pushing_tyre(build, tyre, np.eye(2 * count)[:, [i, count + i]], road)
+            _add_pushing_tyre(tree_build, tyre, np.eye(2 * count)[:, [i, count + i]], road_rows)
         elif i not in steady:
-            _add_turning_tyre(build, tyre, by_road[:, i], road)
+            _add_turning_tyre(tree_build, tyre, by_road[:, i], road_rows)
 
 
-def _add_side_force(build: TreeBuild, force: SideForce, speed: float) -> None:
+def _add_side_force(tree_build: TreeBuild, side_force: SideForce, speed: float) -> None:
     """Add a lateral force that depends on the body's lateral speed and the chassis' roll and yaw."""
-    roll, yaw = (build.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
+    roll, yaw = (tree_build.reader(side_force.chassis, freedom) for freedom in ("rx", "rz"))
 
-    def law(apart: Any, rate: Any) -> list[float]:
-        return [0.0, force.stiffness * (rate[1] / speed - force.roll_steer * roll() - yaw()), 0.0]
+    def law(relative_position: Any, relative_velocity: Any) -> list[float]:
+        return [
+            0.0,
+            side_force.stiffness * (relative_velocity[1] / speed - side_force.roll_steer * roll() - yaw()),
+            0.0,
+        ]
 
-    build.connect(
-        f"side force {force.name!r}", build.marker(None, force.point), build.marker(force.body, force.point), law
+    tree_build.connect(
+        f"side force {side_force.name!r}",
+        tree_build.marker(None, side_force.point),
+        tree_build.marker(side_force.body, side_force.point),
+        law,
     )
 
 
@@ -262,7 +273,7 @@ def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
     return list(trees.values())
 
 
-def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> TreeBuild:
+def assemble(vehicle: SpatialVehicle, speed: float | None, road_rows: RoadRows) -> TreeBuild:
     """Build the vehicle in a new Exudyn system, which is not assembled yet, so that sensors can be added."""
     mbs = exu.SystemContainer().AddSystem()
     built = TreeBuild(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
@@ -275,7 +286,7 @@ def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> Tr
         _add_spring(built, spring)
     for bar in vehicle.bars:
         _add_bar(built, bar)
-    _add_tyres(built, road)
+    _add_tyres(built, road_rows)
     for force in vehicle.side_forces:
         _add_side_force(built, force, float(speed or 0.0))
     for drag in vehicle.drags:

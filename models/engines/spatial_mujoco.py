@@ -29,18 +29,23 @@ from models.vehicles.spatial import SpatialVehicle, Vector
 
 
 def _compiled_model(
-    vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray, per_time: float
+    vehicle: SpatialVehicle,
+    time_step: float,
+    integrator: str,
+    speed: float | None,
+    road_rows: np.ndarray,
+    rows_per_second: float,
 ) -> mujoco.MjModel:
     """The compiled MuJoCo model; its numeric data hold all numbers that the callback reads."""
-    spec = spec_of(vehicle, step)
+    spec = spec_of(vehicle, time_step)
     spec.option.integrator = INTEGRATORS[integrator]
     plain = spec.compile()
     counts, content = packed_numbers(vehicle, force_elements(vehicle, speed), plain, MujocoIndices(vehicle, plain))
     begins = HEADER + len(content)
-    header = [per_time, len(road), len(vehicle.tyres), *counts, begins]
-    spec.add_numeric(name="vehicle", size=begins + road.size, data=[0.0])
+    header = [rows_per_second, len(road_rows), len(vehicle.tyres), *counts, begins]
+    spec.add_numeric(name="vehicle", size=begins + road_rows.size, data=[0.0])
     model = spec.compile()
-    model.numeric_data[:] = np.concatenate([header, content, road.ravel()])
+    model.numeric_data[:] = np.concatenate([header, content, road_rows.ravel()])
     set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)
     return model
 
@@ -49,13 +54,13 @@ class SpatialMujoco:
     """One spatial vehicle in one MuJoCo model."""
 
     def __init__(
-        self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
+        self, vehicle: SpatialVehicle, run_settings: Settings | None, speed: float | None, road_rows: np.ndarray | None
     ) -> None:
-        self.vehicle, self.settings = vehicle, settings
+        self.vehicle, self.settings = vehicle, run_settings
         self._flat = np.zeros(2 * len(vehicle.tyres))
-        step, integrator = (settings.step, settings.integrator) if settings else (1e-3, "RK4")
-        table = self._flat[None, :] if road is None else road
-        self.model = _compiled_model(vehicle, step, integrator, speed, table, 0.0 if road is None else 2.0 / step)
+        step, integrator = (run_settings.step, run_settings.integrator) if run_settings else (1e-3, "RK4")
+        table = self._flat[None, :] if road_rows is None else road_rows
+        self.model = _compiled_model(vehicle, step, integrator, speed, table, 0.0 if road_rows is None else 2.0 / step)
         self.data = mujoco.MjData(self.model)
         self.numbers = MujocoIndices(vehicle, self.model)
         self.law: Any = spatial_law()
@@ -76,14 +81,14 @@ class SpatialMujoco:
         finally:
             numbers[PER_TIME], row[:] = before
 
-    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,); ``road`` (2 w,) replaces the road's row at this
-        time: heights (m), then rates (m/s) under w tyres."""
-        if road is None:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road_row: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) at a time (s), positions and rates (n,); ``road_row`` (2 w,) replaces the road's row at
+        this time: heights (m), then rates (m/s) under w tyres."""
+        if road_row is None:
             with installed(self.law):
                 return self._acceleration(q, v, time)
         with self._hold_road() as row:
-            row[:] = road
+            row[:] = road_row
             return self._acceleration(q, v)
 
     def _acceleration(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> np.ndarray:

@@ -90,15 +90,15 @@ class Workspace(NamedTuple):
 
 
 @register_jitable
-def _three(p, i):
+def _three(pointer, vector_index):
     """The vector (three doubles) at index i of a pointer."""
-    return p[i], p[i + 1], p[i + 2]
+    return pointer[vector_index], pointer[vector_index + 1], pointer[vector_index + 2]
 
 
 @register_jitable
-def _put(p, i, a):
-    """Write the vector ``a`` (three doubles) to index i of a pointer."""
-    p[i], p[i + 1], p[i + 2] = a
+def _put(pointer, vector_index, vector):
+    """Write the vector ``vector`` (three doubles) to index i of a pointer."""
+    pointer[vector_index], pointer[vector_index + 1], pointer[vector_index + 2] = vector
 
 
 @register_jitable
@@ -120,28 +120,28 @@ def _along(a, b):
 
 
 @register_jitable
-def _move(parts, motion, work):
+def _move(parts, mujoco_state, workspace):
     """Compute the twists of the bodies, clear their wrenches, and add the contributions of the points to the travels
     and rates of the elements."""
     for b in range(parts.body_count):
-        body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
-        turn, shift = _twist(body, motion, work.bodies)
+        body, state = beyond(parts.bodies, PER_BODY * b), beyond(workspace.bodies, OF_BODY * b)
+        turn, shift = _twist(body, mujoco_state, workspace.bodies)
         _put(state, TURNS, turn)
         _put(state, SHIFTS, shift)
         _put(state, MOMENTS, (0.0, 0.0, 0.0))
         _put(state, FORCES, (0.0, 0.0, 0.0))
         number = int(body[NUMBER])
-        centre, rows = _three(motion.centres, 3 * number), beyond(motion.rotations, 9 * number)
+        centre, rows = _three(mujoco_state.centres, 3 * number), beyond(mujoco_state.rotations, 9 * number)
         x, y, z = _three(rows, 0), _three(rows, 3), _three(rows, 6)
         for i in range(int(body[POINT]), int(body[BEYOND])):
             point = beyond(parts.points, PER_POINT * i)
-            element, axis = beyond(work.elements, OF_ELEMENT * int(point[ELEMENT])), _three(point, AXIS)
+            element, axis = beyond(workspace.elements, OF_ELEMENT * int(point[ELEMENT])), _three(point, AXIS)
             at = _three(point, PLACE)
             place = centre[0] + _along(x, at), centre[1] + _along(y, at), centre[2] + _along(z, at)
             lever = _across(place, axis)
             element[TRAVEL] += _along(axis, place)
             element[RATE] += _along(axis, shift) + _along(turn, lever)
-            _put(work.levers, OF_POINT * i, lever)
+            _put(workspace.levers, OF_POINT * i, lever)
 
 
 @register_jitable
@@ -160,74 +160,76 @@ def _twist(body, motion, states):
 
 
 @register_jitable
-def _press(parts, motion, work, forces):
+def _press(parts, mujoco_state, workspace, joint_forces):
     """Transfer the elements' forces from the bodies to the joints, carried bodies before their carriers."""
     for b in range(parts.body_count - 1, -1, -1):
-        body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
+        body, state = beyond(parts.bodies, PER_BODY * b), beyond(workspace.bodies, OF_BODY * b)
         moment, force, parent = _three(state, MOMENTS), _three(state, FORCES), int(body[PARENT])
         for i in range(int(body[POINT]), int(body[BEYOND])):
             point = beyond(parts.points, PER_POINT * i)
-            pressed = -work.elements[OF_ELEMENT * int(point[ELEMENT])]
-            moment = _plus(moment, pressed, _three(work.levers, OF_POINT * i))
+            pressed = -workspace.elements[OF_ELEMENT * int(point[ELEMENT])]
+            moment = _plus(moment, pressed, _three(workspace.levers, OF_POINT * i))
             force = _plus(force, pressed, _three(point, AXIS))
         turning = int(body[TURNING])
         for j in range(int(body[FIRST]), turning):
-            forces[j] += _along(_three(motion.axes, 3 * j), force)
+            joint_forces[j] += _along(_three(mujoco_state.axes, 3 * j), force)
         for j in range(turning, int(body[LAST])):
-            about = _plus(moment, -1.0, _across(_three(motion.anchors, 3 * j), force))
-            forces[j] += _along(_three(motion.axes, 3 * j), about)
+            about = _plus(moment, -1.0, _across(_three(mujoco_state.anchors, 3 * j), force))
+            joint_forces[j] += _along(_three(mujoco_state.axes, 3 * j), about)
         if parent >= 0:
-            below = beyond(work.bodies, OF_BODY * parent)
+            below = beyond(workspace.bodies, OF_BODY * parent)
             _put(below, MOMENTS, _plus(moment, 1.0, _three(below, MOMENTS)))
             _put(below, FORCES, _plus(force, 1.0, _three(below, FORCES)))
 
 
 @register_jitable
-def _on_curve(pairs, size, argument):
+def _on_curve(curve_pairs, pair_count, travel_or_rate):
     """Force on a curve given as pairs (argument, force, ...); beyond its ends the outer straight pieces continue."""
     i = 0
-    while i < size - 4 and argument >= pairs[i + 2]:
+    while i < pair_count - 4 and travel_or_rate >= curve_pairs[i + 2]:
         i += 2
-    return pairs[i + 1] + (pairs[i + 3] - pairs[i + 1]) / (pairs[i + 2] - pairs[i]) * (argument - pairs[i])
+    return curve_pairs[i + 1] + (curve_pairs[i + 3] - curve_pairs[i + 1]) / (curve_pairs[i + 2] - curve_pairs[i]) * (
+        travel_or_rate - curve_pairs[i]
+    )
 
 
 @register_jitable
-def _more(law, travel, rate, q):
+def _more(force_law, travel, rate, q):
     """Nonlinear terms of an element's force law (N, or N m) at a travel, its rate and the joint coordinates q: the
     force less that of the law's straight line."""
     force = 0.0
-    if law[FRICTION] != 0.0:
-        force += law[FRICTION] * np.tanh(rate / law[FRICTION_RATE])
-    if law[FIRST_COORDINATE] >= 0.0:
-        force += law[FIRST_GAIN] * q[int(law[FIRST_COORDINATE])]
-    if law[SECOND_COORDINATE] >= 0.0:
-        force += law[SECOND_GAIN] * q[int(law[SECOND_COORDINATE])]
-    over_travel, over_rate = 2 * int(law[ON_TRAVEL]), 2 * int(law[ON_RATE])
+    if force_law[FRICTION] != 0.0:
+        force += force_law[FRICTION] * np.tanh(rate / force_law[FRICTION_RATE])
+    if force_law[FIRST_COORDINATE] >= 0.0:
+        force += force_law[FIRST_GAIN] * q[int(force_law[FIRST_COORDINATE])]
+    if force_law[SECOND_COORDINATE] >= 0.0:
+        force += force_law[SECOND_GAIN] * q[int(force_law[SECOND_COORDINATE])]
+    over_travel, over_rate = 2 * int(force_law[ON_TRAVEL]), 2 * int(force_law[ON_RATE])
     if over_travel > 0:
-        force += _on_curve(beyond(law, CURVES), over_travel, travel)
+        force += _on_curve(beyond(force_law, CURVES), over_travel, travel)
     if over_rate > 0:
-        force += _on_curve(beyond(law, CURVES + over_travel), over_rate, rate)
+        force += _on_curve(beyond(force_law, CURVES + over_travel), over_rate, rate)
     return force
 
 
 @register_jitable
-def _act(parts, road, tyres, motion, moved, forces):
+def _act(parts, road_row, tyre_count, mujoco_state, element_travels, joint_forces):
     """Compute the forces of the elements, store them in place of the travels, and add them to the joints that move
     points of bodies which never turn.
 
-    road : pointer to the heights (m) under ``tyres`` tyres, followed by their rates (m/s).
+    road_row : pointer to the heights (m) under ``tyre_count`` tyres, followed by their rates (m/s).
     """
-    e, q, v = parts.elements, motion.positions, motion.rates
+    e, q, v = parts.elements, mujoco_state.positions, mujoco_state.rates
     for i in range(parts.element_count):
-        travel, rate = moved[OF_ELEMENT * i] - e[REST], moved[OF_ELEMENT * i + RATE]
+        travel, rate = element_travels[OF_ELEMENT * i] - e[REST], element_travels[OF_ELEMENT * i + RATE]
         length, more = int(e[LENGTH]), int(e[MORE])
         shares = more if more > 0 else length
         for k in range(SHARES, shares, PER_SHARE):
             travel += e[k + SHARE] * q[int(e[k])]
             rate += e[k + SHARE] * v[int(e[k])]
         if e[TYRE] >= 0.0:
-            travel -= road[int(e[TYRE])]
-            rate -= road[tyres + int(e[TYRE])]
+            travel -= road_row[int(e[TYRE])]
+            rate -= road_row[tyre_count + int(e[TYRE])]
         elastic = e[HELD] + e[STIFFNESS] * travel
         force = elastic + e[DAMPING] * rate
         if e[ONE_SIDED] != 0.0:
@@ -235,8 +237,8 @@ def _act(parts, road, tyres, motion, moved, forces):
         if more > 0:
             force += _more(beyond(e, more), travel, rate, q)
         for k in range(SHARES, shares, PER_SHARE):
-            forces[int(e[k])] -= force * e[k + SHARE]
-        moved[OF_ELEMENT * i] = force
+            joint_forces[int(e[k])] -= force * e[k + SHARE]
+        element_travels[OF_ELEMENT * i] = force
         e = beyond(e, length)
 
 
@@ -330,7 +332,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 
 
 def packed_numbers(
-    vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, indices: MujocoIndices
+    vehicle: SpatialVehicle, elements: list[Element], mujoco_model: mujoco.MjModel, mujoco_indices: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
     """Counts of bodies, elements and points, and the list of all their numbers in the callback's table."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
@@ -339,56 +341,60 @@ def packed_numbers(
     for name in moving:
         before = len(points)
         points += _points_of(elements, vehicle, name)
-        bodies.append([*_body_numbers(vehicle, name, moving, model, indices), before, len(points)])
-    laws = [_element_numbers(element, vehicle, indices) for element in elements]
+        bodies.append([*_body_numbers(vehicle, name, moving, mujoco_model, mujoco_indices), before, len(points)])
+    laws = [_element_numbers(element, vehicle, mujoco_indices) for element in elements]
     return (len(bodies), len(laws), len(points)), [float(value) for value in chain(*bodies, *points, *laws)]
 
 
 def _body_numbers(
-    vehicle: SpatialVehicle, name: str, listed_bodies: list[str], model: mujoco.MjModel, indices: MujocoIndices
+    vehicle: SpatialVehicle,
+    body_name: str,
+    listed_bodies: list[str],
+    mujoco_model: mujoco.MjModel,
+    mujoco_indices: MujocoIndices,
 ) -> list[float]:
     """Numbers, in the callback's table, of a body that may turn, or that carries one that may."""
-    body, number = vehicle.body(name), indices.bodies[name]
-    first, count = max(int(model.body_jntadr[number]), 0), len(body.freedoms)
+    body, number = vehicle.body(body_name), mujoco_indices.bodies[body_name]
+    first, count = max(int(mujoco_model.body_jntadr[number]), 0), len(body.freedoms)
     sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
     parent = listed_bodies.index(body.parent) if body.parent else -1
     return [parent, number, first, first + sliding, first + count]
 
 
-def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
+def _points_of(elements: list[Element], vehicle: SpatialVehicle, body_name: str) -> list[list[float]]:
     """Numbers, in the callback's table, of the points at which elements act on a body that may turn."""
-    centre = vehicle.body(name).position
+    centre = vehicle.body(body_name).position
     return [
         [i, *np.subtract(point, centre), *axis]
         for i, element in enumerate(elements)
         for body, point, axis in element.points
-        if body == name and vehicle.turns(name)
+        if body == body_name and vehicle.turns(body_name)
     ]
 
 
-def _element_numbers(element: Element, vehicle: SpatialVehicle, indices: MujocoIndices) -> list[float]:
+def _element_numbers(element: Element, vehicle: SpatialVehicle, mujoco_indices: MujocoIndices) -> list[float]:
     """Numbers of an element in the callback's table: its linear law, the factors of coordinates in its travel, and the
     nonlinear terms of its law."""
     shares, rest = dict[int, float](), 0.0
-    if element.added_coordinate in indices.joints:
-        shares[indices.joints[element.added_coordinate]] = 1.0
+    if element.added_coordinate in mujoco_indices.joints:
+        shares[mujoco_indices.joints[element.added_coordinate]] = 1.0
     for name, point, axis in element.points:
         if vehicle.turns(name):
             rest += float(np.dot(point, axis))
             continue
         for place in ((body, freedom) for body in vehicle.chain(name) for freedom in vehicle.body(body).freedoms):
-            joint = indices.joints[place]
+            joint = mujoco_indices.joints[place]
             shares[joint] = shares.get(joint, 0.0) + float(np.dot(axis, AXES[place[1]]))
     flat = [value for pair in shares.items() if pair[1] for value in pair]
-    more = _nonlinear_numbers(element, indices)
+    more = _nonlinear_numbers(element, mujoco_indices)
     law = [element.stiffness, element.damping, element.held, element.tyre, rest, element.one_sided]
     begins = SHARES + len(flat)
     return [begins + len(more), *law, begins if more else 0, *flat, *more]
 
 
-def _nonlinear_numbers(element: Element, indices: MujocoIndices) -> list[float]:
+def _nonlinear_numbers(element: Element, mujoco_indices: MujocoIndices) -> list[float]:
     """Numbers of the nonlinear terms of an element's law in the callback's table; none where the law is linear."""
-    steered = [value for place, gain in element.steered for value in (indices.joints.get(place, -1), gain)]
+    steered = [value for place, gain in element.steered for value in (mujoco_indices.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]
     if not (element.friction[0] or steered or any(curves)):
         return []

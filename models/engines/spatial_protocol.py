@@ -42,9 +42,9 @@ corners and friction, with errors of 1e-11."""
 class SpatialModel(Model, Protocol):
     """A spatial vehicle in an engine, which also gives the linear vehicle that ride needs."""
 
-    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,); ``road`` (2 w,) replaces the model's own road:
-        heights (m), then rates (m/s) under w tyres."""
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road_row: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) at a time (s), positions and rates (n,); ``road_row`` (2 w,) replaces the model's own
+        road: heights (m), then rates (m/s) under w tyres."""
         ...
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
@@ -59,24 +59,24 @@ class SpatialModel(Model, Protocol):
 def build(
     engine: str,
     vehicle: SpatialVehicle,
-    settings: Settings | None = None,
+    run_settings: Settings | None = None,
     speed: float | None = None,
-    road: np.ndarray | None = None,
+    road_rows: np.ndarray | None = None,
 ) -> SpatialModel:
     """Model of a spatial vehicle in "exudyn" or "mujoco".
 
-    settings : wanted for runs in time; Refused where the step does not fit or a mode would grow.
+    run_settings : wanted for runs in time; Refused where the step does not fit or a mode would grow.
     speed : m/s, for side forces and drag; InputError where they miss it.
-    road : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
+    road_rows : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
     """
     check_buildable(engine, vehicle)
     linear = linearise(vehicle, speed)
-    if settings is not None:
-        _check_run(engine, linear, settings, road)
-    elif road is not None:
+    if run_settings is not None:
+        _check_run(engine, linear, run_settings, road_rows)
+    elif road_rows is not None:
         raise Refused(engine, "a road is read by half steps: it needs settings with a step")
     kind = getattr(import_module(f"models.engines.spatial_{engine}"), f"Spatial{engine.capitalize()}")
-    model: SpatialModel = kind(vehicle, settings, speed, road)
+    model: SpatialModel = kind(vehicle, run_settings, speed, road_rows)
     return model
 
 
@@ -103,27 +103,30 @@ def check_buildable(engine: str, vehicle: SpatialVehicle) -> None:
         )
 
 
-def _check_run(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
+def _check_run(
+    engine: str, linearised_vehicle: LinearVehicle, run_settings: Settings, road_rows: np.ndarray | None
+) -> None:
     """Raise Refused for integrators, roads and steps with which a run would compute wrong results."""
-    if settings.integrator not in ALLOWED_INTEGRATORS[engine]:
+    if run_settings.integrator not in ALLOWED_INTEGRATORS[engine]:
         raise Refused(
             engine,
-            f"vehicles in space march with {' or '.join(ALLOWED_INTEGRATORS[engine])}, not with {settings.integrator}",
+            f"vehicles in space march with {' or '.join(ALLOWED_INTEGRATORS[engine])}, "
+            f"not with {run_settings.integrator}",
         )
-    check_divides(engine, settings)
-    shape = (2 * settings.steps + 1, 2 * len(linear.wheels))
-    if road is not None and (road.shape != shape or not np.isfinite(road).all()):
+    check_divides(engine, run_settings)
+    shape = (2 * run_settings.steps + 1, 2 * len(linearised_vehicle.wheels))
+    if road_rows is not None and (road_rows.shape != shape or not np.isfinite(road_rows).all()):
         raise Refused(
             engine,
             f"the road must be {shape[0]} rows (half steps) of {shape[1]} finite numbers (heights, "
-            f"then rates under {len(linear.wheels)} tyres)",
+            f"then rates under {len(linearised_vehicle.wheels)} tyres)",
         )
-    check_modes(engine, linear, settings)
+    check_modes(engine, linearised_vehicle, run_settings)
 
 
-def check_divides(engine: str, settings: Settings) -> None:
+def check_divides(engine: str, run_settings: Settings) -> None:
     """Raise Refused for a step that does not divide the duration."""
-    step, duration = settings.step, settings.duration
+    step, duration = run_settings.step, run_settings.duration
     if not divides(step, duration):
         raise Refused(
             engine,
@@ -132,12 +135,16 @@ def check_divides(engine: str, settings: Settings) -> None:
         )
 
 
-def check_modes(engine: str, linear: LinearVehicle, settings: Settings) -> None:
+def check_modes(engine: str, linearised_vehicle: LinearVehicle, run_settings: Settings) -> None:
     """Raise Refused for a step with which a mode of the linear vehicle grows, although the mode itself does not."""
-    n = len(linear.mass)
-    damping, stiffness = np.split(np.linalg.solve(linear.mass, np.hstack([linear.damping, linear.stiffness])), 2, 1)
+    n = len(linearised_vehicle.mass)
+    damping, stiffness = np.split(
+        np.linalg.solve(linearised_vehicle.mass, np.hstack([linearised_vehicle.damping, linearised_vehicle.stiffness])),
+        2,
+        1,
+    )
     parts = (np.eye(n), damping, stiffness, *np.zeros((2, n, n)))  # no engine knows its callback's damping
-    name, h, duration = settings.integrator, settings.step, settings.duration
+    name, h, duration = run_settings.integrator, run_settings.step, run_settings.duration
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
     if log_growth(name, h, duration, parts) > math.log(ALLOWED_GROWTH) + max(0.0, float(poles.real.max())) * duration:
         raise Refused(
@@ -158,15 +165,15 @@ def curve_count(vehicle: SpatialVehicle) -> int:
     return sum((s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs)
 
 
-def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: float) -> np.ndarray:
+def jacobian(vector_function: Callable[[np.ndarray], np.ndarray], argument_count: int, small_step: float) -> np.ndarray:
     """Jacobian (outputs, size) of a function at 0, by central differences of order six with a step."""
     columns = [
         sum(
-            weight * (function(i * step * unit) - function(-i * step * unit))
+            weight * (vector_function(i * small_step * unit) - vector_function(-i * small_step * unit))
             for i, weight in DIFFERENCE_WEIGHTS.items()
         )
-        / step
-        for unit in np.eye(size)
+        / small_step
+        for unit in np.eye(argument_count)
     ]
     return np.column_stack(columns)
 
@@ -175,10 +182,13 @@ class EngineKinematics(Kinematics):
     """Kinematics of points and bodies from an engine's Jacobians in the design position."""
 
     def __init__(
-        self, vehicle: SpatialVehicle, shift: Callable[[str, Vector], np.ndarray], turn: Callable[[str], np.ndarray]
+        self,
+        vehicle: SpatialVehicle,
+        point_jacobian: Callable[[str, Vector], np.ndarray],
+        rotation_jacobian: Callable[[str], np.ndarray],
     ) -> None:
         super().__init__(vehicle)
-        self._shift, self._turn = shift, turn
+        self._shift, self._turn = point_jacobian, rotation_jacobian
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
         """Jacobian (3, n) of a point's (m) displacement with respect to the coordinates; zeros for a point on the
@@ -193,25 +203,25 @@ class EngineKinematics(Kinematics):
 def linear_vehicle(
     engine: str,
     vehicle: SpatialVehicle,
-    motion: EngineKinematics,
-    mass: np.ndarray,
-    damping: np.ndarray,
-    stiffness: np.ndarray,
-    road: np.ndarray,
+    kinematics: EngineKinematics,
+    mass_matrix: np.ndarray,
+    damping_matrix: np.ndarray,
+    stiffness_matrix: np.ndarray,
+    road_rows: np.ndarray,
 ) -> LinearVehicle:
-    """The linear vehicle from an engine's matrices; ``road`` (n, 2 w) : generalised forces per road height, then per
-    rate, under w tyres."""
-    by_height, by_rate = np.split(road, 2, axis=1)
+    """The linear vehicle from an engine's matrices; ``road_rows`` (n, 2 w) : generalised forces per road height, then
+    per rate, under w tyres."""
+    by_height, by_rate = np.split(road_rows, 2, axis=1)
     source = f"{engine}, " + ("loaded" if vehicle.gravity else "unloaded")
     return LinearVehicle(
-        mass,
-        damping,
-        stiffness,
+        mass_matrix,
+        damping_matrix,
+        stiffness_matrix,
         by_height,
         by_rate,
         vehicle.coordinates(),
         wheels(vehicle),
-        outputs(vehicle, motion),
+        outputs(vehicle, kinematics),
         source,
     )
 
@@ -242,8 +252,13 @@ def linear_vehicle_at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[
 
 
 def checked_trajectory(
-    engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
+    engine: str,
+    run_settings: Settings,
+    times: np.ndarray,
+    states: np.ndarray,
+    engine_note: str,
+    run_counts: dict[str, int],
 ) -> Trajectory:
     """The trajectory of a run, after the checks of ``guard``; raises RunFailed."""
-    guard(engine, times, states, settings.duration, note)
-    return Trajectory(times, states, counts=counts)
+    guard(engine, times, states, run_settings.duration, engine_note)
+    return Trajectory(times, states, counts=run_counts)

@@ -26,22 +26,22 @@ class BodyMotion:
     shift_rest: np.ndarray
     turn_rest: np.ndarray
 
-    def at(self, arm: np.ndarray, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position and Jacobian of a body's point at ``arm`` (body's axes) from the centre, and the term of its
+    def at(self, body_vector: np.ndarray, angular_velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position and Jacobian of a body's point at ``body_vector`` (body's axes) from the centre, and the term of its
         acceleration that does not depend on q''."""
-        r = self.rotation @ arm
+        r = self.rotation @ body_vector
         rows = self.shift - cross_product_matrix(r) @ self.turn
         rest = (
             self.shift_rest
             - cross_product_matrix(r) @ self.turn_rest
-            + cross_product_matrix(omega) @ (cross_product_matrix(omega) @ r)
+            + cross_product_matrix(angular_velocity) @ (cross_product_matrix(angular_velocity) @ r)
         )
         return self.centre + r, rows, rest
 
 
-def cross_product_matrix(v: np.ndarray) -> np.ndarray:
+def cross_product_matrix(vector: np.ndarray) -> np.ndarray:
     """The matrix (3, 3) of the cross product v x of a vector v (3,); ten times as fast as numpy's own product."""
-    x, y, z = v.tolist()
+    x, y, z = vector.tolist()
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
 
 
@@ -59,8 +59,8 @@ class SpatialReference:
         self.index = {place: i for i, place in enumerate(vehicle.coordinates())}
         self.size = len(self.index)
 
-    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) from positions and rates (n,); ``road`` (2 w,): heights (m), then rates (m/s) under w
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road_row: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) from positions and rates (n,); ``road_row`` (2 w,): heights (m), then rates (m/s) under w
         tyres."""
         self.q, self.v, self.motions = q, v, self.motions_of(q, v)
         mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)
@@ -70,7 +70,7 @@ class SpatialReference:
             mass += body.mass * m.shift.T @ m.shift + m.turn.T @ inertia @ m.turn
             force -= body.mass * m.shift.T @ (m.shift_rest + self.vehicle.gravity * UNIT_AXES[2])
             force -= m.turn.T @ (inertia @ m.turn_rest + cross_product_matrix(omega) @ inertia @ omega)
-        force += self._forces(np.zeros(2 * len(self.vehicle.tyres)) if road is None else road)
+        force += self._forces(np.zeros(2 * len(self.vehicle.tyres)) if road_row is None else road_row)
         return np.linalg.solve(mass, force)
 
     def motions_of(self, q: np.ndarray, v: np.ndarray) -> dict[str, BodyMotion]:
@@ -114,9 +114,9 @@ class SpatialReference:
             return np.array(point), np.zeros((3, self.size))
         return self.motions[body].at(np.subtract(point, self.vehicle.body(body).position), np.zeros(3))[:2]
 
-    def _forces(self, road: np.ndarray) -> np.ndarray:
+    def _forces(self, road_row: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of springs, bars, tyres, side forces and drags, without weights."""
-        out, heights, rates = np.zeros(self.size), *np.split(road, 2)
+        out, heights, rates = np.zeros(self.size), *np.split(road_row, 2)
         for spring in self.vehicle.springs:
             out += self._spring(spring)
         for bar in self.vehicle.bars:
@@ -137,13 +137,20 @@ class SpatialReference:
             out -= drag.coefficient * self.speed * (row @ self.v) * row
         return out
 
-    def _spring(self, s: SpringDamper) -> np.ndarray:
+    def _spring(self, spring: SpringDamper) -> np.ndarray:
         """Generalised forces (n,) of a spring-damper."""
-        travel, row = self._travel((s.first_body, s.first_point), (s.second_body, s.second_point), s.axis, s.frame)
+        travel, row = self._travel(
+            (spring.first_body, spring.first_point),
+            (spring.second_body, spring.second_point),
+            spring.axis,
+            spring.frame,
+        )
         rate = row @ self.v
-        force = self.held.parts[s.name] + s.stiffness * travel + s.damping * rate
-        force += (s.travel_force(travel) if s.travel_force else 0.0) + (s.rate_force(rate) if s.rate_force else 0.0)
-        return -(force + s.friction * np.tanh(rate / s.friction_rate)) * row
+        force = self.held.parts[spring.name] + spring.stiffness * travel + spring.damping * rate
+        force += (spring.travel_force(travel) if spring.travel_force else 0.0) + (
+            spring.rate_force(rate) if spring.rate_force else 0.0
+        )
+        return -(force + spring.friction * np.tanh(rate / spring.friction_rate)) * row
 
     def _bar(self, bar: AntiRollBar) -> np.ndarray:
         """Generalised forces (n,) of an anti-roll bar. Where the bar's frame is the body itself, the body's roll is not

@@ -50,27 +50,27 @@ def stability_polynomial(integrator: str) -> list[float] | None:
     return None
 
 
-def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> LinearMatrices:
-    """The vehicle's matrices about zero pitch, without the ``guided`` coordinates: pitch springs as beyond their dead
-    bands, and tyres on the road."""
+def linearised(vehicle: Vehicle, prescribed_coordinates: Collection[int] = ()) -> LinearMatrices:
+    """The vehicle's matrices about zero pitch, without the ``prescribed_coordinates`` coordinates: pitch springs as
+    beyond their dead bands, and tyres on the road."""
     known = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if not strut.pushes_only))
     taut = tuple(replace(spring, dead_band=0.0) for spring in vehicle.pitch_springs)
     mass, damping, stiffness = matrices(replace(vehicle, pitch_springs=taut))
     native, joint = matrices(known)[1], matrices(replace(known, struts=known.tyres))[1]
-    kept = [i for i in range(len(mass)) if i not in guided]
+    kept = [i for i in range(len(mass)) if i not in prescribed_coordinates]
     pick = np.ix_(kept, kept)
     return mass[pick], damping[pick], stiffness[pick], native[pick], joint[pick]
 
 
-def first_order(linear: LinearMatrices) -> np.ndarray:
+def first_order(linear_matrices: LinearMatrices) -> np.ndarray:
     """State matrix A (2n, 2n) of y' = A y, where y = (q, q')."""
-    mass, damping, stiffness, *_ = linear
+    mass, damping, stiffness, *_ = linear_matrices
     n = len(mass)
     inverse = np.diag(1 / mass.diagonal())
     return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
 
 
-def step_matrix(integrator: str, step: float, linear: LinearMatrices) -> np.ndarray | None:
+def step_matrix(integrator: str, time_step: float, linear_matrices: LinearMatrices) -> np.ndarray | None:
     """Matrix (2n, 2n) that advances (q, q') by one step (s); None for integrators that are stable with any step.
 
     That is so for generalised-alpha, the trapezoidal rule and MuJoCo's ``discrete``, which are implicit in
@@ -78,92 +78,94 @@ def step_matrix(integrator: str, step: float, linear: LinearMatrices) -> np.ndar
     """
     polynomial = stability_polynomial(integrator)
     if polynomial is not None:
-        z = step * first_order(linear)
+        z = time_step * first_order(linear_matrices)
         out = np.zeros_like(z)
         for coefficient in reversed(polynomial):
             out = out @ z + coefficient * np.eye(len(z))
         return out
     if integrator == "VelocityVerlet":
-        return _verlet(step, linear)
-    *_, native, joint = linear
+        return _verlet(time_step, linear_matrices)
+    *_, native, joint = linear_matrices
     alone = np.diag(native.diagonal())
     within_trees = alone.copy()  # between coordinates of one body, not across branches
     within_trees[2:, 2:] = native[2:, 2:]
     implicit = {"Euler": joint, "implicit": within_trees, "implicitfast": alone}
-    return _semi_implicit(step, linear, implicit[integrator]) if integrator in implicit else None
+    return _semi_implicit(time_step, linear_matrices, implicit[integrator]) if integrator in implicit else None
 
 
-def _verlet(step: float, linear: LinearMatrices) -> np.ndarray:
+def _verlet(time_step: float, linear_matrices: LinearMatrices) -> np.ndarray:
     """Matrix (3n, 3n) that advances (q, q', q'') by one step of Exudyn's velocity Verlet.
 
     The acceleration at the end of a step uses the velocity at its middle, and the next step begins with this
     acceleration, which is therefore part of the state. A single step looks stable up to 5.6 ms, two are stable only up
     to 2.7 ms.
     """
-    a = first_order(linear)
+    a = first_order(linear_matrices)
     n = len(a) // 2
     q, v, first = (np.eye(3 * n)[i * n : (i + 1) * n] for i in range(3))
-    after = q + step * v + 0.5 * step**2 * first
-    second = a[n:, :n] @ after + a[n:, n:] @ (v + 0.5 * step * first)
-    return np.vstack([after, v + 0.5 * step * (first + second), second])
+    after = q + time_step * v + 0.5 * time_step**2 * first
+    second = a[n:, :n] @ after + a[n:, n:] @ (v + 0.5 * time_step * first)
+    return np.vstack([after, v + 0.5 * time_step * (first + second), second])
 
 
-def _semi_implicit(step: float, linear: LinearMatrices, implicit: np.ndarray) -> np.ndarray:
-    """Matrix (2n, 2n) of one step of MuJoCo's single-step integrators: new velocities, with the part ``implicit``
-    (n, n) of the damping taken implicitly, then positions from these."""
-    mass, damping, stiffness, *_ = linear
+def _semi_implicit(time_step: float, linear_matrices: LinearMatrices, implicit_damping: np.ndarray) -> np.ndarray:
+    """Matrix (2n, 2n) of one step of MuJoCo's single-step integrators: new velocities, with the part
+    ``implicit_damping`` (n, n) of the damping taken implicitly, then positions from these."""
+    mass, damping, stiffness, *_ = linear_matrices
     n = len(mass)
     q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]
-    after = v - step * np.linalg.solve(mass + step * implicit, stiffness @ q + damping @ v)
-    return np.vstack([q + step * after, after])
+    after = v - time_step * np.linalg.solve(mass + time_step * implicit_damping, stiffness @ q + damping @ v)
+    return np.vstack([q + time_step * after, after])
 
 
-def log_growth(integrator: str, step: float, duration: float, linear: LinearMatrices) -> float:
+def log_growth(integrator: str, time_step: float, duration: float, linear_matrices: LinearMatrices) -> float:
     """Natural logarithm of the factor by which the fastest growing mode grows over a run; 0 if none grows."""
-    matrix = step_matrix(integrator, step, linear)
+    matrix = step_matrix(integrator, time_step, linear_matrices)
     if matrix is None:
         return 0.0
     radius = float(np.abs(np.linalg.eigvals(matrix)).max())
-    return max(0.0, duration / step * math.log(radius)) if math.isfinite(radius) else math.inf
+    return max(0.0, duration / time_step * math.log(radius)) if math.isfinite(radius) else math.inf
 
 
-def longest_stable_step(integrator: str, step: float, duration: float, linear: LinearMatrices) -> float:
+def longest_stable_step(
+    integrator: str, unstable_step: float, duration: float, linear_matrices: LinearMatrices
+) -> float:
     """Longest step (s), to four digits, at which no mode grows over the run; the search starts at an unstable step."""
-    allowed, stable = math.log(ALLOWED_GROWTH), step / 2
-    while log_growth(integrator, stable, duration, linear) > allowed and stable > 1e-12 * step:
+    allowed, stable = math.log(ALLOWED_GROWTH), unstable_step / 2
+    while log_growth(integrator, stable, duration, linear_matrices) > allowed and stable > 1e-12 * unstable_step:
         stable /= 2
     unstable = 2 * stable
     while unstable - stable > 1e-5 * stable:
         middle = 0.5 * (stable + unstable)
-        if log_growth(integrator, middle, duration, linear) > allowed:
+        if log_growth(integrator, middle, duration, linear_matrices) > allowed:
             unstable = middle
         else:
             stable = middle
     return stable
 
 
-def check_step(engine: str, assembly: Assembly, settings: Settings) -> None:
+def check_step(engine: str, assembly: Assembly, run_settings: Settings) -> None:
     """Raise Refused for a step with which a mode of the vehicle would grow; the message gives the limit and the fastest
     pole."""
     linear = linearised(assembly.vehicle, assembly.guided)
-    grown = log_growth(settings.integrator, settings.step, settings.duration, linear)
+    grown = log_growth(run_settings.integrator, run_settings.step, run_settings.duration, linear)
     if grown <= math.log(ALLOWED_GROWTH):
         return
     longest = longest_stable_step(
-        settings.integrator, settings.step, max(settings.duration, LONG_RUN * settings.step), linear
+        run_settings.integrator, run_settings.step, max(run_settings.duration, LONG_RUN * run_settings.step), linear
     )
     scale = 10.0 ** (math.floor(math.log10(longest)) - 2)  # three digits, rounded down: a limit that is named must hold
     raise Refused(
         engine,
-        f"step {settings.step:g} s exceeds the stability limit {math.floor(longest / scale) * scale:g} s of "
-        f"{settings.integrator} for this vehicle (fastest pole {_fastest_pole_text(linear)}): an error would grow "
+        f"step {run_settings.step:g} s exceeds the stability limit {math.floor(longest / scale) * scale:g} s of "
+        f"{run_settings.integrator} for this vehicle (fastest pole {_fastest_pole_text(linear)}): an error would grow "
         f"1e{grown / math.log(10):.0f}-fold over the run; shorten the step",
     )
 
 
-def _fastest_pole_text(linear: LinearMatrices) -> str:
+def _fastest_pole_text(linear_matrices: LinearMatrices) -> str:
     """Text of the vehicle's eigenvalue with the largest magnitude, in 1/s."""
-    poles = np.linalg.eigvals(first_order(linear))
+    poles = np.linalg.eigvals(first_order(linear_matrices))
     pole = complex(poles[np.abs(poles).argmax()])
     real = 0.0 if abs(pole.real) < 1e-9 * abs(pole) else pole.real
     swing = "" if abs(pole.imag) < 1e-9 * abs(pole) else f" +- {abs(pole.imag):.4g}i"

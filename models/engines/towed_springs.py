@@ -18,23 +18,26 @@ FORCE_COLUMNS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, par
 curves); all are 0 if the engine itself computes the part."""
 
 
-def towed_division(handling: Handling, engine: str) -> Division:
+def towed_division(vehicle_on_tyres: Handling, engine: str) -> Division:
     """Division of the springs and bars of towed bodies between "exudyn" or "mujoco" and the compiled forces."""
-    free = handling.vehicle
-    elements = elements_of(free, handling.held) if handling.forces == "native" and free.towed else ()
+    free = vehicle_on_tyres.vehicle
+    elements = elements_of(free, vehicle_on_tyres.held) if vehicle_on_tyres.forces == "native" and free.towed else ()
     return divide(free, (element for element in elements if element.frame in free.towed), engine)
 
 
-def shared_numbers(handling: Handling, division: Division) -> np.ndarray:
+def shared_numbers(vehicle_on_tyres: Handling, division: Division) -> np.ndarray:
     """The table for the compiled forces, without the terms that native parts compute; the vehicle's own table where
     there are no native parts."""
     if not division.native:
-        return handling.numbers
-    numbers, native = handling.numbers.copy(), {part.element.name for part in division.native}
+        return vehicle_on_tyres.numbers
+    numbers, native = vehicle_on_tyres.numbers.copy(), {part.element.name for part in division.native}
     first, count = int(numbers[at.OF_PARTS]), int(numbers[at.PARTS])
     rows = numbers[first : first + count * parts.PER_PART].reshape(count, parts.PER_PART)
     left = {element.name: element for element in division.shared}
-    all_parts: tuple[SpringDamper | AntiRollBar, ...] = (*handling.vehicle.springs, *handling.vehicle.bars)
+    all_parts: tuple[SpringDamper | AntiRollBar, ...] = (
+        *vehicle_on_tyres.vehicle.springs,
+        *vehicle_on_tyres.vehicle.bars,
+    )
     for row, part in zip(rows, all_parts, strict=True):
         if part.name in native:
             _remainder(row, left.get(part.name))
@@ -43,16 +46,16 @@ def shared_numbers(handling: Handling, division: Division) -> np.ndarray:
     return numbers
 
 
-def _remainder(row: np.ndarray, shared_element: Element | None) -> None:
+def _remainder(element_row: np.ndarray, shared_element: Element | None) -> None:
     """Reduce a part's row of the table to the terms that are not native; to zeros where the part is entirely native."""
     gone = (
         shared_element is None or shared_element.travel_force is None,
         shared_element is None or shared_element.rate_force is None,
     )
-    row[FORCE_COLUMNS[:4]] = (
+    element_row[FORCE_COLUMNS[:4]] = (
         (shared_element.stiffness, shared_element.damping, shared_element.preload, shared_element.friction)
         if shared_element
         else 0.0
     )
     for column, none in zip(FORCE_COLUMNS[4:], gone, strict=True):
-        row[column] = 0.0 if none else row[column]
+        element_row[column] = 0.0 if none else element_row[column]

@@ -30,10 +30,10 @@ from models.vehicles.spatial import Body, SpatialVehicle
 CENTRE = (0.0, 0.0, 0.0)
 
 
-def driven_wheelset(equations: Equations) -> Driven:
+def driven_wheelset(wheelset_equations: Equations) -> Driven:
     """The wheelset as engines build it: bodies in the order of the joints, the suspension at both ends, and the table
     of numbers for the forces of the rails."""
-    body = equations.body
+    body = wheelset_equations.body
     across, along = body.yaw_inertia, body.spin_inertia
     inertia = ((across, 0.0, 0.0), (0.0, along, 0.0), (0.0, 0.0, across))
     track = np.array([0.0, body.lean, 1.0])  # along the track's axes, by a weight's part square to the track
@@ -53,7 +53,7 @@ def driven_wheelset(equations: Equations) -> Driven:
         )
         for arm in (body.half_spacing, -body.half_spacing)
     )
-    numbers = table(float(equations.speed), equations.rails)
+    numbers = table(float(wheelset_equations.speed), wheelset_equations.rails)
     vehicle = SpatialVehicle("wheelset", bodies, (), (), ())
     return Driven(vehicle, GRAVITY * track, numbers, joint_forces, set_joint_forces, ground_springs=springs)
 
@@ -72,14 +72,16 @@ class EngineWheelset(Equations):
         joints = joints_from_states(np.asarray(state, float))
         return state_rates(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
-    def _states_and_contacts(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
-        """States (m, 10) by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
+    def _states_and_contacts(
+        self, state: Array, row_count: int, time_step: float, steps_per_row: int
+    ) -> tuple[Array, Array]:
+        """States (m, 10) by the engine's RK4, every ``steps_per_row``-th of them, and the contacts in these states."""
         joints = joints_from_states(state)
-        states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
+        states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], row_count, time_step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < DERAILED_LIMIT)
         if away.any():
-            raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
-        return states[::stride], self.at(states[::stride])[1]
+            raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * time_step)
+        return states[::steps_per_row], self.at(states[::steps_per_row])[1]
 
 
 class ExudynWheelset(EngineWheelset):

@@ -59,12 +59,14 @@ def inlined(function: Callable) -> Any:
     return njit(cache=True, error_model="numpy", _nrt=False, inline="always")(function)
 
 
-def _kept_apart(compiled: Any) -> Any:
+def _kept_apart(compiled_function: Any) -> Any:
     """The numba function, compiled once for all literal numbers of its callers, and by one process at a time, with
     cache files that are safe from other processes."""
-    _without_literals(compiled)
-    compiled.compile = _compile_alone(compiled._cache, compiled.py_func, compiled.compile)
-    return compiled
+    _without_literals(compiled_function)
+    compiled_function.compile = _compile_alone(
+        compiled_function._cache, compiled_function.py_func, compiled_function.compile
+    )
+    return compiled_function
 
 
 def _compile_alone(function_cache: Any, function: Callable, compile_function: Callable) -> Callable:
@@ -91,54 +93,55 @@ def _compile_alone(function_cache: Any, function: Callable, compile_function: Ca
     return compile_alone
 
 
-def callback(function: Callable, signature: Any) -> Any:
+def callback(function: Callable, callback_signature: Any) -> Any:
     """C callback with a signature, cached on disk as kernels are; a kernel that the function calls is one of its
     globals."""
-    law: Any = CFunc(function, normalize_signature(signature), {}, {})
+    law: Any = CFunc(function, normalize_signature(callback_signature), {}, {})
     law.enable_caching()
     _compile_alone(law._cache, function, law.compile)()
     return law
 
 
-def _without_literals(compiled: Any) -> None:
+def _without_literals(compiled_function: Any) -> None:
     """Have the function compiled once for all literal numbers of its callers; numba would compile it for each
     number."""
-    template = compiled.get_call_template
+    template = compiled_function.get_call_template
 
-    def plain(types: Any, keywords: dict[str, Any]) -> Any:
+    def plain(argument_types: Any, keywords: dict[str, Any]) -> Any:
         return template(
-            tuple(unliteral(each) for each in types), {name: unliteral(each) for name, each in keywords.items()}
+            tuple(unliteral(each) for each in argument_types),
+            {name: unliteral(each) for name, each in keywords.items()},
         )
 
-    compiled.get_call_template = plain
+    compiled_function.get_call_template = plain
 
 
-def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
+def _or_none(load_index: Callable[[], dict]) -> Callable[[], dict]:
     """Wrapper of a cache index reader that returns an empty index if older sources wrote the index, with classes that
     no longer exist."""
 
     def read() -> dict:
         try:
-            return load()
+            return load_index()
         except (AttributeError, ImportError):
             return {}
 
     return read
 
 
-def named_closure(function: Any, *parts: Any) -> Any:
-    """The closure, renamed after ``parts`` so that its name is unique among its factory's closures; must be done before
-    compiling."""
-    function.__qualname__ = function.__name__ = "_".join([function.__name__, *(str(part) for part in parts)])
-    return function
+def named_closure(closure: Any, *name_parts: Any) -> Any:
+    """The closure, renamed after ``name_parts`` so that its name is unique among its factory's closures; must be done
+    before compiling."""
+    closure.__qualname__ = closure.__name__ = "_".join([closure.__name__, *(str(part) for part in name_parts)])
+    return closure
 
 
 @cache
-def checksum(folder: Path) -> int:
+def checksum(source_folder: Path) -> int:
     """Checksum of all sources in a folder and in the folders that all kernels share, with the tables beside them:
     whatever a kernel of this folder may contain."""
     sources = (
-        path for place in sorted({folder, *COMMON}) for path in sorted(place.iterdir()) if path.suffix in SOURCES
+        path for place in sorted({source_folder, *COMMON}) for path in sorted(place.iterdir()) if path.suffix in SOURCES
     )
     return zlib.crc32(b"".join(path.read_bytes() for path in sources))
 
@@ -150,17 +153,17 @@ def _files(function: Any) -> list[Path]:
     return [Path(each.__code__.co_filename) for each in functions]
 
 
-def stamp(file: Path, *others: Path) -> int:
-    """Checksum of all sources that a kernel in ``file`` may contain: the sources of its folder, and the kernels of
-    ``others`` and of all files that these import."""
-    made_of = {*others, *(path for each in (file, *others) for path in _imported(each))}
-    elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
-    return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(file.parent))
+def stamp(kernel_file: Path, *called_kernels: Path) -> int:
+    """Checksum of all sources that a kernel in ``kernel_file`` may contain: the sources of its folder, and the kernels
+    of ``called_kernels`` and of all files that these import."""
+    made_of = {*called_kernels, *(path for each in (kernel_file, *called_kernels) for path in _imported(each))}
+    elsewhere = sorted(path for path in made_of if path.parent not in (kernel_file.parent, *COMMON))
+    return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(kernel_file.parent))
 
 
-def _imported(file: Path) -> set[Path]:
+def _imported(source_file: Path) -> set[Path]:
     """Files with compiled kernels that a file imports, directly or through other such files."""
-    imported, left = set[Path](), [file]
+    imported, left = set[Path](), [source_file]
     while left:
         new = _kernels(left.pop()) - imported
         imported |= new
@@ -169,13 +172,13 @@ def _imported(file: Path) -> set[Path]:
 
 
 @cache
-def _kernels(file: Path) -> frozenset[Path]:
+def _kernels(source_file: Path) -> frozenset[Path]:
     """Files with compiled kernels that a file's import statements name; read from the text, without importing."""
-    if not file.is_file():
+    if not source_file.is_file():
         return frozenset()
     places = [
         ROOT.joinpath(*module.split("."), *name)
-        for module, *names in IMPORT.findall(file.read_text())
+        for module, *names in IMPORT.findall(source_file.read_text())
         for name in ((), *((part.split()[0],) for part in "".join(names).split(",") if part.strip()))
     ]
     files = {place.with_suffix(".py") for place in places}

@@ -14,20 +14,20 @@ SEEKER = "xarray"
 import."""
 
 
-def leave_out(*names: str) -> None:
+def leave_out(*library_names: str) -> None:
     """Make optional libraries appear as not installed in this process, until ``let_in`` is called.
 
     Those that are imported already stay, and all stay where xarray is: it may count on them.
     """
     modules: dict[str, Any] = sys.modules
     if SEEKER not in modules:
-        for name in names:
+        for name in library_names:
             modules.setdefault(name, None)
 
 
-def let_in(*names: str) -> None:
+def let_in(*library_names: str) -> None:
     """Undo ``leave_out`` for these libraries; must be called before one of them is imported."""
     modules: dict[str, Any] = sys.modules
-    for name in names:
+    for name in library_names:
         if name in modules and modules[name] is None:
             del modules[name]

@@ -18,14 +18,14 @@ from models.machine.stack import DOUBLES, REGISTER
 _intrinsic: Any = intrinsic
 
 
-def record(*names: str) -> np.dtype:
+def record(*field_names: str) -> np.dtype:
     """Type of a record with one double per name; in Python the doubles are attributes, too."""
-    return np.dtype((np.record, np.dtype([(name, np.float64) for name in names], align=True)))
+    return np.dtype((np.record, np.dtype([(name, np.float64) for name in field_names], align=True)))
 
 
-def size_of(kind: np.dtype) -> int:
+def size_of(record_type: np.dtype) -> int:
     """Number of doubles in a record of this type."""
-    return kind.itemsize // 8
+    return record_type.itemsize // 8
 
 
 @_intrinsic
@@ -62,9 +62,9 @@ def stacked(typing_context, count, kind):
     return made(count if isinstance(count, types.IntegerLiteral) else types.intp, kind), generate
 
 
-def _array(context: Any, builder: Any, made: Any, pointer: Any, count: Any) -> Any:
+def _array(context: Any, builder: Any, array_type: Any, pointer: Any, count: Any) -> Any:
     """Array of ``count`` records that starts at a pointer."""
-    array, size = make_array(made)(context, builder), context.get_constant(types.intp, made.dtype.size)
+    array, size = make_array(array_type)(context, builder), context.get_constant(types.intp, array_type.dtype.size)
     place = builder.bitcast(pointer, array.data.type)
     populate_array(array, place, [count], [size], size, None, None)
     return array._getvalue()

@@ -28,7 +28,7 @@ def interleave(
     jobs: Sequence[Callable[[], Any]],
     rounds: int,
     minimum_seconds: float = 0.02,
-    lasted: Sequence[float] | np.ndarray | None = None,
+    warm_up_times: Sequence[float] | np.ndarray | None = None,
     round_interval: Sequence[int] | None = None,
     clock: Clock = time.perf_counter,
 ) -> np.ndarray:
@@ -36,10 +36,10 @@ def interleave(
     thread, warmed up.
 
     minimum_seconds : a job is repeated within its turn until it lasts about this long (s);
-    lasted : seconds of a run of each job that has been, 0 where there was none; round_interval : a job is in one of so
-    many rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
-    """
-    known = [0.0] * len(jobs) if lasted is None else lasted
+    warm_up_times : seconds of a run of each job that has been, 0 where there was none; round_interval : a job is in one
+    of so many rounds, a run that has been its first; clock : that of the processor leaves out what else the machine
+    does."""
+    known = [0.0] * len(jobs) if warm_up_times is None else warm_up_times
     repeats = [
         1 if duration > LONG_JOB_RATIO * minimum_seconds else _repeats(job, minimum_seconds, clock)
         for job, duration in zip(jobs, known, strict=True)
@@ -56,20 +56,20 @@ def interleave(
     return seconds
 
 
-def _repeats(job: Callable[[], Any], minimum_seconds: float, clock: Clock) -> int:
+def _repeats(timed_job: Callable[[], Any], minimum_seconds: float, clock: Clock) -> int:
     """Number of repeats of a job that last ``minimum_seconds`` (s) together, from the warm-up run, or from one more run
     if that was short."""
-    if _timed(job, 1, clock) >= minimum_seconds:
+    if _timed(timed_job, 1, clock) >= minimum_seconds:
         return 1
-    return max(1, math.ceil(0.9 * minimum_seconds / max(_timed(job, 1, clock), 1e-9)))
+    return max(1, math.ceil(0.9 * minimum_seconds / max(_timed(timed_job, 1, clock), 1e-9)))
 
 
-def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
+def _timed(timed_job: Callable[[], Any], repeat_count: int, clock: Clock) -> float:
     """Mean time (s) of a run of the job over some repeats."""
     start = clock()
-    for _ in range(repeats):
-        job()
-    return (clock() - start) / repeats
+    for _ in range(repeat_count):
+        timed_job()
+    return (clock() - start) / repeat_count
 
 
 def describe(seconds: Sequence[float]) -> dict[str, float]:
@@ -79,34 +79,36 @@ def describe(seconds: Sequence[float]) -> dict[str, float]:
     return {"median": middle, "mad": float(np.median(np.abs(values - middle))), "min": float(values.min())}
 
 
-def interval(samples: np.ndarray) -> tuple[float, float, float]:
+def interval(bootstrapped_values: np.ndarray) -> tuple[float, float, float]:
     """Median and 95 % interval (2.5 % and 97.5 % quantile) of bootstrapped values."""
-    low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975))
+    low, middle, high = np.quantile(bootstrapped_values, (0.025, 0.5, 0.975))
     return float(middle), float(low), float(high)
 
 
-def resamples(rounds: int, count: int = RESAMPLES) -> np.ndarray:
+def resamples(round_count: int, resample_count: int = RESAMPLES) -> np.ndarray:
     """Numbers of rounds drawn with replacement, shape (count, rounds); the same draw for all jobs keeps paired times
     together."""
-    return np.random.default_rng(SEED).integers(rounds, size=(count, rounds))
+    return np.random.default_rng(SEED).integers(round_count, size=(resample_count, round_count))
 
 
-def median(samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+def median(timed_samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
     """Median of the samples of all rounds with its bootstrap 95 % interval."""
-    values = np.asarray(samples, float)
+    values = np.asarray(timed_samples, float)
     _, low, high = interval(np.median(values[resamples(len(values))], axis=1))
     return float(np.median(values)), low, high
 
 
-def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
+def spelled(timed_samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
     """Text of the samples' median with its interval, as used in tables: "12.3 (11.9 to 12.8)"."""
-    middle, low, high = (f"{scale * value:.3g}" for value in median(samples))
+    middle, low, high = (f"{scale * value:.3g}" for value in median(timed_samples))
     return f"{middle} ({low} to {high})"
 
 
-def paired_ratio(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+def paired_ratio(
+    numerator_times: Sequence[float] | np.ndarray, denominator_times: Sequence[float] | np.ndarray
+) -> tuple[float, float, float]:
     """Ratio a / b of paired times, by the median of the log ratios within the rounds, with its bootstrap 95 %
     interval."""
-    logs = np.log(np.asarray(a) / np.asarray(b))
+    logs = np.log(np.asarray(numerator_times) / np.asarray(denominator_times))
     _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
     return math.exp(float(np.median(logs))), math.exp(low), math.exp(high)

@@ -133,7 +133,7 @@ def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -
 
 def _random_stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
     """Standard normal random samples (count,) that depend only on seed, path, source and the name."""
-    return normal_samples(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
+    return normal_samples(seed, (path << 32) + crc32(name.encode()), count, 1, noise_source=source)[:, 0]
 
 
 def _names_of_signal(signal: Signal) -> tuple[str, ...]:

@@ -32,14 +32,14 @@ def rotated(matrix, vector):
 
 
 @lean
-def move(joints, q, v, links):
-    """Fill ``links`` (n + 1, PER_MOTION) with the motion of the body behind each joint, from joint coordinates and
-    rates (n,)."""
-    links[0, :] = 0.0
-    links[0, ROTATION] = links[0, ROTATION + 4] = links[0, ROTATION + 8] = 1.0
+def move(joints, q, v, body_motions):
+    """Fill ``body_motions`` (n + 1, PER_MOTION) with the motion of the body behind each joint, from joint coordinates
+    and rates (n,)."""
+    body_motions[0, :] = 0.0
+    body_motions[0, ROTATION] = body_motions[0, ROTATION + 4] = body_motions[0, ROTATION + 8] = 1.0
     for j in range(len(joints)):
-        joint, link = joints[j], links[j + 1]
-        below, k = links[int(joint[PARENT]) + 1], int(joint[AXIS])
+        joint, link = joints[j], body_motions[j + 1]
+        below, k = body_motions[int(joint[PARENT]) + 1], int(joint[AXIS])
         for i in range(PER_MOTION):
             link[i] = below[i]
         arm, along, omega = (
@@ -62,84 +62,89 @@ def move(joints, q, v, links):
 
 
 @lean
-def _turn(link, below, k, angle, rate):
-    """Rotate the row ``link`` of ``links`` about axis k of the row ``below`` by an angle (rad); add the angular
-    velocity ``rate`` (rad/s, a vector)."""
-    c, s, a, b = math.cos(angle), math.sin(angle), (k + 1) % 3, (k + 2) % 3
-    add(link, OMEGA, rate)
+def _turn(body_motion, parent_motion, axis_index, angle, angular_rate):
+    """Rotate the row ``body_motion`` of ``links`` about axis k of the row ``parent_motion`` by an angle (rad); add the
+    angular velocity ``angular_rate`` (rad/s, a vector)."""
+    c, s, a, b = math.cos(angle), math.sin(angle), (axis_index + 1) % 3, (axis_index + 2) % 3
+    add(body_motion, OMEGA, angular_rate)
     for i in range(0, 9, 3):
-        link[a + i] = c * below[a + i] + s * below[b + i]
-        link[b + i] = c * below[b + i] - s * below[a + i]
+        body_motion[a + i] = c * parent_motion[a + i] + s * parent_motion[b + i]
+        body_motion[b + i] = c * parent_motion[b + i] - s * parent_motion[a + i]
 
 
 @lean
-def locate(link, arms, i):
+def locate(body_motion, numbers, arm_index):
     """Position in space of a point given by its arm from the origin of a row of ``links``, in that row's axes."""
-    return plus(rotated(link, three(arms, i)), three(link, POSITION))
+    return plus(rotated(body_motion, three(numbers, arm_index)), three(body_motion, POSITION))
 
 
 @lean
-def joint_velocity(rotates, link, position):
-    """Velocity of a point at ``position`` per unit rate of a joint below it; ``link`` is the joint's row of
+def joint_velocity(is_rotation, body_motion, position):
+    """Velocity of a point at ``position`` per unit rate of a joint below it; ``body_motion`` is the joint's row of
     ``links``."""
-    along = three(link, JOINT_AXIS)
-    if rotates == 0.0:
+    along = three(body_motion, JOINT_AXIS)
+    if is_rotation == 0.0:
         return along
-    return plus(cross(along, position), times(cross(along, three(link, POSITION)), -1.0))
+    return plus(cross(along, position), times(cross(along, three(body_motion, POSITION)), -1.0))
 
 
 @lean
-def add_wrench(joints, links, last_joint, position, force, moment, out):
-    """Add to the joint forces ``out`` (n,) a force (N) at ``position`` and a moment (N m) that act on the body behind
-    joint ``last_joint``."""
+def add_wrench(joints, body_motions, last_joint, position, force, moment, generalised_forces):
+    """Add to the joint forces ``generalised_forces`` (n,) a force (N) at ``position`` and a moment (N m) that act on
+    the body behind joint ``last_joint``."""
     j = last_joint
     while j >= 0:
-        link, turns = links[j + 1], joints[j, ROTATES]
+        link, turns = body_motions[j + 1], joints[j, ROTATES]
         by, about = joint_velocity(turns, link, position), times(three(link, JOINT_AXIS), turns)
         for k in range(3):
-            out[j] += by[k] * force[k] + about[k] * moment[k]
+            generalised_forces[j] += by[k] * force[k] + about[k] * moment[k]
         j = int(joints[j, PARENT])
 
 
 @lean
-def bias_acceleration(link, arm, gravity):
+def bias_acceleration(body_motion, arm, gravity):
     """Acceleration of a body's point without the q'' terms, minus that of free fall; ``arm`` : from the origin of a row
     of ``links``."""
-    omega, rest = three(link, OMEGA), (link[BIAS], link[BIAS + 1], link[BIAS + 2] + gravity)
-    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(link, ANGULAR_BIAS), arm))
+    omega, rest = three(body_motion, OMEGA), (body_motion[BIAS], body_motion[BIAS + 1], body_motion[BIAS + 2] + gravity)
+    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(body_motion, ANGULAR_BIAS), arm))
 
 
 @lean
-def body_inertia_terms(link, body, gravity, tensor):
+def body_inertia_terms(body_motion, body_row, gravity, inertia_tensor):
     """Arm to a body's centre in space, and the centre's acceleration and the rate of angular momentum, both without the
-    q'' terms. Writes the body's inertia in space to ``tensor``."""
+    q'' terms. Writes the body's inertia in space to ``inertia_tensor``."""
     for i in range(3):
         for j in range(3):
-            tensor[3 * i + j] = 0.0  # R T R^T
+            inertia_tensor[3 * i + j] = 0.0  # R T R^T
             for k in range(9):
-                tensor[3 * i + j] += link[3 * i + k // 3] * body[INERTIA + k] * link[3 * j + k % 3]
-    arm, omega = rotated(link, three(body, ARM)), three(link, OMEGA)
-    momentum = plus(rotated(tensor, three(link, ANGULAR_BIAS)), cross(omega, rotated(tensor, omega)))
-    return arm, bias_acceleration(link, arm, gravity), momentum
+                inertia_tensor[3 * i + j] += (
+                    body_motion[3 * i + k // 3] * body_row[INERTIA + k] * body_motion[3 * j + k % 3]
+                )
+    arm, omega = rotated(body_motion, three(body_row, ARM)), three(body_motion, OMEGA)
+    momentum = plus(
+        rotated(inertia_tensor, three(body_motion, ANGULAR_BIAS)), cross(omega, rotated(inertia_tensor, omega))
+    )
+    return arm, bias_acceleration(body_motion, arm, gravity), momentum
 
 
 @lean
-def add_inertia(joints, bodies, links, gravity, mass, force):
-    """Write the mass matrix (n, n), and add weights, and inertia forces without the q'' terms, to ``force`` (n,)."""
+def add_inertia(joints, bodies, body_motions, gravity, mass_matrix, generalised_forces):
+    """Write the mass matrix (n, n), and add weights, and inertia forces without the q'' terms, to
+    ``generalised_forces`` (n,)."""
     n = len(joints)
-    mass[:] = 0.0
+    mass_matrix[:] = 0.0
     chain, rows, tensor = array(doubles(n), (n,)), array(doubles(9 * n), (n, 9)), array(doubles(9), (9,))
     for b in range(len(bodies)):
         body = bodies[b]
         j, kg, count = int(body[LAST]), body[MASS], 0
-        arm, a, t = body_inertia_terms(links[j + 1], body, gravity, tensor)
-        place = plus(arm, three(links[j + 1], POSITION))
+        arm, a, t = body_inertia_terms(body_motions[j + 1], body, gravity, tensor)
+        place = plus(arm, three(body_motions[j + 1], POSITION))
         while j >= 0:
-            row, link, turns = rows[count], links[j + 1], joints[j, ROTATES]
+            row, link, turns = rows[count], body_motions[j + 1], joints[j, ROTATES]
             chain[count] = j
             by, about = joint_velocity(turns, link, place), times(three(link, JOINT_AXIS), turns)
             for k in range(3):
-                force[j] -= kg * by[k] * a[k] + about[k] * t[k]
+                generalised_forces[j] -= kg * by[k] * a[k] + about[k] * t[k]
             put(row, 0, by)
             put(row, 3, about)
             put(row, 6, rotated(tensor, about))
@@ -149,7 +154,7 @@ def add_inertia(joints, bodies, links, gravity, mass, force):
                 both = 0.0
                 for k in range(3):
                     both += kg * rows[i, k] * rows[two, k] + rows[i, 6 + k] * rows[two, 3 + k]
-                mass[int(chain[i]), int(chain[two])] += both
+                mass_matrix[int(chain[i]), int(chain[two])] += both
 
 
 @lean

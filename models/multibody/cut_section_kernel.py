@@ -71,20 +71,20 @@ class SectionPlaces(NamedTuple):
 
 
 @lean
-def _point_acceleration(joints, links, last_joint, qdd, position, a):
+def _point_acceleration(joints, body_motions, last_joint, qdd, position, acceleration):
     """Acceleration of a point at ``position`` on the body of joint ``last_joint``, and that body's angular
-    acceleration. ``a`` is the point's acceleration without the q'' terms."""
+    acceleration. ``acceleration`` is the point's acceleration without the q'' terms."""
     j, turning = last_joint, (0.0, 0.0, 0.0)
     while j >= 0:
-        link, turns = links[j + 1], joints[j, ROTATES]
-        a = plus(a, times(joint_velocity(turns, link, position), qdd[j]))
+        link, turns = body_motions[j + 1], joints[j, ROTATES]
+        acceleration = plus(acceleration, times(joint_velocity(turns, link, position), qdd[j]))
         turning = plus(turning, times(times(three(link, JOINT_AXIS), turns), qdd[j]))
         j = int(joints[j, PARENT])
-    return a, turning
+    return acceleration, turning
 
 
 @lean
-def _write_body_loads(joints, bodies, links, gravity, qdd, loads):
+def _write_body_loads(joints, bodies, body_motions, gravity, qdd, loads):
     """Write, for each body, the force and moment that accelerate it and carry its weight (9 numbers in all).
 
     These are the point of action, the force, and the moment about that point.
@@ -92,35 +92,35 @@ def _write_body_loads(joints, bodies, links, gravity, qdd, loads):
     tensor = array(doubles(9), (9,))
     for b in range(len(bodies)):
         body, row, last = bodies[b], loads[b], int(bodies[b, LAST])
-        arm, a, t = body_inertia_terms(links[last + 1], body, gravity, tensor)
-        place = plus(three(links[last + 1], POSITION), arm)
-        a, turning = _point_acceleration(joints, links, last, qdd, place, a)
+        arm, a, t = body_inertia_terms(body_motions[last + 1], body, gravity, tensor)
+        place = plus(three(body_motions[last + 1], POSITION), arm)
+        a, turning = _point_acceleration(joints, body_motions, last, qdd, place, a)
         put(row, 0, place)
         put(row, 3, times(a, body[MASS]))
         put(row, 6, plus(t, rotated(tensor, turning)))
 
 
 @lean
-def _write_hub_loads(head, hubs, links, wrenches, loads):
+def _write_hub_loads(table_head, hubs, body_motions, wrenches, loads):
     """Write position, force and moment of each hub's load, with negative sign because the load acts from outside."""
     for i in range(len(hubs)):
-        hub, row, body_frame = hubs[i], loads[i], links[wrench_axes_row(head, hubs[i])]
-        put(row, 0, locate(links[int(hub[LAST]) + 1], hub, ARM))
+        hub, row, body_frame = hubs[i], loads[i], body_motions[wrench_axes_row(table_head, hubs[i])]
+        put(row, 0, locate(body_motions[int(hub[LAST]) + 1], hub, ARM))
         put(row, 3, times(rotated(body_frame, three(wrenches[i], 0)), -1.0))
         put(row, 6, times(rotated(body_frame, three(wrenches[i], 3)), -1.0))
 
 
 @lean
-def _write_element_loads(elements, links, element_forces, loads, travels):
+def _write_element_loads(elements, body_motions, element_forces, loads, travels):
     """Write for every element the positions and forces at both ends, and the couple on the body in which its axis is
     fixed, all with negative sign. Also writes its travel."""
     for i in range(len(elements)):
         e = elements[i]
-        axis = rotated(links[int(e[AXIS_JOINT]) + 1], three(e, AXIS))
+        axis = rotated(body_motions[int(e[AXIS_JOINT]) + 1], three(e, AXIS))
         travels[i] = -e[DESIGN_TRAVEL]
         for side in range(2):
             row, sign = loads[3 * i + side], 2.0 * side - 1.0
-            place = locate(links[int(e[FIRST_BODY + SECOND_BODY * side]) + 1], e, SECOND_BODY * side + 1)
+            place = locate(body_motions[int(e[FIRST_BODY + SECOND_BODY * side]) + 1], e, SECOND_BODY * side + 1)
             for k in range(3):
                 travels[i] += sign * axis[k] * place[k]
             put(row, 0, place)
@@ -128,50 +128,51 @@ def _write_element_loads(elements, links, element_forces, loads, travels):
             put(row, 6, (0.0, 0.0, 0.0))
         put(loads[3 * i + 2], 0, (0.0, 0.0, 0.0))
         put(loads[3 * i + 2], 3, (0.0, 0.0, 0.0))
-        put(loads[3 * i + 2], 6, times(cross(axis, span_vector(e, links)), element_forces[i]))
+        put(loads[3 * i + 2], 6, times(cross(axis, span_vector(e, body_motions)), element_forces[i]))
 
 
 @lean
-def _resultant(loads, is_carried, point):
-    """Resultant force, and moment about ``point``, of all loads on the bodies behind a guide (nonzero in
+def _resultant(body_loads, is_carried, reference_point):
+    """Resultant force, and moment about ``reference_point``, of all loads on the bodies behind a guide (nonzero in
     ``is_carried``)."""
     force = moment = 0.0, 0.0, 0.0
-    for i in range(len(loads)):
+    for i in range(len(body_loads)):
         if is_carried[i] != 0.0:
-            row = loads[i]
-            arm = plus(three(row, 0), times(point, -1.0))
+            row = body_loads[i]
+            arm = plus(three(row, 0), times(reference_point, -1.0))
             force, moment = plus(force, three(row, 3)), plus(moment, three(row, 6))
             moment = plus(moment, cross(arm, three(row, 3)))
     return force, moment
 
 
 @lean
-def _measured_acceleration(joints, links, point, gravity, qdd):
+def _measured_acceleration(joints, body_motions, point, gravity, qdd):
     """Acceleration (3,) that an accelerometer at a point measures, in the axes of the body that carries the point."""
     last = int(point[JOINT])
-    link = links[last + 1]
+    link = body_motions[last + 1]
     arm = rotated(link, three(point, POINT_ARM))
     a = bias_acceleration(link, arm, gravity * point[WEIGHT])
-    return into(link, _point_acceleration(joints, links, last, qdd, plus(three(link, POSITION), arm), a)[0], 0)
+    return into(link, _point_acceleration(joints, body_motions, last, qdd, plus(three(link, POSITION), arm), a)[0], 0)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def section_results(numbers, interval, states, places, in_body_axes, out):
-    """Write the section results (n, all) of states (n, 2 c) that are ``interval`` half steps apart from time 0 on.
+def section_results(parameter_table, half_steps_between, states, section_places, in_body_axes, section_values):
+    """Write the section results (n, all) of states (n, 2 c) that are ``half_steps_between`` half steps apart from time
+    0 on.
 
-    places : ``SectionPlaces``; in_body_axes : whether guides and hubs are given in the axes of what they carry instead
-    of the chassis'."""
-    guides, points = places.guide_joints, places.points
-    head, joints, bodies, elements, hubs, _ = table_views(numbers)
+    section_places : ``SectionPlaces``; in_body_axes : whether guides and hubs are given in the axes of what they carry
+    instead of the chassis'."""
+    guides, points = section_places.guide_joints, section_places.points
+    head, joints, bodies, elements, hubs, _ = table_views(parameter_table)
     n, b, e, h, chassis = len(joints), len(bodies), len(elements), len(hubs), int(head[CHASSIS])
     links, mass, sides = np.empty((n + 1, PER_MOTION)), np.empty((n, n)), np.empty((1, n))
     inside, travels, wrenches, moments = np.empty(e), np.empty(e), np.empty((h, WRENCH)), np.empty(2)
     told = ForceReport(inside, wrenches, moments)
     loads, per_time, gravity = np.empty((b + h + 3 * e, 9)), head[ROWS_PER_SECOND], head[GRAVITY]
     for i in range(len(states)):
-        q, v, row = states[i, :n], states[i, n:], out[i]
+        q, v, row = states[i, :n], states[i, n:], section_values[i]
         sides[:] = 0.0
-        forces(numbers, i * interval / per_time, q, v, links, sides[0], told)
+        forces(parameter_table, i * half_steps_between / per_time, q, v, links, sides[0], told)
         add_inertia(joints, bodies, links, gravity, mass, sides[0])
         solve(mass, sides)
         _write_body_loads(joints, bodies, links, gravity, sides[0], loads[:b])
@@ -186,7 +187,7 @@ def section_results(numbers, interval, states, places, in_body_axes, out):
         at += CHASSIS_ROW + MOMENTS
         for g in range(len(guides)):
             last = int(guides[g])
-            force, moment = _resultant(loads, places.carried_loads[g], three(links[last + 1], POSITION))
+            force, moment = _resultant(loads, section_places.carried_loads[g], three(links[last + 1], POSITION))
             at = _write_wrench(links[last + 1 if in_body_axes else chassis + 1], force, moment, row, at)
         for g in range(h):
             force, moment = times(three(loads[b + g], 3), -1.0), times(three(loads[b + g], 6), -1.0)
@@ -197,8 +198,8 @@ def section_results(numbers, interval, states, places, in_body_axes, out):
 
 
 @lean
-def _write_wrench(frame, force, moment, row, at):
+def _write_wrench(body_motion, force, moment, result_row, first_index):
     """Write force and moment, given in space, in the axes of a row of ``links``. Returns the index after them."""
-    put(row, at, into(frame, force, 0))
-    put(row, at + 3, into(frame, moment, 0))
-    return at + WRENCH
+    put(result_row, first_index, into(body_motion, force, 0))
+    put(result_row, first_index + 3, into(body_motion, moment, 0))
+    return first_index + WRENCH

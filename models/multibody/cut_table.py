@@ -81,7 +81,7 @@ def joints(vehicle: CutVehicle) -> Joints:
     return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
 
 
-def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray:
+def table(vehicle: CutVehicle, hub_inputs: HubInputs, time_step: float) -> np.ndarray:
     """Table of all numbers that the compiled forces of a cut vehicle read, for a run with a step (s)."""
     joined = joints(vehicle)
     bodies = []
@@ -99,7 +99,7 @@ def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray
         kernel.FRAMES.index(hub_inputs.frame),
         hub_inputs.speed,
     )
-    head[[kernel.ROWS_PER_SECOND, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
+    head[[kernel.ROWS_PER_SECOND, kernel.ROWS, kernel.COLUMNS]] = 2.0 / time_step, *inputs.shape
     head[[kernel.GRAVITY, kernel.CHASSIS, kernel.ENFORCING_RATE]] = (
         vehicle.tree.gravity,
         ROLL,
@@ -116,37 +116,37 @@ def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray
     return whole
 
 
-def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all force curves. The position of each curve, counted from ``first``, is also written into its
+def _put_curves(vehicle: CutVehicle, element_rows: np.ndarray, first_index: int) -> np.ndarray:
+    """Numbers of all force curves. The position of each curve, counted from ``first_index``, is also written into its
     element's row."""
     placed = list[float]()
-    for row, element in zip(rows, vehicle.elements, strict=True):
+    for row, element in zip(element_rows, vehicle.elements, strict=True):
         for column, curve in ((kernel.TRAVEL_CURVE, element.travel_force), (kernel.RATE_CURVE, element.rate_force)):
             if curve is not None:
-                row[column] = first + len(placed)
+                row[column] = first_index + len(placed)
                 placed += curve_numbers(curve).tolist()
     return np.array(placed)
 
 
-def _element_numbers(element: Element, joined: Joints) -> list[float]:
+def _element_numbers(element: Element, joint_table: Joints) -> list[float]:
     first, two = (
-        np.subtract(element.first_point, joined.joint_position[element.first_body]),
-        np.subtract(element.second_point, joined.joint_position[element.second_body]),
+        np.subtract(element.first_point, joint_table.joint_position[element.first_body]),
+        np.subtract(element.second_point, joint_table.joint_position[element.second_body]),
     )
     law = (
         element.preload,
         element.stiffness,
         element.damping,
-        joined.last_joint[element.frame],
+        joint_table.last_joint[element.frame],
         element.friction,
         element.friction_rate,
         0.0,
         0.0,
     )
     return [
-        joined.last_joint[element.first_body],
+        joint_table.last_joint[element.first_body],
         *first,
-        joined.last_joint[element.second_body],
+        joint_table.last_joint[element.second_body],
         *two,
         *element.axis,
         element.design,
@@ -154,10 +154,10 @@ def _element_numbers(element: Element, joined: Joints) -> list[float]:
     ]
 
 
-def _hub_numbers(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
+def _hub_numbers(vehicle: CutVehicle, joint_table: Joints, hub_index: int) -> list[float]:
     """Numbers of a wheel hub, including those of the tyre that was on it."""
-    tyre = vehicle.uncut.tyres[i]
+    tyre = vehicle.uncut.tyres[hub_index]
     side = next((force for force in vehicle.uncut.side_forces if force.name == tyre.name), None)
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)
-    arm = np.subtract(tyre.point, joined.joint_position[tyre.body])
-    return [joined.last_joint[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]
+    arm = np.subtract(tyre.point, joint_table.joint_position[tyre.body])
+    return [joint_table.last_joint[tyre.body], *arm, tyre.point[2], vehicle.loads[hub_index], *law, tyre.pushes_only]

@@ -126,10 +126,10 @@ normal to the road, axle, force of its load, velocity of its centre (3 each)."""
 
 
 @lean
-def control(numbers, table_index, control_index, knot_count, t):
+def control(parameter_table, first_index, control_index, knot_count, t):
     """Value and rate (per s) of a steering, brake, drive or push control at a time (s). Its rate is 0 at every knot;
     between knots it follows the smoothest polynomial of degree 5."""
-    knots = numbers[table_index + 2 * control_index * knot_count :]
+    knots = parameter_table[first_index + 2 * control_index * knot_count :]
     if t <= knots[0]:
         return knots[knot_count], 0.0
     for i in range(1, knot_count):
@@ -142,77 +142,81 @@ def control(numbers, table_index, control_index, knot_count, t):
 
 
 @lean
-def height(waves, wave_count, x, y):
+def height(road_waves, wave_count, x, y):
     """Height (m) of the road at x, y (m), and its slopes along x and y: a sum of plane waves."""
     z = along = across = 0.0
     for i in range(0, 4 * wave_count, 4):
-        phase = waves[i] * x + waves[i + 1] * y
+        phase = road_waves[i] * x + road_waves[i + 1] * y
         cosine, sine = math.cos(phase), math.sin(phase)
-        z += waves[i + 2] * cosine + waves[i + 3] * sine
-        slope = waves[i + 3] * cosine - waves[i + 2] * sine
-        along += waves[i] * slope
-        across += waves[i + 1] * slope
+        z += road_waves[i + 2] * cosine + road_waves[i + 3] * sine
+        slope = road_waves[i + 3] * cosine - road_waves[i + 2] * sine
+        along += road_waves[i] * slope
+        across += road_waves[i + 1] * slope
     return z, along, across
 
 
 @lean
-def _axle(steer, inclination):
-    """Unit vector along the axle, to the left, of a wheel at steer angle ``steer`` and inclination ``inclination``
-    (rad)."""
+def _axle(steer_angle, wheel_inclination):
+    """Unit vector along the axle, to the left, of a wheel at steer angle ``steer_angle`` and inclination
+    ``wheel_inclination`` (rad)."""
     cosine, sine, level, lean_of = 1.0, 0.0, 1.0, 0.0
-    if steer != 0.0:
-        cosine, sine = math.cos(steer), math.sin(steer)
-    if inclination != 0.0:
-        level, lean_of = math.cos(inclination), math.sin(inclination)
+    if steer_angle != 0.0:
+        cosine, sine = math.cos(steer_angle), math.sin(steer_angle)
+    if wheel_inclination != 0.0:
+        level, lean_of = math.cos(wheel_inclination), math.sin(wheel_inclination)
     return -sine * level, cosine * level, lean_of
 
 
 @lean
-def _axle_of_towed_wheel(link, axle):
+def _axle_of_towed_wheel(carrier_link, axle):
     """Axle of a towed body's wheel, rotated in the road's plane from the carrier's heading to the heading of the x axis
-    of ``link``."""
-    x, y, _ = three(link, TURNED)
+    of ``carrier_link``."""
+    x, y, _ = three(carrier_link, TURNED)
     level = math.sqrt(x * x + y * y)
     return (x * axle[0] - y * axle[1]) / level, (y * axle[0] + x * axle[1]) / level, axle[2]
 
 
 @lean
-def _road_under(waves, wave_count, frame, position):
+def _road_under(road_waves, wave_count, moving_frame, position):
     """Height (m) of the road, and its upward normal (-dz/dx, -dz/dy, 1), under a position (m) given in the carrier's
     axes."""
-    x, y = ground_position(frame, position)
-    zeta, dx, dy = height(waves, wave_count, x, y)
-    return zeta, (-(frame.cosine * dx + frame.sine * dy), frame.sine * dx - frame.cosine * dy, 1.0)
+    x, y = ground_position(moving_frame, position)
+    zeta, dx, dy = height(road_waves, wave_count, x, y)
+    return zeta, (
+        -(moving_frame.cosine * dx + moving_frame.sine * dy),
+        moving_frame.sine * dx - moving_frame.cosine * dy,
+        1.0,
+    )
 
 
 @lean
-def _load(tyre, deflection, rising_speed, ledger):
+def _load(tyre_row, deflection, rising_speed, energy_ledger):
     """Vertical load (N) of a tyre at a deflection (m) from rest whose centre rises from the road at ``rising_speed``
     (m/s). Adds its energy and power to the ledger."""
-    elastic = max(tyre[STATIC] + tyre[VERTICAL] * deflection, 0.0)
-    load = max(elastic - tyre[VISCOUS] * rising_speed, 0.0) if elastic > 0.0 else 0.0
-    ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[VERTICAL]
-    ledger[DISSIPATED] += (load - elastic) * rising_speed
+    elastic = max(tyre_row[STATIC] + tyre_row[VERTICAL] * deflection, 0.0)
+    load = max(elastic - tyre_row[VISCOUS] * rising_speed, 0.0) if elastic > 0.0 else 0.0
+    energy_ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre_row[VERTICAL]
+    energy_ledger[DISSIPATED] += (load - elastic) * rising_speed
     return load
 
 
 @lean
-def find_contact(tyre, waves, wave_count, steer, steer_rate, vehicle, wheel):
+def find_contact(tyre_row, road_waves, wave_count, steer_angle, steer_rate, moving_vehicle, wheel_contact):
     """Contact of a tyre with a road of ``wave_count`` waves: fills load, position and sliding velocity in the
     ``WheelContact``.
 
-    steer, steer_rate : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
+    steer_angle, steer_rate : the wheel's angle (rad) and its rate; moving_vehicle : ``MovingVehicle``.
     """
-    frame, tree, patch, slip = vehicle.frame, vehicle.tree, wheel.patch, wheel.slip
-    way, report = wheel.way, wheel.report
-    spot, knuckle = row(tree.spots, PER_SPOT, int(tyre[POINT])), row(tree.links, PER_LINK, int(tyre[KNUCKLE]))
-    p, turning, axle = three(spot, WHERE), three(knuckle, TURNING), _axle(steer, tyre[INCLINED])
-    carrying = row(tree.links, PER_LINK, int(tyre[CARRYING]))
-    if tyre[TOWED] != 0.0:
+    frame, tree, patch, slip = moving_vehicle.frame, moving_vehicle.tree, wheel_contact.patch, wheel_contact.slip
+    way, report = wheel_contact.way, wheel_contact.report
+    spot, knuckle = row(tree.spots, PER_SPOT, int(tyre_row[POINT])), row(tree.links, PER_LINK, int(tyre_row[KNUCKLE]))
+    p, turning, axle = three(spot, WHERE), three(knuckle, TURNING), _axle(steer_angle, tyre_row[INCLINED])
+    carrying = row(tree.links, PER_LINK, int(tyre_row[CARRYING]))
+    if tyre_row[TOWED] != 0.0:
         axle = _axle_of_towed_wheel(carrying, axle)
     passing = plus(three(spot, RATE), carried_velocity(frame, p))
-    zeta, upwards = _road_under(waves, wave_count, frame, p)
-    load = _load(tyre, zeta - (p[2] - tyre[HEIGHT]), dot(passing, upwards), vehicle.ledger)
+    zeta, upwards = _road_under(road_waves, wave_count, frame, p)
+    load = _load(tyre_row, zeta - (p[2] - tyre_row[HEIGHT]), dot(passing, upwards), moving_vehicle.ledger)
     long = math.sqrt(dot(upwards, upwards))
     normal = times(upwards, 1.0 / long)
     along = cross(axle, normal)
@@ -220,17 +224,17 @@ def find_contact(tyre, waves, wave_count, steer, steer_rate, vehicle, wheel):
     along = times(along, 1.0 / flat)
     radius = max(p[2] - zeta, 0.0) / (long * flat)
     down = times(plus(times(axle, dot(axle, normal)), times(normal, -1.0)), radius / flat)
-    across, rotor = cross(normal, along), int(tyre[ROTOR])
-    spin = vehicle.rates[rotor] if rotor >= 0 else dot(three(carrying, TURNING), axle) - dot(turning, axle)
+    across, rotor = cross(normal, along), int(tyre_row[ROTOR])
+    spin = moving_vehicle.rates[rotor] if rotor >= 0 else dot(three(carrying, TURNING), axle) - dot(turning, axle)
     whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame.yaw_rate + steer_rate))
     sliding = plus(passing, cross(whole, down))
     slip[0], slip[1], slip[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
     slip[3] = -spin * dot(cross(axle, down), along)
     pressing = load * long
-    patch[A], patch[B] = math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]), tyre[HALF_WIDTH]
-    patch[LOAD], patch[MU] = pressing, tyre[GRIP]
-    patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = 1.0 / tyre[BRISTLES]
-    report[PRESS], report[ANGLE] = pressing, steer
+    patch[A], patch[B] = math.sqrt(tyre_row[RADIUS] * pressing / tyre_row[VERTICAL]), tyre_row[HALF_WIDTH]
+    patch[LOAD], patch[MU] = pressing, tyre_row[GRIP]
+    patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = 1.0 / tyre_row[BRISTLES]
+    report[PRESS], report[ANGLE] = pressing, steer_angle
     report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slip[0], slip[1], slip[2], slip[3]
     put(way, CENTRE, p)
     put(way, DOWN, down)
@@ -243,182 +247,213 @@ def find_contact(tyre, waves, wave_count, steer, steer_rate, vehicle, wheel):
 
 
 @lean
-def add_creep_forces(tyre, creeping, vehicle, wheel):
+def add_creep_forces(tyre_row, creep_forces, moving_vehicle, wheel_contact):
     """Add a tyre's load, creep forces and creep moment (3,) to its wheel; the moment about the axle accelerates the
     spin."""
-    way, report, ground = wheel.way, wheel.report, vehicle.tree.ground
-    knuckle, rotor, axle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
-    force = plus(times(three(way, ROLLING), creeping[0]), times(three(way, ACROSS), creeping[1]))
-    turning = times(three(way, NORMAL), creeping[2])
+    way, report, ground = wheel_contact.way, wheel_contact.report, moving_vehicle.tree.ground
+    knuckle, rotor, axle = (
+        row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[KNUCKLE])),
+        int(tyre_row[ROTOR]),
+        three(way, AXLE),
+    )
+    force = plus(times(three(way, ROLLING), creep_forces[0]), times(three(way, ACROSS), creep_forces[1]))
+    turning = times(three(way, NORMAL), creep_forces[2])
     moment = plus(cross(three(way, DOWN), force), turning)
     push(knuckle, ground, plus(force, three(way, LOADING)), three(way, CENTRE))
     twist(knuckle, ground, moment)
     torque = dot(axle, moment)
     if rotor >= 0:
-        vehicle.forces[rotor] += torque
+        moving_vehicle.forces[rotor] += torque
     else:
-        _transfer_torque(torque, axle, knuckle, row(vehicle.tree.links, PER_LINK, int(tyre[CARRYING])))
-    report[FX], report[FY], report[MZ], report[STEER_MOMENT] = creeping[0], creeping[1], creeping[2], moment[2]
-    report[POWER] = creeping[0] * report[SLIP_X] + creeping[1] * report[SLIP_Y] + creeping[2] * report[TURN]
+        _transfer_torque(torque, axle, knuckle, row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING])))
+    report[FX], report[FY], report[MZ], report[STEER_MOMENT] = (
+        creep_forces[0],
+        creep_forces[1],
+        creep_forces[2],
+        moment[2],
+    )
+    report[POWER] = creep_forces[0] * report[SLIP_X] + creep_forces[1] * report[SLIP_Y] + creep_forces[2] * report[TURN]
 
 
 @lean
-def add_wheel_torque(tyre, braking, driving, vehicle, wheel):
+def add_wheel_torque(tyre_row, brake_torque, drive_torque, moving_vehicle, wheel_contact):
     """Add the torque (N m) of brake and drive to a wheel's spin, and the opposite torque to the body that carries the
     wheel."""
-    rotor, axle, report = int(tyre[ROTOR]), three(wheel.way, AXLE), wheel.report
+    rotor, axle, report = int(tyre_row[ROTOR]), three(wheel_contact.way, AXLE), wheel_contact.report
     report[SPIN_TORQUE] = 0.0
-    if rotor < 0 or (braking == 0.0 and driving == 0.0):
+    if rotor < 0 or (brake_torque == 0.0 and drive_torque == 0.0):
         return
-    knuckle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE]))
-    carrying = row(vehicle.tree.links, PER_LINK, int(tyre[CARRYING]))
-    spin = vehicle.rates[rotor] + dot(three(knuckle, TURNING), axle) - dot(three(carrying, TURNING), axle)
-    report[SPIN_TORQUE] = tyre[DRIVEN] * driving
-    if braking != 0.0:
-        report[SPIN_TORQUE] -= tyre[BRAKED] * braking * math.tanh(spin / tyre[BRAKE_RATE])
-    vehicle.forces[rotor] += report[SPIN_TORQUE]
-    vehicle.ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
+    knuckle = row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[KNUCKLE]))
+    carrying = row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
+    spin = moving_vehicle.rates[rotor] + dot(three(knuckle, TURNING), axle) - dot(three(carrying, TURNING), axle)
+    report[SPIN_TORQUE] = tyre_row[DRIVEN] * drive_torque
+    if brake_torque != 0.0:
+        report[SPIN_TORQUE] -= tyre_row[BRAKED] * brake_torque * math.tanh(spin / tyre_row[BRAKE_RATE])
+    moving_vehicle.forces[rotor] += report[SPIN_TORQUE]
+    moving_vehicle.ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
     _transfer_torque(-report[SPIN_TORQUE], axle, knuckle, carrying)
 
 
 @lean
-def _transfer_torque(torque, axle, link, carrier_link):
+def _transfer_torque(torque, axle, knuckle_link, carrier_link):
     """Transfer a torque (N m) about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
-    add(link, TWISTED, times(axle, -torque))
+    add(knuckle_link, TWISTED, times(axle, -torque))
     add(carrier_link, TWISTED, times(axle, torque))
 
 
 @lean
-def workspace_size(head):
+def workspace_size(table_head):
     """Number of doubles that the workspace for a vehicle's motion and forces needs."""
-    return PER_LINK * int(head[JOINTS]) + PER_SPOT * int(head[POINTS]) + GROUND
+    return PER_LINK * int(table_head[JOINTS]) + PER_SPOT * int(table_head[POINTS]) + GROUND
 
 
 @lean
-def start_forces(numbers, q, v, f, workspace, ledger):
+def start_forces(parameter_table, q, v, generalised_forces, workspace, energy_ledger):
     """Add the forces of all springs, dampers and bars. Returns the ``MovingVehicle``, whose tree lies in ``workspace``.
 
-    numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; workspace : pointer to as many doubles as needed.
-    """
-    n, points, table = int(numbers[JOINTS]), int(numbers[POINTS]), start(numbers)
+    parameter_table : array; q, v, generalised_forces (n,) and energy_ledger (LEDGER,) : arrays; workspace : pointer to
+    as many doubles as needed."""
+    n, points, table = int(parameter_table[JOINTS]), int(parameter_table[POINTS]), start(parameter_table)
     spots = beyond(workspace, PER_LINK * n)
     ground = array(beyond(spots, PER_SPOT * points), (GROUND,))
     ground[0] = ground[1] = ground[2] = 0.0
     outwards(beyond(table, HEADER), n, q, v, workspace)
-    locate(beyond(table, int(numbers[OF_POINTS])), points, workspace, spots)
+    locate(beyond(table, int(parameter_table[OF_POINTS])), points, workspace, spots)
     for i in range(LEDGER):
-        ledger[i] = 0.0
-    ledger[POTENTIAL], ledger[DISSIPATED] = add_part_forces(
-        table, int(numbers[OF_PARTS]), int(numbers[PARTS]), workspace, spots, q, v, f
+        energy_ledger[i] = 0.0
+    energy_ledger[POTENTIAL], energy_ledger[DISSIPATED] = add_part_forces(
+        table, int(parameter_table[OF_PARTS]), int(parameter_table[PARTS]), workspace, spots, q, v, generalised_forces
     )
-    chassis = row(workspace, PER_LINK, int(numbers[CHASSIS]))
-    return MovingVehicle(v, f, ledger, carrier_frame(q, v), Tree(workspace, spots, ground), chassis)
+    chassis = row(workspace, PER_LINK, int(parameter_table[CHASSIS]))
+    return MovingVehicle(
+        v, generalised_forces, energy_ledger, carrier_frame(q, v), Tree(workspace, spots, ground), chassis
+    )
 
 
 @lean
-def finish_forces(numbers, vehicle):
+def finish_forces(parameter_table, moving_vehicle):
     """Add drag, and all forces gathered on bodies and points, to the vehicle's generalised forces. The power of drag
     goes into the ledger."""
-    table, frame, f = start(numbers), vehicle.frame, vehicle.forces
-    if numbers[DRAG] != 0.0:
-        _drag(numbers, vehicle)
+    table, frame, f = start(parameter_table), moving_vehicle.frame, moving_vehicle.forces
+    if parameter_table[DRAG] != 0.0:
+        _drag(parameter_table, moving_vehicle)
     inwards(
         beyond(table, HEADER),
-        int(numbers[JOINTS]),
-        beyond(table, int(numbers[OF_POINTS])),
-        int(numbers[POINTS]),
-        vehicle.tree,
+        int(parameter_table[JOINTS]),
+        beyond(table, int(parameter_table[OF_POINTS])),
+        int(parameter_table[POINTS]),
+        moving_vehicle.tree,
         f,
     )
-    ahead, aside, turn = vehicle.tree.ground
+    ahead, aside, turn = moving_vehicle.tree.ground
     f[0] += frame.cosine * ahead - frame.sine * aside
     f[1] += frame.sine * ahead + frame.cosine * aside
     f[2] += turn
 
 
 @lean
-def _drag(numbers, vehicle):
+def _drag(parameter_table, moving_vehicle):
     """Add aerodynamic drag (N) at the chassis' centre, against its forward motion."""
-    chassis, frame = vehicle.chassis, vehicle.frame
-    place = plus(three(chassis, PLACE), out(chassis, numbers, DRAG_X))
+    chassis, frame = moving_vehicle.chassis, moving_vehicle.frame
+    place = plus(three(chassis, PLACE), out(chassis, parameter_table, DRAG_X))
     speed = plus(three(chassis, SPEED), cross(three(chassis, TURNING), place))
     ahead = speed[0] + frame.forward_speed - frame.yaw_rate * place[1]
-    force = -numbers[DRAG] * abs(ahead) * ahead
-    vehicle.ledger[DISSIPATED] += force * ahead
-    push(chassis, vehicle.tree.ground, (force, 0.0, 0.0), place)
+    force = -parameter_table[DRAG] * abs(ahead) * ahead
+    moving_vehicle.ledger[DISSIPATED] += force * ahead
+    push(chassis, moving_vehicle.tree.ground, (force, 0.0, 0.0), place)
 
 
 @lean
-def _push_from_outside(numbers, t, vehicle):
+def _push_from_outside(parameter_table, t, moving_vehicle):
     """Add the forces of all external pushes, whose directions turn with the vehicle's heading, and their power to the
     ledger."""
-    controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
-    count = int(numbers[controls - 1])
+    controls, knots, table = int(parameter_table[OF_KNOTS]), int(parameter_table[KNOTS]), start(parameter_table)
+    count = int(parameter_table[controls - 1])
     for i in range(count):
         of = row(beyond(table, controls - 1 - PER_PUSH * count), PER_PUSH, i)
-        link = row(vehicle.tree.links, PER_LINK, int(of[PUSHED_BY]))
-        force = times(three(of, PUSH_AXIS), control(numbers, controls, FIRST_PUSH + i, knots, t)[0])
+        link = row(moving_vehicle.tree.links, PER_LINK, int(of[PUSHED_BY]))
+        force = times(three(of, PUSH_AXIS), control(parameter_table, controls, FIRST_PUSH + i, knots, t)[0])
         place = plus(three(link, PLACE), out(link, of, PUSHED_AT))
         speed = plus(
-            plus(three(link, SPEED), cross(three(link, TURNING), place)), carried_velocity(vehicle.frame, place)
+            plus(three(link, SPEED), cross(three(link, TURNING), place)), carried_velocity(moving_vehicle.frame, place)
         )
-        vehicle.ledger[DISSIPATED] += dot(force, speed)
-        push(link, vehicle.tree.ground, force, place)
+        moving_vehicle.ledger[DISSIPATED] += dot(force, speed)
+        push(link, moving_vehicle.tree.ground, force, place)
 
 
 @lean
-def all_forces(numbers, t, q, v, f, report, ledger):
-    """Add a vehicle's generalised forces (N, N m) to ``f``, and fill the tyres' report (tyres, REPORTED) and the ledger
-    (LEDGER,).
+def all_forces(parameter_table, t, q, v, generalised_forces, tyre_report, energy_ledger):
+    """Add a vehicle's generalised forces (N, N m) to ``generalised_forces``, and fill the tyres' report (tyres,
+    REPORTED) and the ledger (LEDGER,).
 
     t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
     """
-    w, controls, knots, table = int(numbers[TYRES]), int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
-    vehicle = start_forces(numbers, q, v, f, doubles(workspace_size(numbers)), ledger)
-    steer, steering = control(numbers, controls, STEER, knots, t)
-    braking, driving = control(numbers, controls, BRAKE, knots, t)[0], control(numbers, controls, DRIVE, knots, t)[0]
+    w, controls, knots, table = (
+        int(parameter_table[TYRES]),
+        int(parameter_table[OF_KNOTS]),
+        int(parameter_table[KNOTS]),
+        start(parameter_table),
+    )
+    vehicle = start_forces(
+        parameter_table, q, v, generalised_forces, doubles(workspace_size(parameter_table)), energy_ledger
+    )
+    steer, steering = control(parameter_table, controls, STEER, knots, t)
+    braking, driving = (
+        control(parameter_table, controls, BRAKE, knots, t)[0],
+        control(parameter_table, controls, DRIVE, knots, t)[0],
+    )
     patches, ways = array(doubles(10 * w), (w, 10)), doubles(WAY * w)
     slips, creeping = array(doubles(4 * w), (w, 4)), array(doubles(4 * w), (w, 4))
-    tyres, waves = beyond(table, int(numbers[OF_TYRES])), numbers[int(numbers[OF_WAVES]) :]
+    tyres, waves = beyond(table, int(parameter_table[OF_TYRES])), parameter_table[int(parameter_table[OF_WAVES]) :]
     for i in range(w):
-        tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), report[i])
-        find_contact(tyre, waves, int(numbers[WAVES]), tyre[STEERED] * steer, tyre[STEERED] * steering, vehicle, wheel)
-    cells = array(beyond(table, int(numbers[OF_CELLS])), (5, int(numbers[CELLS])))
-    strips = array(beyond(table, int(numbers[OF_STRIPS])), (4, int(numbers[STRIPS])))
-    tyre_forces(patches, slips, strips, cells, numbers[MIDDLE], creeping)
+        tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), tyre_report[i])
+        find_contact(
+            tyre, waves, int(parameter_table[WAVES]), tyre[STEERED] * steer, tyre[STEERED] * steering, vehicle, wheel
+        )
+    cells = array(beyond(table, int(parameter_table[OF_CELLS])), (5, int(parameter_table[CELLS])))
+    strips = array(beyond(table, int(parameter_table[OF_STRIPS])), (4, int(parameter_table[STRIPS])))
+    tyre_forces(patches, slips, strips, cells, parameter_table[MIDDLE], creeping)
     for i in range(w):
-        tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), report[i])
+        tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), tyre_report[i])
         add_creep_forces(tyre, creeping[i], vehicle, wheel)
         add_wheel_torque(tyre, braking, driving, vehicle, wheel)
-        ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
-    _push_from_outside(numbers, t, vehicle)
-    finish_forces(numbers, vehicle)
+        energy_ledger[STEER_POWER] -= tyre[STEERED] * steering * tyre_report[i, STEER_MOMENT]
+    _push_from_outside(parameter_table, t, vehicle)
+    finish_forces(parameter_table, vehicle)
 
 
 @lean
-def forces(numbers, t, q, v, f):
-    """Add the generalised forces of a vehicle on its tyres to ``f``. For callbacks: all arguments but the time (s) are
-    pointers to doubles."""
-    head = array(numbers, (HEADER,))
+def forces(parameter_table, t, q, v, generalised_forces):
+    """Add the generalised forces of a vehicle on its tyres to ``generalised_forces``. For callbacks: all arguments but
+    the time (s) are pointers to doubles."""
+    head = array(parameter_table, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
-    all_forces(array(numbers, (int(head[COUNT]),)), t, array(q, (n,)), array(v, (n,)), array(f, (n,)), report, ledger)
+    all_forces(
+        array(parameter_table, (int(head[COUNT]),)),
+        t,
+        array(q, (n,)),
+        array(v, (n,)),
+        array(generalised_forces, (n,)),
+        report,
+        ledger,
+    )
 
 
 @lean
-def set_forces(block, t, n):
-    """Set ``f`` to the forces of ``forces``. All data lie in one block of doubles at a memory address: f, q and v (n,),
-    then the table."""
-    f = at(block)
-    array(f, (n,))[:] = 0.0
-    forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
+def set_forces(block_address, t, coordinate_count):
+    """Set the forces f to those of ``forces``. All data lie in one block of doubles at a memory address: f, q and v
+    (n,), then the table."""
+    f = at(block_address)
+    array(f, (coordinate_count,))[:] = 0.0
+    forces(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
 
 
 @lean
-def reports(numbers, times, q, v, tyre_reports, ledgers):
+def reports(parameter_table, times, q, v, tyre_reports, energy_ledgers):
     """Fill the tyres' reports (m, tyres, REPORTED) and energy ledgers (m, LEDGER) of states (m, n) at ``times``
     (m,)."""
     f = array(doubles(q.shape[1]), (q.shape[1],))
     f[:] = 0.0
     for i in range(len(times)):
-        all_forces(numbers, times[i], q[i], v[i], f, tyre_reports[i], ledgers[i])
+        all_forces(parameter_table, times[i], q[i], v[i], f, tyre_reports[i], energy_ledgers[i])

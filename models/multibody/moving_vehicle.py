@@ -69,15 +69,19 @@ def carrier_frame(q, v):
 
 
 @lean
-def carried_velocity(frame, position):
+def carried_velocity(moving_frame, position):
     """Velocity (m/s) that the carrier's motion gives to a point at a position (m), both in the carrier's axes."""
-    return frame.forward_speed - frame.yaw_rate * position[1], frame.lateral_speed + frame.yaw_rate * position[0], 0.0
+    return (
+        moving_frame.forward_speed - moving_frame.yaw_rate * position[1],
+        moving_frame.lateral_speed + moving_frame.yaw_rate * position[0],
+        0.0,
+    )
 
 
 @lean
-def ground_position(frame, position):
+def ground_position(moving_frame, position):
     """Position x, y (m) on the ground of a point at a position (m) in the carrier's axes."""
     return (
-        frame.x + frame.cosine * position[0] - frame.sine * position[1],
-        frame.y + frame.sine * position[0] + frame.cosine * position[1],
+        moving_frame.x + moving_frame.cosine * position[0] - moving_frame.sine * position[1],
+        moving_frame.y + moving_frame.sine * position[0] + moving_frame.cosine * position[1],
     )

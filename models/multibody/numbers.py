@@ -104,14 +104,14 @@ class Handling:
         """Acceleration of gravity (3,) in m/s^2, in the axes of the sloping road."""
         return GRAVITY * np.array([-np.sin(self.slope), 0.0, -np.cos(self.slope)])
 
-    def tyre_numbers(self, i: int) -> np.ndarray:
+    def tyre_numbers(self, tyre_index: int) -> np.ndarray:
         """View of the numbers (PER_TYRE,) of tyre i in the table; changes to it take effect at once."""
-        first = int(self.numbers[at.OF_TYRES]) + at.PER_TYRE * i
+        first = int(self.numbers[at.OF_TYRES]) + at.PER_TYRE * tyre_index
         return self.numbers[first : first + at.PER_TYRE]
 
-    def changed(self, **changes: object) -> "Handling":
+    def changed(self, **changed_fields: object) -> "Handling":
         """Returns a copy of this vehicle on its tyres with other values in some fields."""
-        return replace(self, **changes)  # type: ignore[arg-type]
+        return replace(self, **changed_fields)  # type: ignore[arg-type]
 
     def straight(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and rates (n,) of straight rolling at a speed (m/s), with all other coordinates at rest."""
@@ -124,20 +124,20 @@ class Handling:
         return np.zeros(len(places)), v
 
 
-def table(handling: Handling) -> np.ndarray:
+def table(vehicle_on_tyres: Handling) -> np.ndarray:
     """Table of all numbers that the compiled forces of a free vehicle read, in the order described in ``forces``."""
     free, chassis, of, points = (
-        handling.vehicle,
-        chassis_of(handling.given),
-        net(handling.tyres.cells),
-        _Points(handling.vehicle),
+        vehicle_on_tyres.vehicle,
+        chassis_of(vehicle_on_tyres.given),
+        net(vehicle_on_tyres.tyres.cells),
+        _Points(vehicle_on_tyres.vehicle),
     )
-    parts = [*_springs(handling, points), *_bars(handling, points)]
+    parts = [*_springs(vehicle_on_tyres, points), *_bars(vehicle_on_tyres, points)]
     tyres, knots = (
-        [_tyre(handling, i, points) for i in range(len(free.tyres))],
-        _knots(handling.controls, handling.pushes),
+        [_tyre(vehicle_on_tyres, i, points) for i in range(len(free.tyres))],
+        _knots(vehicle_on_tyres.controls, vehicle_on_tyres.pushes),
     )
-    pushes = _pushes(handling)
+    pushes = _pushes(vehicle_on_tyres)
     held = {*pushes[at.PUSHED_BY : -1 : at.PER_PUSH], *(row[tree.JOINT] for row in points.rows)}
     sections = [
         _joints(free, held),
@@ -146,14 +146,14 @@ def table(handling: Handling) -> np.ndarray:
         np.ravel(tyres),
         pushes,
         knots.ravel(),
-        handling.waves.ravel(),
+        vehicle_on_tyres.waves.ravel(),
         of.cells.ravel(),
         of.strips.ravel(),
     ]
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
     joint, place = _point_position(free, chassis.name, chassis.position)
-    drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
+    drag = vehicle_on_tyres.given.drags[0].coefficient / 2.0 if vehicle_on_tyres.given.drags else 0.0
     counts = [
         begins[-1] + curves.size,
         len(free.coordinates()),
@@ -161,7 +161,7 @@ def table(handling: Handling) -> np.ndarray:
         len(parts),
         len(free.tyres),
         knots.shape[2],
-        len(handling.waves),
+        len(vehicle_on_tyres.waves),
     ]
     places = [*begins[1:4], *begins[5:-1]]  # pushes are found from the controls
     head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *places]
@@ -207,79 +207,82 @@ _PartRow = tuple[list[float], tuple[Curve | None, ...]]
 """Numbers of a spring or bar, as ``parts`` reads them, and its curves of force over travel and over rate."""
 
 
-def _springs(handling: Handling, points: _Points) -> Iterator[_PartRow]:
-    for s in handling.vehicle.springs:
+def _springs(vehicle_on_tyres: Handling, force_points: _Points) -> Iterator[_PartRow]:
+    for s in vehicle_on_tyres.vehicle.springs:
         if s.second_body is None:
             raise InputError(
-                handling.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
+                vehicle_on_tyres.vehicle.name,
+                f"springs[{s.name}].bodies",
+                s.name,
+                "a free vehicle is not tied to the ground",
             )
-        ends = points.number(s.first_body, s.first_point), points.number(s.second_body, s.second_point)
+        ends = force_points.number(s.first_body, s.first_point), force_points.number(s.second_body, s.second_point)
         rest = float(np.dot(np.subtract(s.second_point, s.first_point), s.axis))
-        law = [s.stiffness, s.damping, handling.held.parts[s.name], s.friction, s.friction_rate, rest]
-        frame = _frame(handling.vehicle, f"springs[{s.name}]", s.frame)
+        law = [s.stiffness, s.damping, vehicle_on_tyres.held.parts[s.name], s.friction, s.friction_rate, rest]
+        frame = _frame(vehicle_on_tyres.vehicle, f"springs[{s.name}]", s.frame)
         yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0, frame], (s.travel_force, s.rate_force)
 
 
-def _bars(handling: Handling, points: _Points) -> Iterator[_PartRow]:
-    for bar in handling.vehicle.bars:
-        ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
+def _bars(vehicle_on_tyres: Handling, force_points: _Points) -> Iterator[_PartRow]:
+    for bar in vehicle_on_tyres.vehicle.bars:
+        ends = force_points.number(bar.left, bar.point_left), force_points.number(bar.right, bar.point_right)
         rest, frame = (
             (bar.point_right[2] - bar.point_left[2]) / bar.track,
-            _frame(handling.vehicle, bar.name, bar.frame),
+            _frame(vehicle_on_tyres.vehicle, bar.name, bar.frame),
         )
-        law = [bar.stiffness, bar.damping, handling.held.parts[bar.name], 0.0, 1.0, rest]
-        turns = [-1.0, 0.0] if frame else [float(handling.vehicle.coordinates().index((bar.body, "rx"))), 1.0]
+        law = [bar.stiffness, bar.damping, vehicle_on_tyres.held.parts[bar.name], 0.0, 1.0, rest]
+        turns = [-1.0, 0.0] if frame else [float(vehicle_on_tyres.vehicle.coordinates().index((bar.body, "rx"))), 1.0]
         yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0, frame], (None, None)
 
 
-def _frame(vehicle: SpatialVehicle, key_path: str, frame: str | None) -> float:
+def _frame(vehicle: SpatialVehicle, part_key_path: str, frame_body: str | None) -> float:
     """Last coordinate of the body in which the axis of a spring or bar is fixed; 0 for the carrier."""
-    if frame == CARRIER:
+    if frame_body == CARRIER:
         return 0.0
-    if frame not in vehicle.towed:
+    if frame_body not in vehicle.towed:
         allowed = "must be left out, or be a towed body: in handling axes are fixed in the carrier, which only yaws"
-        raise InputError(vehicle.name, f"{key_path}.frame", frame, allowed, vehicle.towed)
-    return float(last_coordinate_and_joint(vehicle, frame)[0])
+        raise InputError(vehicle.name, f"{part_key_path}.frame", frame_body, allowed, vehicle.towed)
+    return float(last_coordinate_and_joint(vehicle, frame_body)[0])
 
 
-def _put_curves(parts: list[_PartRow], rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all force curves. The position of each curve, counted from ``first``, is also written into the row of
-    its spring."""
+def _put_curves(part_rows: list[_PartRow], table_rows: np.ndarray, first_index: int) -> np.ndarray:
+    """Numbers of all force curves. The position of each curve, counted from ``first_index``, is also written into the
+    row of its spring."""
     laid_curves = np.empty(0)
-    for row, (_, curves) in zip(rows.reshape(-1, PER_PART), parts, strict=True):
+    for row, (_, curves) in zip(table_rows.reshape(-1, PER_PART), part_rows, strict=True):
         for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
             if curve is not None:
-                row[column] = first + laid_curves.size
+                row[column] = first_index + laid_curves.size
                 laid_curves = np.concatenate((laid_curves, curve_numbers(curve)))
     return laid_curves
 
 
-def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
+def _tyre(vehicle_on_tyres: Handling, tyre_index: int, force_points: _Points) -> list[float]:
     """Numbers of tyre i. Its bristle stiffness is chosen such that, at static load, it has the ride vehicle's cornering
     stiffness."""
-    free, of = handling.vehicle, handling.tyres
-    tyre, places = free.tyres[i], free.coordinates()
+    free, of = vehicle_on_tyres.vehicle, vehicle_on_tyres.tyres
+    tyre, places = free.tyres[tyre_index], free.coordinates()
     joint, _ = _point_position(free, tyre.body, tyre.point)
-    load = handling.held.tyres[tyre.name]
+    load = vehicle_on_tyres.held.tyres[tyre.name]
     if not load > 0.0:
         raise InputError(free.name, f"tyres[{tyre.name}]", load, "carries no weight: it must press on the road at rest")
     sunk = load / tyre.stiffness
     radius = tyre.point[2] + sunk
-    cornering = next(force.stiffness for force in handling.given.side_forces if force.name == tyre.name)
+    cornering = next(force.stiffness for force in vehicle_on_tyres.given.side_forces if force.name == tyre.name)
     bristles = cornering / (cornering_stiffness_factor(of.cells) * radius * sunk * of.half_width)
     spins = (rotor(tyre.name), "ry")
     axle = [t for t in free.tyres if t.axle == tyre.axle]
-    share, front, c = 1.0 / len(axle), tyre.axle == 0, handling.controls
+    share, front, c = 1.0 / len(axle), tyre.axle == 0, vehicle_on_tyres.controls
     rear, towed = max(t.axle for t in free.tyres) or 1, free.towed_under(tyre.body)
     driven = max(t.axle for t in free.tyres if free.towed_under(t.body) is None) or 1
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
     drive = 0.0 if towed else share * (c.front_drive if front else (1.0 - c.front_drive) / driven)
     leans = 0.0 if towed else np.sign(tyre.point[1]) * of.inclination
-    carrying, _ = last_coordinate_and_joint(free, towed or chassis_of(handling.given).name)
+    carrying, _ = last_coordinate_and_joint(free, towed or chassis_of(vehicle_on_tyres.given).name)
     return [
         joint,
         places.index(spins) if spins in places else -1,
-        points.number(tyre.body, tyre.point),
+        force_points.number(tyre.body, tyre.point),
         tyre.point[2],
         load,
         tyre.stiffness,
@@ -298,16 +301,16 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     ]
 
 
-def _pushes(handling: Handling) -> np.ndarray:
+def _pushes(vehicle_on_tyres: Handling) -> np.ndarray:
     """A row of numbers for each external push, and then the number of pushes."""
-    names = tuple(body.name for body in handling.vehicle.bodies)
-    for push in handling.pushes:
+    names = tuple(body.name for body in vehicle_on_tyres.vehicle.bodies)
+    for push in vehicle_on_tyres.pushes:
         if push.body not in names:
-            raise InputError(handling.given.name, "pushes", push.body, "no such body", names)
+            raise InputError(vehicle_on_tyres.given.name, "pushes", push.body, "no such body", names)
     rows = [
         [joint, *place, *push.axis]
-        for push in handling.pushes
-        for joint, place in [_point_position(handling.vehicle, push.body, push.point)]
+        for push in vehicle_on_tyres.pushes
+        for joint, place in [_point_position(vehicle_on_tyres.vehicle, push.body, push.point)]
     ]
     return np.array([*np.ravel(rows), len(rows)])
 

@@ -51,18 +51,18 @@ offset, slope, corners and bends; the last coordinate of the body in which its a
 
 
 @lean
-def add_part_forces(numbers, offset, part_count, links, spots, q, v, f):
-    """Add the forces of all springs, dampers and bars to the points they act on, or to ``f`` for a coordinate that adds
-    to a travel. Returns their energy (J) and power (W).
+def add_part_forces(parameter_table, first_index, part_count, links, force_points, q, v, generalised_forces):
+    """Add the forces of all springs, dampers and bars to the points they act on, or to ``generalised_forces`` for a
+    coordinate that adds to a travel. Returns their energy (J) and power (W).
 
-    numbers : pointer to the table; offset, part_count : of the parts there. What keeps a part's axis takes up the
-    couple of its two forces: a towed body by its link."""
+    parameter_table : pointer to the table; first_index, part_count : of the parts there. What keeps a part's axis takes
+    up the couple of its two forces: a towed body by its link."""
     energy = power = 0.0
     for i in range(part_count):
-        e = row(beyond(numbers, offset), PER_PART, i)
+        e = row(beyond(parameter_table, first_index), PER_PART, i)
         from_spot, to_spot, axis = (
-            row(spots, PER_SPOT, int(e[FIRST_POINT])),
-            row(spots, PER_SPOT, int(e[SECOND_POINT])),
+            row(force_points, PER_SPOT, int(e[FIRST_POINT])),
+            row(force_points, PER_SPOT, int(e[SECOND_POINT])),
             three(e, AXIS),
         )
         frame, apart = int(e[FRAME]), plus(three(to_spot, WHERE), times(three(from_spot, WHERE), -1.0))
@@ -79,13 +79,13 @@ def add_part_forces(numbers, offset, part_count, links, spots, q, v, f):
         if e[FRICTION] != 0.0:
             other += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
         if e[ON_TRAVEL] != 0.0:
-            other += on_curve(beyond(numbers, int(e[ON_TRAVEL])), travel)
+            other += on_curve(beyond(parameter_table, int(e[ON_TRAVEL])), travel)
         if e[ON_RATE] != 0.0:
-            other += on_curve(beyond(numbers, int(e[ON_RATE])), rate)
+            other += on_curve(beyond(parameter_table, int(e[ON_RATE])), rate)
         energy += (e[HELD] + 0.5 * e[STIFFNESS] * travel) * travel
         power -= other * rate
         if coordinate >= 0:
-            f[coordinate] -= (spring + other) * e[ADDED_GAIN]
+            generalised_forces[coordinate] -= (spring + other) * e[ADDED_GAIN]
         force = times(axis, spring + other)
         add(from_spot, PUSH, force)
         add(to_spot, PUSH, times(force, -1.0))
@@ -95,13 +95,13 @@ def add_part_forces(numbers, offset, part_count, links, spots, q, v, f):
 
 
 @lean
-def on_curve(numbers, argument):
-    """Force of a piecewise linear curve at an argument. ``numbers`` points to the curve: count, offset, slope, then
-    corners and changes of slope."""
-    head = row(numbers, 3, 0)
-    hinges, force = row(numbers, int(head[0]), 0), head[1] + head[2] * argument
+def on_curve(curve_numbers_pointer, travel_or_rate):
+    """Force of a piecewise linear curve at an argument. ``curve_numbers_pointer`` points to the curve: count, offset,
+    slope, then corners and changes of slope."""
+    head = row(curve_numbers_pointer, 3, 0)
+    hinges, force = row(curve_numbers_pointer, int(head[0]), 0), head[1] + head[2] * travel_or_rate
     for i in range(3, len(hinges), 2):
-        force += hinges[i + 1] * max(argument - hinges[i], 0.0)
+        force += hinges[i + 1] * max(travel_or_rate - hinges[i], 0.0)
     return force
 
 

@@ -29,9 +29,9 @@ AHEAD, ASIDE, TURN, GROUND = 0, 1, 2, 3
 
 
 @lean
-def three(numbers, first):
+def three(array, first_index):
     """Three successive numbers of an array as a tuple."""
-    return numbers[first], numbers[first + 1], numbers[first + 2]
+    return array[first_index], array[first_index + 1], array[first_index + 2]
 
 
 @lean
@@ -47,9 +47,9 @@ def cross(a, b):
 
 
 @lean
-def times(a, factor):
+def times(vector, factor):
     """Product of a tuple and a number."""
-    return a[0] * factor, a[1] * factor, a[2] * factor
+    return vector[0] * factor, vector[1] * factor, vector[2] * factor
 
 
 @lean
@@ -59,44 +59,47 @@ def plus(a, b):
 
 
 @lean
-def put(numbers, first, a):
-    """Write a tuple into an array from index ``first`` on."""
-    numbers[first], numbers[first + 1], numbers[first + 2] = a
+def put(array, first_index, added):
+    """Write a tuple into an array from index ``first_index`` on."""
+    array[first_index], array[first_index + 1], array[first_index + 2] = added
 
 
 @lean
-def add(numbers, first, a):
-    """Add a tuple to three numbers of an array from index ``first`` on."""
-    numbers[first] += a[0]
-    numbers[first + 1] += a[1]
-    numbers[first + 2] += a[2]
+def add(array, first_index, added):
+    """Add a tuple to three numbers of an array from index ``first_index`` on."""
+    array[first_index] += added[0]
+    array[first_index + 1] += added[1]
+    array[first_index + 2] += added[2]
 
 
 @lean
-def outwards(joints, n, q, v, links):
-    """Fill the links (motion of the bodies), body by body, from the table rows of ``joints``; their forces are set to
-    zero. joints, links : pointers."""
+def outwards(joint_table, coordinate_count, q, v, links):
+    """Fill the links (motion of the bodies), body by body, from the table rows of ``joint_table``; their forces are set
+    to zero. joint_table, links : pointers."""
     carrier = row(links, PER_LINK, 2)
     for k in range(PER_LINK):
         carrier[k] = 0.0
     carrier[TURNED] = carrier[TURNED + 4] = carrier[TURNED + 8] = 1.0
     j = 3
-    while j < n:
-        of = row(joints, PER_JOINT, j)
+    while j < coordinate_count:
+        of = row(joint_table, PER_JOINT, j)
         count = int(of[COUNT])
         if of[KIND] != LOOSE:
-            _fill_link(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
+            _fill_link(joint_table, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
         j += count
 
 
 @lean
-def _fill_link(joints, first, end, below, q, v, links):
+def _fill_link(joint_table, first_joint, end_joint, parent_link, q, v, links):
     """Fill a body's link from its parent's link, and the axes of its coordinates, translations first."""
-    x, y, z = three(below, TURNED), three(below, TURNED + 3), three(below, TURNED + 6)
-    place, speed = plus(three(below, PLACE), out(below, row(joints, PER_JOINT, first), ARM)), three(below, SPEED)
-    turning = three(below, TURNING)
-    for j in range(first, end):
-        kind = row(joints, PER_JOINT, j)[KIND]
+    x, y, z = three(parent_link, TURNED), three(parent_link, TURNED + 3), three(parent_link, TURNED + 6)
+    place, speed = (
+        plus(three(parent_link, PLACE), out(parent_link, row(joint_table, PER_JOINT, first_joint), ARM)),
+        three(parent_link, SPEED),
+    )
+    turning = three(parent_link, TURNING)
+    for j in range(first_joint, end_joint):
+        kind = row(joint_table, PER_JOINT, j)[KIND]
         along = kind if kind < 3.0 else kind - 3.0
         axis = x if along == 0.0 else (y if along == 1.0 else z)
         put(row(links, PER_LINK, j), AXIS, axis)
@@ -105,7 +108,7 @@ def _fill_link(joints, first, end, below, q, v, links):
         else:
             turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
             x, y, z = _rotated_axes(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
-    link = row(links, PER_LINK, end - 1)
+    link = row(links, PER_LINK, end_joint - 1)
     put(link, TURNED, x)
     put(link, TURNED + 3, y)
     put(link, TURNED + 6, z)
@@ -117,30 +120,33 @@ def _fill_link(joints, first, end, below, q, v, links):
 
 
 @lean
-def _rotated_axes(along, x, y, z, cosine, sine):
-    """Three axes x, y, z after a rotation about the axis with index ``along``."""
-    if along == 0.0:
+def _rotated_axes(axis_index, x, y, z, cosine, sine):
+    """Three axes x, y, z after a rotation about the axis with index ``axis_index``."""
+    if axis_index == 0.0:
         return x, plus(times(y, cosine), times(z, sine)), plus(times(z, cosine), times(y, -sine))
-    if along == 1.0:
+    if axis_index == 1.0:
         return plus(times(x, cosine), times(z, -sine)), y, plus(times(z, cosine), times(x, sine))
     return plus(times(x, cosine), times(y, sine)), plus(times(y, cosine), times(x, -sine)), z
 
 
 @lean
-def out(link, local, first):
+def out(link, first_component, first):
     """Vector in the carrier's axes, from three components along a link's axes."""
     return plus(
-        plus(times(three(link, TURNED), local[first]), times(three(link, TURNED + 3), local[first + 1])),
-        times(three(link, TURNED + 6), local[first + 2]),
+        plus(
+            times(three(link, TURNED), first_component[first]),
+            times(three(link, TURNED + 3), first_component[first + 1]),
+        ),
+        times(three(link, TURNED + 6), first_component[first + 2]),
     )
 
 
 @lean
-def locate(points, count, links, spots):
-    """Fill the positions and velocities of all force points from the table rows of ``points``; their forces are set to
-    zero. points, links, spots : pointers."""
-    for i in range(count):
-        of, spot = row(points, PER_POINT, i), row(spots, PER_SPOT, i)
+def locate(point_table, point_count, links, force_points):
+    """Fill the positions and velocities of all force points from the table rows of ``point_table``; their forces are
+    set to zero. point_table, links, force_points : pointers."""
+    for i in range(point_count):
+        of, spot = row(point_table, PER_POINT, i), row(force_points, PER_SPOT, i)
         link = row(links, PER_LINK, int(of[JOINT]))
         place = plus(three(link, PLACE), out(link, of, LOCAL))
         put(spot, WHERE, place)
@@ -149,45 +155,45 @@ def locate(points, count, links, spots):
 
 
 @lean
-def push(link, ground, force, place):
+def push(link, carrier_wrench, force, position):
     """Add an external force (N) at a position (m) to the body of a link, and to the carrier."""
-    twist(link, ground, cross(place, force))
+    twist(link, carrier_wrench, cross(position, force))
     add(link, PUSHED, force)
-    ground[AHEAD] += force[0]
-    ground[ASIDE] += force[1]
+    carrier_wrench[AHEAD] += force[0]
+    carrier_wrench[ASIDE] += force[1]
 
 
 @lean
-def twist(link, ground, moment):
+def twist(link, carrier_wrench, moment):
     """Add an external moment (N m) to the body of a link, and to the carrier."""
     add(link, TWISTED, moment)
-    ground[TURN] += moment[2]
+    carrier_wrench[TURN] += moment[2]
 
 
 @lean
-def inwards(joints, n, points, count, tree, f):
+def inwards(joint_table, coordinate_count, point_table, point_count, body_tree, generalised_forces):
     """Transfer forces at points and on bodies from the leaves of the tree to the carrier; adds the generalised force of
-    each coordinate to ``f``.
+    each coordinate to ``generalised_forces``.
 
     What acts between the vehicle's parts does not push the carrier: it feels what comes from outside, in its axes.
     """
-    links, spots = tree.links, tree.spots
-    for i in range(count):
-        spot, link = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(points, PER_POINT, i)[JOINT]))
+    links, spots = body_tree.links, body_tree.spots
+    for i in range(point_count):
+        spot, link = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(point_table, PER_POINT, i)[JOINT]))
         force = three(spot, PUSH)
         add(link, PUSHED, force)
         add(link, TWISTED, cross(three(spot, WHERE), force))
-    j = n - 1
+    j = coordinate_count - 1
     while j > 2:
-        of, link = row(joints, PER_JOINT, j), row(links, PER_LINK, j)
+        of, link = row(joint_table, PER_JOINT, j), row(links, PER_LINK, j)
         first = j + 1 - int(of[COUNT])
         if of[KIND] != LOOSE:
             pushed, twisted = three(link, PUSHED), three(link, TWISTED)
             moment = plus(twisted, cross(pushed, three(link, PLACE)))
             for k in range(first, j + 1):
-                turns = row(joints, PER_JOINT, k)[KIND] >= 3.0
-                f[k] += dot(three(row(links, PER_LINK, k), AXIS), moment if turns else pushed)
-            below = row(links, PER_LINK, int(row(joints, PER_JOINT, first)[BELOW]))
+                turns = row(joint_table, PER_JOINT, k)[KIND] >= 3.0
+                generalised_forces[k] += dot(three(row(links, PER_LINK, k), AXIS), moment if turns else pushed)
+            below = row(links, PER_LINK, int(row(joint_table, PER_JOINT, first)[BELOW]))
             add(below, PUSHED, pushed)
             add(below, TWISTED, twisted)
         j = first - 1

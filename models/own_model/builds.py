@@ -38,12 +38,12 @@ Equations = Callable[[np.ndarray, np.ndarray], Motion]
 """Function that returns the motion (``Motion``) at coordinates and rates (n,)."""
 
 
-def equations_of_build(twin: TwinModel, build: str) -> Equations:
+def equations_of_build(user_model: TwinModel, build_name: str) -> Equations:
     """Equations of motion of the description as "exudyn", "mujoco" or "plain" builds it; constraints are soft in
     MuJoCo, and rigid in the others."""
-    built: Any = plain_tree(twin) if build == PLAIN_BUILD else free_model(build, twin.driven)
-    rigid = twin.driven.tied and build != SOFT_BUILD
-    terms = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
+    built: Any = plain_tree(user_model) if build_name == PLAIN_BUILD else free_model(build_name, user_model.driven)
+    rigid = user_model.driven.tied and build_name != SOFT_BUILD
+    terms = _constraint_rows(user_model, built.ties if build_name != PLAIN_BUILD else None) if rigid else None
 
     def move(q: np.ndarray, v: np.ndarray) -> Motion:
         mass, force = built.mass_and_force(0.0, q, v)
@@ -54,26 +54,26 @@ def equations_of_build(twin: TwinModel, build: str) -> Equations:
     return move
 
 
-def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
+def largest_gap(user_model: TwinModel, build_name: str, states: Sequence[State]) -> float:
     """Largest violation (m or rad) of a build's constraints at the states. Comparing accelerations would not show it:
     bodies in wrong relative positions can have the same accelerations."""
-    if not twin.driven.tied:
+    if not user_model.driven.tied:
         return 0.0
-    if build == PLAIN_BUILD:
-        constraints = plain_constraints(twin)
+    if build_name == PLAIN_BUILD:
+        constraints = plain_constraints(user_model)
         return max(float(np.abs(constraints.gap(q).size).max()) for q, _ in states)
-    built: Any = free_model(build, twin.driven)
+    built: Any = free_model(build_name, user_model.driven)
     return max(float(np.abs(built.gaps(q)).max(initial=0.0)) for q, _ in states)
 
 
 def _constraint_rows(
-    twin: TwinModel, jacobian_at: JacobianAt | None
+    user_model: TwinModel, jacobian_at: JacobianAt | None
 ) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Function that returns the constraint Jacobian J (c, n) and J' q' (c,) at a state, from plain equations or by
     differences of an engine's J."""
     if jacobian_at is None:
-        return plain_constraints(twin).terms
-    if twin.driven.connections:
+        return plain_constraints(user_model).terms
+    if user_model.driven.connections:
         return partial(jacobian_by_differences, jacobian_at)
 
     def constant(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,127 +83,135 @@ def _constraint_rows(
     return constant
 
 
-def plain_tree(twin: TwinModel) -> PlainTree:
+def plain_tree(user_model: TwinModel) -> PlainTree:
     """Equations of motion of a user's model in plain numpy."""
-    loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
-    lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
-    frictions = [(friction.coordinate, friction.force, FULL_FRICTION_SPEED) for friction in twin.driven.frictions]
-    turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
-    pushes = [(load.body, load.point, load.force, load.moment) for load in twin.driven.body_loads]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, AppliedForces(loads, lines, frictions, turns, pushes))
+    loads = [(spring.body, spring.point, spring.load) for spring in user_model.driven.ground_springs]
+    lines = [(line.ends, line.stiffness, line.damping, line.length) for line in user_model.driven.line_springs]
+    frictions = [(friction.coordinate, friction.force, FULL_FRICTION_SPEED) for friction in user_model.driven.frictions]
+    turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in user_model.driven.turning_springs]
+    pushes = [(load.body, load.point, load.force, load.moment) for load in user_model.driven.body_loads]
+    return PlainTree(
+        user_model.driven.vehicle, user_model.driven.gravity, AppliedForces(loads, lines, frictions, turns, pushes)
+    )
 
 
-def expected_equations(twin: TwinModel, build: str) -> Equations:
+def expected_equations(user_model: TwinModel, build_name: str) -> Equations:
     """Equations of motion with which a build must agree: MuJoCo's model of the file, with rigid constraints and Coulomb
     friction unless the build is MuJoCo's."""
-    if build == SOFT_BUILD or not is_soft_in_mujoco(twin):
-        return equations_of_file(twin)
-    return rigid_equations(twin) if twin.driven.tied else sliding_equations(twin)
+    if build_name == SOFT_BUILD or not is_soft_in_mujoco(user_model):
+        return equations_of_file(user_model)
+    return rigid_equations(user_model) if user_model.driven.tied else sliding_equations(user_model)
 
 
-def is_soft_in_mujoco(twin: TwinModel) -> bool:
+def is_soft_in_mujoco(user_model: TwinModel) -> bool:
     """Whether a model has constraints or dry friction, which yield in MuJoCo but in no other build."""
-    return twin.driven.tied or bool(twin.driven.frictions)
+    return user_model.driven.tied or bool(user_model.driven.frictions)
 
 
-def equations_of_file(twin: TwinModel) -> Equations:
+def equations_of_file(user_model: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it."""
-    data = mujoco.MjData(twin.model)
+    data = mujoco.MjData(user_model.model)
 
     def move(q: np.ndarray, v: np.ndarray) -> Motion:
-        state = forward_state(twin, data, q, v)
-        mass, force = _mass_and_forces_of_file(twin, data, state, data.qfrc_constraint)
+        state = forward_state(user_model, data, q, v)
+        mass, force = _mass_and_forces_of_file(user_model, data, state, data.qfrc_constraint)
         return Motion(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.bias))
 
     return move
 
 
-def rigid_equations(twin: TwinModel) -> Equations:
+def rigid_equations(user_model: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it, with its equality constraints made rigid."""
-    data = mujoco.MjData(twin.model)
-    terms = _constraint_rows(twin, lambda places: [_constraint_jacobian_of_file(twin, data, q) for q in places])
+    data = mujoco.MjData(user_model.model)
+    terms = _constraint_rows(
+        user_model, lambda places: [_constraint_jacobian_of_file(user_model, data, q) for q in places]
+    )
 
     def move(q: np.ndarray, v: np.ndarray) -> Motion:
         rows, rest = terms(q, v)
-        mass, force = _sliding_forces_of_file(twin, data, q, v)
+        mass, force = _sliding_forces_of_file(user_model, data, q, v)
         force = constrained_forces(mass, force, rows, rest)
         return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
 
-def sliding_equations(twin: TwinModel) -> Equations:
+def sliding_equations(user_model: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it, with dry friction by Coulomb's law."""
-    data = mujoco.MjData(twin.model)
+    data = mujoco.MjData(user_model.model)
 
     def move(q: np.ndarray, v: np.ndarray) -> Motion:
-        mass, force = _sliding_forces_of_file(twin, data, q, v)
+        mass, force = _sliding_forces_of_file(user_model, data, q, v)
         return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
 
 def _sliding_forces_of_file(
-    twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray
+    user_model: TwinModel, mujoco_data: mujoco.MjData, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass matrix (n, n) and forces (n,) of MuJoCo's model without its equality constraints, with full dry friction
     against the rates."""
-    state, sliding = forward_state(twin, data, q, v), np.empty(twin.size)
-    rubs, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, np.zeros(data.nefc)
-    rows[rubs] = -np.sign(v[data.efc_id[rubs]]) * data.efc_frictionloss[rubs]
-    mujoco.mj_mulJacTVec(twin.model, data, sliding, rows)
-    return _mass_and_forces_of_file(twin, data, state, sliding)
+    state, sliding = forward_state(user_model, mujoco_data, q, v), np.empty(user_model.size)
+    rubs, rows = mujoco_data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, np.zeros(mujoco_data.nefc)
+    rows[rubs] = -np.sign(v[mujoco_data.efc_id[rubs]]) * mujoco_data.efc_frictionloss[rubs]
+    mujoco.mj_mulJacTVec(user_model.model, mujoco_data, sliding, rows)
+    return _mass_and_forces_of_file(user_model, mujoco_data, state, sliding)
 
 
-def _constraint_jacobian_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
+def _constraint_jacobian_of_file(user_model: TwinModel, mujoco_data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
     """Jacobian (c, n) of the file's equality constraints in MuJoCo, with respect to the coordinates of the
     description."""
-    state = forward_state(twin, data, q, np.zeros(twin.size))
-    ties, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty((twin.size, data.nefc))
-    for row, unit in zip(rows, np.eye(twin.size), strict=True):
-        mujoco.mj_mulJacVec(twin.model, data, row, unit)
+    state = forward_state(user_model, mujoco_data, q, np.zeros(user_model.size))
+    ties, rows = (
+        mujoco_data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY,
+        np.empty((user_model.size, mujoco_data.nefc)),
+    )
+    for row, unit in zip(rows, np.eye(user_model.size), strict=True):
+        mujoco.mj_mulJacVec(user_model.model, mujoco_data, row, unit)
     of_constraints: np.ndarray = rows.T[ties] @ state.jacobian
     return of_constraints
 
 
-def forward_state(twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray) -> MujocoState:
-    """MuJoCo's state at coordinates and rates (n,); fills ``data`` with the quantities of MuJoCo's model there."""
-    state = twin.coordinates.to_mujoco(q, v)
-    data.ctrl[:] = constant_controls(twin.model)
-    data.qpos[:], data.qvel[:], data.time = state.qpos, state.qvel, 0.0
-    mujoco.mj_forward(twin.model, data)
+def forward_state(user_model: TwinModel, mujoco_data: mujoco.MjData, q: np.ndarray, v: np.ndarray) -> MujocoState:
+    """MuJoCo's state at coordinates and rates (n,); fills ``mujoco_data`` with the quantities of MuJoCo's model
+    there."""
+    state = user_model.coordinates.to_mujoco(q, v)
+    mujoco_data.ctrl[:] = constant_controls(user_model.model)
+    mujoco_data.qpos[:], mujoco_data.qvel[:], mujoco_data.time = state.qpos, state.qvel, 0.0
+    mujoco.mj_forward(user_model.model, mujoco_data)
     return state
 
 
 def _mass_and_forces_of_file(
-    twin: TwinModel, data: mujoco.MjData, state: MujocoState, constraint: np.ndarray
+    user_model: TwinModel, mujoco_data: mujoco.MjData, mujoco_state: MujocoState, constraint_forces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass matrix (n, n) and forces (n,) of MuJoCo's model in the coordinates of the description."""
-    own_mass, j = np.empty((twin.size, twin.size)), state.jacobian
-    mujoco.mj_fullM(twin.model, data, own_mass)
-    return j.T @ own_mass @ j, j.T @ (data.qfrc_smooth + constraint - own_mass @ state.bias)
+    own_mass, j = np.empty((user_model.size, user_model.size)), mujoco_state.jacobian
+    mujoco.mj_fullM(user_model.model, mujoco_data, own_mass)
+    return j.T @ own_mass @ j, j.T @ (mujoco_data.qfrc_smooth + constraint_forces - own_mass @ mujoco_state.bias)
 
 
-def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
+def sliding_states(user_model: TwinModel, states: Sequence[State]) -> list[State]:
     """The given states at which every joint with dry friction slides, so that its full friction acts in every build.
 
     MuJoCo's is a soft constraint, whose force is less where a joint sticks.
     """
-    if not twin.driven.frictions:
+    if not user_model.driven.frictions:
         return list(states)
-    data = mujoco.MjData(twin.model)
+    data = mujoco.MjData(user_model.model)
 
     def slides(q: np.ndarray, v: np.ndarray) -> bool:
-        forward_state(twin, data, q, v)
+        forward_state(user_model, data, q, v)
         of = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
         whole = np.abs(data.efc_force[of]) >= WHOLE_FRICTION_SHARE * data.efc_frictionloss[of]
         against = data.efc_force[of] * v[data.efc_id[of]] < 0.0
         return bool((whole & against).all())
 
-    return [(q, v) for q, v in moving_friction_states(twin, states) if slides(q, v)]
+    return [(q, v) for q, v in moving_friction_states(user_model, states) if slides(q, v)]
 
 
-def moving_friction_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
+def moving_friction_states(user_model: TwinModel, states: Sequence[State]) -> list[State]:
     """The given states at which every joint with dry friction moves fast enough for Coulomb's law."""
-    rubbing = [friction.coordinate for friction in twin.driven.frictions]
+    rubbing = [friction.coordinate for friction in user_model.driven.frictions]
     return [(q, v) for q, v in states if (np.abs(v[rubbing]) >= FULL_FRICTION_SPEED).all()]

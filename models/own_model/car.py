@@ -45,13 +45,13 @@ PRELOAD_DIFFERENCE = 0.01
 """Relative difference of a preload from the file's from which a note reports it."""
 
 
-def vehicle_of_file(path: Path) -> SpatialVehicle:
+def vehicle_of_file(mjcf_path: Path) -> SpatialVehicle:
     """The unloaded vehicle of an MJCF file. Raises InputError for features that vehicles of a scene cannot have."""
-    document = checked_document(path)
+    document = checked_document(mjcf_path)
     if document.kind != "MJCF":
-        raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
+        raise InputError(mjcf_path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
     model, _ = compiled_model(document)
-    check_sane(model, path.name)
+    check_sane(model, mjcf_path.name)
     return _Reader(model, document).vehicle()
 
 
@@ -93,8 +93,8 @@ class _Reader:
         check_vehicle(vehicle, file)
         return self._without_preloads(vehicle)
 
-    def _refuse(self, part: str, value: object, reason: str) -> NoReturn:
-        raise InputError(self.document.path.name, part, value, reason)
+    def _refuse(self, part_name: str, value: object, reason: str) -> NoReturn:
+        raise InputError(self.document.path.name, part_name, value, reason)
 
     def _leave_out(self, roles: Roles) -> None:
         """Remove parts of the file that twinrig models in another way; refuse other parts without an equivalent."""
@@ -127,37 +127,41 @@ class _Reader:
             if self.model.body_gravcomp[b]:
                 self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
 
-    def _elements(self, parts: CarBodies) -> Iterator[JointElement]:
+    def _elements(self, merged_bodies: CarBodies) -> Iterator[JointElement]:
         """Springs, dampers and rotor inertias along the coordinates of the suspension, with the signs of their axes."""
         joints = {coordinate_of(self.model, j)[0]: j for j in range(self.model.njnt)}
         for element in joint_elements(self.model):
             numbers = [joints[body] for body, _ in element.coordinates]
             for j in numbers:
-                if j not in parts.coordinates:
+                if j not in merged_bodies.coordinates:
                     said = f"acts along {label(self.model, 'joint', j)}, which twinrig moves, and along others"
                     self._refuse(element.name, None, said)
-            moved = [parts.coordinates[j] for j in numbers]
+            moved = [merged_bodies.coordinates[j] for j in numbers]
             factors = tuple(factor * sign for factor, (_, sign) in zip(element.factors, moved, strict=True))
             yield replace(element, coordinates=tuple(at for at, _ in moved), factors=factors)
 
-    def _ranges(self, parts: CarBodies) -> Iterator[tuple]:
+    def _ranges(self, merged_bodies: CarBodies) -> Iterator[tuple]:
         """Limits of the suspension joints, in the suspension's coordinates."""
         model = self.model
-        for j, (at, sign) in parts.coordinates.items():
+        for j, (at, sign) in merged_bodies.coordinates.items():
             if model.jnt_limited[j]:
                 low, high = sorted(sign * (model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]))
                 yield at, float(low), float(high)
 
     def _point_outputs(
-        self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]
+        self, design_data: mujoco.MjData, merged_bodies: CarBodies, wheels: tuple[WheelSite, ...]
     ) -> Iterator[PointOutput]:
         """Outputs of vertical acceleration at every named site that does not mark a wheel."""
         taken = {wheel.site for wheel in wheels}
         for s in range(self.model.nsite):
             name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
-            if name and s not in taken and body in parts.body_names:
+            if name and s not in taken and body in merged_bodies.body_names:
                 yield PointOutput(
-                    name, "acceleration", parts.body_names[body], _vector_of(design.site_xpos[s]), (0.0, 0.0, 1.0)
+                    name,
+                    "acceleration",
+                    merged_bodies.body_names[body],
+                    _vector_of(design_data.site_xpos[s]),
+                    (0.0, 0.0, 1.0),
                 )
 
     def _without_preloads(self, vehicle: SpatialVehicle) -> SpatialVehicle:
@@ -181,23 +185,29 @@ def _reserved_names(wheels: tuple[WheelSite, ...]) -> set[str]:
     return {CARRIER, SWAY, *(rotor(wheel.name) for wheel in wheels)}
 
 
-def _tyre(wheel: WheelSite, parts: CarBodies) -> Tyre:
-    at, spin = _vector_of(wheel.point), parts.spin_inertia.get(wheel.name)
+def _tyre(wheel: WheelSite, merged_bodies: CarBodies) -> Tyre:
+    at, spin = _vector_of(wheel.point), merged_bodies.spin_inertia.get(wheel.name)
     return Tyre(
-        wheel.name, parts.body_names[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin
+        wheel.name,
+        merged_bodies.body_names[wheel.body],
+        at,
+        wheel.axle,
+        wheel.stiffness,
+        wheel.damping,
+        spin_inertia=spin,
     )
 
 
-def _side_force(wheel: WheelSite, parts: CarBodies) -> SideForce:
+def _side_force(wheel: WheelSite, merged_bodies: CarBodies) -> SideForce:
     x, y, _ = _vector_of(wheel.point)
-    return SideForce(wheel.name, parts.chassis, (x, y, 0.0), parts.chassis, wheel.cornering)
+    return SideForce(wheel.name, merged_bodies.chassis, (x, y, 0.0), merged_bodies.chassis, wheel.cornering)
 
 
 def _spatial_outputs(
-    parts: CarBodies, elements: tuple[JointElement, ...], tyres: tuple[Tyre, ...]
+    merged_bodies: CarBodies, elements: tuple[JointElement, ...], tyres: tuple[Tyre, ...]
 ) -> Iterator[SpatialOutput]:
     """Motion of the chassis, travels of springs and dampers, forces of tyres."""
-    chassis = next(body for body in parts.bodies if body.name == parts.chassis)
+    chassis = next(body for body in merged_bodies.bodies if body.name == merged_bodies.chassis)
     yield PointOutput(chassis.name, "acceleration", chassis.name, chassis.position, (0.0, 0.0, 1.0))
     for turn, axis in (("roll", (1.0, 0.0, 0.0)), ("pitch", (0.0, 1.0, 0.0))):
         yield TurnOutput(f"{turn} acceleration", "angular acceleration", chassis.name, axis)
@@ -207,6 +217,6 @@ def _spatial_outputs(
         yield TyreOutput(f"tyre force {tyre.name}", "tyre force", tyre.name)
 
 
-def _vector_of(numbers: np.ndarray) -> Vector:
-    x, y, z = np.asarray(numbers, float).tolist()
+def _vector_of(components: np.ndarray) -> Vector:
+    x, y, z = np.asarray(components, float).tolist()
     return x, y, z

@@ -58,30 +58,38 @@ class _JointSegment:
     joints: list[tuple[int, Freedom, float]] = field(default_factory=list)
     anchor: np.ndarray | None = None
 
-    def accepts(self, freedom: Freedom, anchor: np.ndarray) -> bool:
+    def accepts(self, freedom: Freedom, hinge_anchor: np.ndarray) -> bool:
         """Whether the body's next joint in the file can belong to this segment."""
         order = FREEDOMS.index
         if self.freedoms and order(freedom) <= order(self.freedoms[-1]):
             return False
-        return freedom[0] != "r" or self.anchor is None or bool(np.abs(anchor - self.anchor).max() <= CENTRE_TOLERANCE)
+        return (
+            freedom[0] != "r"
+            or self.anchor is None
+            or bool(np.abs(hinge_anchor - self.anchor).max() <= CENTRE_TOLERANCE)
+        )
 
-    def add(self, joint: int, freedom: Freedom, sign: float, anchor: np.ndarray) -> None:
+    def add(self, joint: int, freedom: Freedom, sign: float, hinge_anchor: np.ndarray) -> None:
         """Add a joint to the segment."""
         self.freedoms.append(freedom)
         self.joints.append((joint, freedom, sign))
         if freedom[0] == "r":
-            self.anchor = anchor
+            self.anchor = hinge_anchor
 
 
 def car_bodies(
-    model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved_names: Collection[str]
+    mujoco_model: mujoco.MjModel,
+    design_data: mujoco.MjData,
+    roles: Roles,
+    model_xml: Document,
+    reserved_names: Collection[str],
 ) -> CarBodies:
     """Bodies of a car from an MJCF model. Raises InputError for joints with oblique axes, and for wheels with
     imbalance.
 
-    design : data of the model in the design position, with kinematics computed; reserved_names : names for other
+    design_data : data of the model in the design position, with kinematics computed; reserved_names : names for other
     bodies."""
-    return _Builder(model, design, roles, document, reserved_names).build()
+    return _Builder(mujoco_model, design_data, roles, model_xml, reserved_names).build()
 
 
 class _Builder:
@@ -89,22 +97,22 @@ class _Builder:
 
     def __init__(
         self,
-        model: mujoco.MjModel,
-        design: mujoco.MjData,
+        mujoco_model: mujoco.MjModel,
+        design_data: mujoco.MjData,
         roles: Roles,
-        document: Document,
+        model_xml: Document,
         reserved_names: Collection[str],
     ) -> None:
         self.model, self.design, self.roles, self.document, self.reserved = (
-            model,
-            design,
+            mujoco_model,
+            design_data,
             roles,
-            document,
+            model_xml,
             reserved_names,
         )
         self.leaders = dict[int, int]()
-        for b in moving_bodies(model):
-            above = self.leaders.get(int(model.body_parentid[b]))
+        for b in moving_bodies(mujoco_model):
+            above = self.leaders.get(int(mujoco_model.body_parentid[b]))
             joined = b in roles.chassis[1:] or (above is not None and not self._suspension_joints(b))
             self.leaders[b] = above if joined and above is not None else b
         self.spin_inertia = dict[str, float]()
@@ -134,9 +142,11 @@ class _Builder:
         left_out = {*self.roles.spin, *self.roles.steer}
         return [j for j in joints_of(self.model, body) if j not in left_out] if body not in self.roles.chassis else []
 
-    def _name(self, leader: int) -> str:
+    def _name(self, leading_body: int) -> str:
         """Name of the combined body: that of its leading body, or for the chassis that of its heaviest body."""
-        body = max(self.roles.chassis if leader in self.roles.chassis else (leader,), key=self.model.body_mass.item)
+        body = max(
+            self.roles.chassis if leading_body in self.roles.chassis else (leading_body,), key=self.model.body_mass.item
+        )
         name: str = self.model.body(body).name or f"body {body}"
         return f"{name} of the file" if name in self.reserved else name
 
@@ -170,12 +180,12 @@ class _Builder:
             body = int(self.model.body_parentid[body])
         return body == carrier
 
-    def _check_round(self, mass: Mass, wheel: WheelSite, joint: int) -> None:
+    def _check_round(self, mass_properties: Mass, wheel: WheelSite, joint: int) -> None:
         """Refuse a wheel with imbalance, which would shake as it spins."""
-        inertia, beside = mass.inertia, np.abs((mass.centre - wheel.point)[[0, 2]]).max()
+        inertia, beside = mass_properties.inertia, np.abs((mass_properties.centre - wheel.point)[[0, 2]]).max()
         uneven = np.abs([inertia[0, 0] - inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]).max()
         if (
-            mass.mass and (beside > SAME_AXLE_DISTANCE or uneven > REVOLUTION_TOLERANCE * np.trace(inertia))
+            mass_properties.mass and (beside > SAME_AXLE_DISTANCE or uneven > REVOLUTION_TOLERANCE * np.trace(inertia))
         ) or not inertia[1, 1] > 0.0:
             said = (
                 f"spins {wheel.name!r}, whose mass must be one of revolution about the axle: its centre is "
@@ -183,9 +193,9 @@ class _Builder:
             )
             raise InputError(self.document.path.name, joint_text(self.model, self.document, joint), None, said)
 
-    def _segments(self, leader: int) -> list[_JointSegment]:
+    def _segments(self, leading_body: int) -> list[_JointSegment]:
         segments = [_JointSegment()]
-        for joint in self._suspension_joints(leader):
+        for joint in self._suspension_joints(leading_body):
             known, anchor = freedom_of(self.model, self.design, joint), self.design.xanchor[joint].copy()
             if known is None:
                 axis = np.round(self.design.xaxis[joint], 9).tolist()
@@ -209,32 +219,40 @@ def combined_mass(masses: list[Mass]) -> Mass:
 
 
 def _bodies_of_joints(
-    name: str,
-    above: str,
+    body_name: str,
+    carrier_name: str,
     segments: list[_JointSegment],
-    mass: Mass,
-    coordinates: dict[int, tuple[tuple[str, Freedom], float]],
+    mass_properties: Mass,
+    joint_coordinates: dict[int, tuple[tuple[str, Freedom], float]],
 ) -> Iterator[Body]:
-    """Bodies of the description for one body of the file and its joints; fills ``coordinates`` with the names that the
-    joints have in the description."""
+    """Bodies of the description for one body of the file and its joints; fills ``joint_coordinates`` with the names
+    that the joints have in the description."""
     for number, segment in enumerate(segments):
         last, at = number == len(segments) - 1, segment.anchor
-        itself = last and (at is None or np.abs(at - mass.centre).max() <= CENTRE_TOLERANCE)
-        link = name if itself else f"{name} joint {number + 1}"
-        coordinates |= {joint: ((link, freedom), sign) for joint, freedom, sign in segment.joints}
+        itself = last and (at is None or np.abs(at - mass_properties.centre).max() <= CENTRE_TOLERANCE)
+        link = body_name if itself else f"{body_name} joint {number + 1}"
+        joint_coordinates |= {joint: ((link, freedom), sign) for joint, freedom, sign in segment.joints}
         if itself:
-            yield _body_from_segment(name, mass, tuple(segment.freedoms), above)
+            yield _body_from_segment(body_name, mass_properties, tuple(segment.freedoms), carrier_name)
             return
-        yield Body(link, 0.0, _vector_of(mass.centre if at is None else at), tuple(segment.freedoms), parent=above)
-        above = link
-    yield _body_from_segment(name, mass, (), above)
+        yield Body(
+            link,
+            0.0,
+            _vector_of(mass_properties.centre if at is None else at),
+            tuple(segment.freedoms),
+            parent=carrier_name,
+        )
+        carrier_name = link
+    yield _body_from_segment(body_name, mass_properties, (), carrier_name)
 
 
-def _body_from_segment(name: str, mass: Mass, freedoms: tuple[Freedom, ...], parent: str | None) -> Body:
-    x, y, z = map(_vector_of, mass.inertia)
-    return Body(name, mass.mass, _vector_of(mass.centre), freedoms, (x, y, z), parent)
+def _body_from_segment(
+    body_name: str, mass_properties: Mass, freedoms: tuple[Freedom, ...], parent_name: str | None
+) -> Body:
+    x, y, z = map(_vector_of, mass_properties.inertia)
+    return Body(body_name, mass_properties.mass, _vector_of(mass_properties.centre), freedoms, (x, y, z), parent_name)
 
 
-def _vector_of(numbers: np.ndarray) -> Vector:
-    x, y, z = np.asarray(numbers, float).tolist()
+def _vector_of(components: np.ndarray) -> Vector:
+    x, y, z = np.asarray(components, float).tolist()
     return x, y, z

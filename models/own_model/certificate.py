@@ -102,70 +102,79 @@ class Agreement:
 
 
 def certificate(
-    twin: TwinModel, count: int = STATE_COUNT, report_progress: Progress = lambda share: None
+    user_model: TwinModel, state_count: int = STATE_COUNT, report_progress: Progress = lambda share: None
 ) -> tuple[Agreement, ...]:
     """Agreement of every build of the description with the file's model in MuJoCo.
 
     RunFailed where a joint with dry friction cannot move.
     """
-    states, rows = comparison_states(twin, count), list[Agreement]()
-    soft = reference_of_file(twin, states, SOFT_BUILD)
-    rigid = reference_of_file(twin, states, PLAIN_BUILD) if is_soft_in_mujoco(twin) else soft
+    states, rows = comparison_states(user_model, state_count), list[Agreement]()
+    soft = reference_of_file(user_model, states, SOFT_BUILD)
+    rigid = reference_of_file(user_model, states, PLAIN_BUILD) if is_soft_in_mujoco(user_model) else soft
     for i, build in enumerate(ALL_BUILDS):
         row = agreement_of_build(
-            build, soft if build == SOFT_BUILD else rigid, motion_at(equations_of_build(twin, build), states)
+            build, soft if build == SOFT_BUILD else rigid, motion_at(equations_of_build(user_model, build), states)
         )
-        rows.append(replace(row, gap=largest_gap(twin, build, states)))
+        rows.append(replace(row, gap=largest_gap(user_model, build, states)))
         report_progress((i + 1) / len(ALL_BUILDS))
     return tuple(rows)
 
 
-def comparison_states(twin: TwinModel, count: int) -> list[State]:
+def comparison_states(user_model: TwinModel, state_count: int) -> list[State]:
     """Random states at which dry friction slides. Where it sticks in MuJoCo, the rates are increased; a state is left
     out if it sticks all the same, unless all do: then those are taken at which every joint with dry friction moves.
 
     RunFailed where none does.
     """
-    states, drawn = list[State](), list(zip(*random_states(twin, count), strict=True))
+    states, drawn = list[State](), list(zip(*random_states(user_model, state_count), strict=True))
     for q, v in drawn:
-        tried = (sliding_states(twin, [(q, factor * v)]) for factor in RATE_FACTORS)
+        tried = (sliding_states(user_model, [(q, factor * v)]) for factor in RATE_FACTORS)
         states += next((each for each in tried if each), [])
-    states = states or moving_friction_states(twin, drawn)
+    states = states or moving_friction_states(user_model, drawn)
     if not states:
         said = "a joint with dry friction cannot move, so its friction has no direction: try `--without friction_loss`"
         raise RunFailed("twin", said)
     return states
 
 
-def softness_difference(twin: TwinModel, count: int) -> float:
+def softness_difference(user_model: TwinModel, state_count: int) -> float:
     """Largest relative difference between the file's accelerations with MuJoCo's soft constraints and those with rigid
     constraints, at states that satisfy the constraints."""
-    states = comparison_states(twin, count)
+    states = comparison_states(user_model, state_count)
     return agreement_of_build(
-        "", reference_of_file(twin, states, PLAIN_BUILD), motion_at(expected_equations(twin, SOFT_BUILD), states)
+        "",
+        reference_of_file(user_model, states, PLAIN_BUILD),
+        motion_at(expected_equations(user_model, SOFT_BUILD), states),
     ).acceleration
 
 
-def reference_of_file(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
+def reference_of_file(user_model: TwinModel, states: Sequence[State], build_name: str) -> Reference:
     """``Reference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``motion_at``
     does."""
-    law = partial(expected_equations, build=build)
-    moved = motion_at(law(twin), states)
-    _check_inertia(twin, moved[0].mass)
-    return Reference(twin.names, joint_coordinate_slices(twin.model), moved, sensitivities(twin, law, states, moved))
+    law = partial(expected_equations, build_name=build_name)
+    moved = motion_at(law(user_model), states)
+    _check_inertia(user_model, moved[0].mass)
+    return Reference(
+        user_model.names,
+        joint_coordinate_slices(user_model.model),
+        moved,
+        sensitivities(user_model, law, states, moved),
+    )
 
 
-def _check_inertia(twin: TwinModel, mass: np.ndarray) -> None:
+def _check_inertia(user_model: TwinModel, mass_matrix: np.ndarray) -> None:
     """Raise RunFailed, naming the joints that together move without inertia, where the mass matrix (n, n) is
     singular."""
-    scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), SMALLEST_FLOAT))
-    values, shapes = np.linalg.eigh(mass * np.outer(scale, scale))
-    if values[0] <= len(mass) * float(np.finfo(float).eps):
+    scale = 1.0 / np.sqrt(np.maximum(mass_matrix.diagonal(), SMALLEST_FLOAT))
+    values, shapes = np.linalg.eigh(mass_matrix * np.outer(scale, scale))
+    if values[0] <= len(mass_matrix) * float(np.finfo(float).eps):
         share = np.abs(shapes[:, 0])
         names = [
-            name for name, part in zip(twin.names, share, strict=True) if part > NAMED_COORDINATE_SHARE * share.max()
+            name
+            for name, part in zip(user_model.names, share, strict=True)
+            if part > NAMED_COORDINATE_SHARE * share.max()
         ]
-        raise RunFailed(twin.name, f"the mass matrix is singular: {' and '.join(names)} can move without inertia")
+        raise RunFailed(user_model.name, f"the mass matrix is singular: {' and '.join(names)} can move without inertia")
 
 
 def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Motion]:
@@ -181,12 +190,15 @@ def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarra
     return moved
 
 
-def agreement_of_build(build: str, expected: Reference, motions: Sequence[Motion]) -> Agreement:
+def agreement_of_build(build_name: str, expected_reference: Reference, motions: Sequence[Motion]) -> Agreement:
     """Largest differences between the motions of a build and the reference over all states."""
-    rows = [_scales_at_state(expected, i) for i in range(len(motions))]
+    rows = [_scales_at_state(expected_reference, i) for i in range(len(motions))]
     magnitudes, rounding = (Motion(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
     apart = Motion(
-        *(np.abs(np.array(there) - np.array(here)) for there, here in _paired_values(motions, expected.motions))
+        *(
+            np.abs(np.array(there) - np.array(here))
+            for there, here in _paired_values(motions, expected_reference.motions)
+        )
     )
     mass, force, shares = (
         np.where(d > 0.0, d / np.maximum(np.maximum(a, r / EQUAL_ACCELERATION_SHARE), SMALLEST_FLOAT), 0.0)
@@ -194,52 +206,54 @@ def agreement_of_build(build: str, expected: Reference, motions: Sequence[Motion
     )
     at, i = np.unravel_index(np.argmax(np.nan_to_num(shares, nan=np.inf)), shares.shape)
     bound = _may_be_rounding(magnitudes, rounding.acceleration)
-    sizes = (float(apart.acceleration[at, i]), float(np.abs(expected.motions[at].acceleration[i])))
+    sizes = (float(apart.acceleration[at, i]), float(np.abs(expected_reference.motions[at].acceleration[i])))
     return Agreement(
-        build,
+        build_name,
         _largest_difference(mass),
         _largest_difference(force),
         _largest_difference(shares),
-        expected.names[i],
+        expected_reference.names[i],
         *sizes,
         bound,
     )
 
 
-def _may_be_rounding(magnitudes: Motion, rounding: np.ndarray) -> float:
+def _may_be_rounding(magnitudes: Motion, allowed_rounding: np.ndarray) -> float:
     """Largest ratio, over the coordinates, of the allowed rounding (s, n) to the largest acceleration, limited to 1e-10
     to 1; coordinates that hardly move are left out."""
-    largest, allowed = magnitudes.acceleration.max(axis=0), rounding.max(axis=0)
+    largest, allowed = magnitudes.acceleration.max(axis=0), allowed_rounding.max(axis=0)
     weighted = largest * np.sqrt(np.diagonal(magnitudes.mass, axis1=1, axis2=2).max(axis=0))
     moves = weighted > HARDLY_MOVING_SHARE * weighted.max()
     return min(1.0, max(EQUAL_ACCELERATION_SHARE, float((allowed[moves] / largest[moves]).max(initial=0.0))))
 
 
-def _paired_values(motions: Sequence[Motion], expected: Sequence[Motion]) -> Iterator[tuple[tuple, tuple]]:
+def _paired_values(
+    build_motions: Sequence[Motion], expected_motions: Sequence[Motion]
+) -> Iterator[tuple[tuple, tuple]]:
     """Pairs of a build's and the expected values over all states: first mass matrices, then forces, then
     accelerations."""
-    return zip(zip(*motions, strict=True), zip(*expected, strict=True), strict=True)
+    return zip(zip(*build_motions, strict=True), zip(*expected_motions, strict=True), strict=True)
 
 
-def _largest_difference(shares: np.ndarray) -> float:
-    return float(shares.max()) if np.isfinite(shares).all() else np.inf
+def _largest_difference(relative_differences: np.ndarray) -> float:
+    return float(relative_differences.max()) if np.isfinite(relative_differences).all() else np.inf
 
 
-def _scales_at_state(expected: Reference, state: int) -> tuple[Motion, Motion]:
+def _scales_at_state(expected_reference: Reference, state_index: int) -> tuple[Motion, Motion]:
     """Reference magnitudes of masses, forces and accelerations at one state, and the rounding error allowed in each.
 
     The allowed error does not grow further where a mass matrix is nearly singular.
     """
-    moved, sensitive = expected.motions[state], expected.sensitivities[state]
+    moved, sensitive = expected_reference.motions[state_index], expected_reference.sensitivities[state_index]
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
     force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
-    acceleration = np.array([acceleration[together].max() for together in expected.judged_together])
+    acceleration = np.array([acceleration[together].max() for together in expected_reference.judged_together])
     magnitudes = Motion(np.outer(inertia, inertia), force, acceleration)
     allowed = ROUNDING_SHARE * min(1.0, WORST_CONDITION / _scaled_condition(moved.mass))
     return magnitudes, Motion(*(allowed * each for each in sensitive))
 
 
-def _scaled_condition(mass: np.ndarray) -> float:
+def _scaled_condition(mass_matrix: np.ndarray) -> float:
     """Condition number of a mass matrix after scaling to a unit diagonal."""
-    scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), np.finfo(float).tiny))
-    return float(np.linalg.cond(mass * np.outer(scale, scale)))
+    scale = 1.0 / np.sqrt(np.maximum(mass_matrix.diagonal(), np.finfo(float).tiny))
+    return float(np.linalg.cond(mass_matrix * np.outer(scale, scale)))

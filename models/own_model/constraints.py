@@ -26,21 +26,23 @@ Ranges = tuple[np.ndarray | float, np.ndarray | float]
 """Lowest and highest coordinates, (n,) or the same for all."""
 
 
-def plain_constraints(twin: TwinModel) -> PlainConstraints:
+def plain_constraints(user_model: TwinModel) -> PlainConstraints:
     """The constraints of a user's model in plain numpy."""
-    driven = twin.driven
+    driven = user_model.driven
     joints = [(connection.ends, connection.axes) for connection in driven.connections]
-    return PlainConstraints(Bodies(driven.vehicle), *coupling_rows(driven.couplings, twin.size), joints)
+    return PlainConstraints(Bodies(driven.vehicle), *coupling_rows(driven.couplings, user_model.size), joints)
 
 
-def constrained_forces(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray, bias: np.ndarray) -> np.ndarray:
+def constrained_forces(
+    mass_matrix: np.ndarray, forces: np.ndarray, jacobian: np.ndarray, bias: np.ndarray
+) -> np.ndarray:
     """Forces (n,) including the constraint forces of rigid constraints J q'' + bias = 0, with Jacobian J (c, n) and
     bias (c,); rows may be linearly dependent."""
     turned, sizes, jacobian = np.linalg.svd(jacobian, full_matrices=False)
     kept = sizes > REDUNDANT_SHARE * sizes[0]
     jacobian, bias = jacobian[kept], (bias @ turned)[kept] / sizes[kept]
-    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, jacobian.T)
-    answer: np.ndarray = force - jacobian.T @ np.linalg.solve(jacobian @ compliance, jacobian @ free + bias)
+    free, compliance = np.linalg.solve(mass_matrix, forces), np.linalg.solve(mass_matrix, jacobian.T)
+    answer: np.ndarray = forces - jacobian.T @ np.linalg.solve(jacobian @ compliance, jacobian @ free + bias)
     return answer
 
 
@@ -59,7 +61,7 @@ def jacobian_by_differences(jacobian_at: JacobianAt, q: np.ndarray, v: np.ndarra
 
 
 def satisfying_state(
-    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray, ranges: Ranges = (-np.inf, np.inf)
+    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray, coordinate_ranges: Ranges = (-np.inf, np.inf)
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Nearest coordinates (n,) and rates (n,) that satisfy the constraints, by Newton's method; None if it does not
     converge. ranges : lowest and highest coordinates, which no correction leaves."""
@@ -67,17 +69,21 @@ def satisfying_state(
         gap = constraints.gap(q)
         if np.abs(gap.size).max() <= SATISFIED_GAP:
             return q, v - np.linalg.pinv(gap.jacobian, REDUNDANT_SHARE) @ (gap.jacobian @ v)
-        step = _correction(gap.jacobian, gap.size, q, ranges)
-        q = np.clip(q - step * min(1.0, LONGEST_CORRECTION / max(float(np.abs(step).max()), SATISFIED_GAP)), *ranges)
+        step = _correction(gap.jacobian, gap.size, q, coordinate_ranges)
+        q = np.clip(
+            q - step * min(1.0, LONGEST_CORRECTION / max(float(np.abs(step).max()), SATISFIED_GAP)), *coordinate_ranges
+        )
     return None
 
 
-def _correction(jacobian: np.ndarray, gap: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
+def _correction(
+    jacobian: np.ndarray, constraint_gap: np.ndarray, q: np.ndarray, coordinate_ranges: Ranges
+) -> np.ndarray:
     """Smallest correction (n,) of the coordinates that closes gaps (c,) to first order; coordinates that it would push
     out of their ranges are left unchanged."""
-    (low, high), held = ranges, np.zeros(len(q), bool)
+    (low, high), held = coordinate_ranges, np.zeros(len(q), bool)
     while True:
-        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, jacobian), REDUNDANT_SHARE) @ gap
+        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, jacobian), REDUNDANT_SHARE) @ constraint_gap
         pressed = ~held & (((q <= low) & (step > 0.0)) | ((q >= high) & (step < 0.0)))
         if not pressed.any():
             return step

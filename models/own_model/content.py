@@ -58,76 +58,90 @@ class Content:
         return f"{self.kind}: {first_names_text(self.names)}: {self.reason}"
 
 
-def contents_of_model(model: mujoco.MjModel, document: Document) -> list[Content]:
+def contents_of_model(mujoco_model: mujoco.MjModel, model_xml: Document) -> list[Content]:
     """All content of the model beyond a tree with linear force laws, one item for each kind that occurs."""
-    return _contents_of_kind(model, document, lambda kind, what, number: True)
+    return _contents_of_kind(mujoco_model, model_xml, lambda kind, what, number: True)
 
 
-def without_equal(model: mujoco.MjModel, document: Document) -> list[Content]:
+def without_equal(mujoco_model: mujoco.MjModel, model_xml: Document) -> list[Content]:
     """The content of ``contents_of_model`` that other builds cannot represent."""
-    return _contents_of_kind(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
+    return _contents_of_kind(
+        mujoco_model, model_xml, lambda kind, what, number: not _has_equal(mujoco_model, kind, what, number)
+    )
 
 
 def _contents_of_kind(
-    model: mujoco.MjModel, document: Document, is_wanted: Callable[[str, str, int], bool]
+    mujoco_model: mujoco.MjModel, model_xml: Document, is_wanted: Callable[[str, str, int], bool]
 ) -> list[Content]:
     rows = list[Content]()
     for kind, (listed, why, _) in CONTENT_KINDS.items():
-        if names := [_with_line(model, document, *each) for each in listed(model) if is_wanted(kind, *each)]:
+        if names := [
+            _with_line(mujoco_model, model_xml, *each) for each in listed(mujoco_model) if is_wanted(kind, *each)
+        ]:
             rows.append(Content(kind, tuple(names), why))
     return rows
 
 
-def _has_equal(model: mujoco.MjModel, kind: str, object_kind: str, number: int) -> bool:
+def _has_equal(mujoco_model: mujoco.MjModel, content_kind: str, object_kind: str, object_index: int) -> bool:
     """Whether other builds can represent an object of the file: a ball joint without rotor, dry friction of a hinge or
     slide, or an equality constraint between bodies or of one or two hinges or slides."""
-    if kind == "friction_loss":
-        return object_kind == "joint" and has_dry_friction(model, number)
-    if kind == "turning_law":
-        return not _has_rotor(model, number)
-    return kind == "equality" and (couples_joints(model, number) or joins_bodies(model, number))
+    if content_kind == "friction_loss":
+        return object_kind == "joint" and has_dry_friction(mujoco_model, object_index)
+    if content_kind == "turning_law":
+        return not _has_rotor(mujoco_model, object_index)
+    return content_kind == "equality" and (
+        couples_joints(mujoco_model, object_index) or joins_bodies(mujoco_model, object_index)
+    )
 
 
-def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
-    """Remove the kinds of content named in ``without`` from the model, and return what was removed. Raises InputError
-    where other content cannot be represented."""
-    for kind in without:
+def check_and_leave_out(
+    mujoco_model: mujoco.MjModel, model_xml: Document, left_out_kinds: Collection[str]
+) -> list[Content]:
+    """Remove the kinds of content named in ``left_out_kinds`` from the model, and return what was removed. Raises
+    InputError where other content cannot be represented."""
+    for kind in left_out_kinds:
         if kind not in CONTENT_KINDS:
             raise InputError("--without", "", kind, "no such content", tuple(CONTENT_KINDS))
-    if there := [row for row in without_equal(model, document) if row.kind not in without or row.kind == "flex"]:
-        raise InputError(document.path.name, "", None, _refusal(there, without))
-    left_out = [row for row in contents_of_model(model, document) if row.kind in without]
+    if there := [
+        row for row in without_equal(mujoco_model, model_xml) if row.kind not in left_out_kinds or row.kind == "flex"
+    ]:
+        raise InputError(model_xml.path.name, "", None, _refusal(there, left_out_kinds))
+    left_out = [row for row in contents_of_model(mujoco_model, model_xml) if row.kind in left_out_kinds]
     for row in left_out:
-        CONTENT_KINDS[row.kind][2](model)
-    model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
-    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
-    model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
-    model.opt.tolerance = min(SOLVER_TOLERANCE, model.opt.tolerance)
-    if not feature_is_disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
-        for times in (model.eq_solref[:, 0], model.dof_solref[:, 0]):
-            times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
+        CONTENT_KINDS[row.kind][2](mujoco_model)
+    mujoco_model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
+    mujoco_model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
+    mujoco_model.opt.iterations, mujoco_model.opt.noslip_iterations = max(100, mujoco_model.opt.iterations), 0
+    mujoco_model.opt.tolerance = min(SOLVER_TOLERANCE, mujoco_model.opt.tolerance)
+    if not feature_is_disabled(mujoco_model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
+        for times in (mujoco_model.eq_solref[:, 0], mujoco_model.dof_solref[:, 0]):
+            times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * mujoco_model.opt.timestep), times)
     return left_out
 
 
-def _refusal(rows: Sequence[Content], without: Collection[str]) -> str:
-    """Text of a refusal: the content without an equivalent, and the option that leaves all of it out; without : kinds
-    left out already."""
-    told = ". ".join(row.line() for row in rows)
-    if any(row.kind == "flex" for row in rows):
+def _refusal(contents: Sequence[Content], left_out_kinds: Collection[str]) -> str:
+    """Text of a refusal: the content without an equivalent, and the option that leaves all of it out;
+    left_out_kinds : kinds left out already."""
+    told = ". ".join(row.line() for row in contents)
+    if any(row.kind == "flex" for row in contents):
         return (
             f"{told}. Deformable bodies have no equal, and cannot be left out: their vertices are bodies of the model"
         )
-    subject_and_verb, pronoun = ("It has", "it") if len(rows) == 1 else ("They have", "them")
-    kinds = ",".join(dict.fromkeys((*without, *(row.kind for row in rows))))
+    subject_and_verb, pronoun = ("It has", "it") if len(contents) == 1 else ("They have", "them")
+    kinds = ",".join(dict.fromkeys((*left_out_kinds, *(row.kind for row in contents))))
     return f"{told}. {subject_and_verb} no equal in the other builds; leave {pronoun} out with `--without {kinds}`"
 
 
-def _with_line(model: mujoco.MjModel, document: Document, object_kind: str, number: int) -> str:
-    if number == NAMELESS_INDEX:
+def _with_line(mujoco_model: mujoco.MjModel, model_xml: Document, object_kind: str, object_index: int) -> str:
+    if object_index == NAMELESS_INDEX:
         return object_kind
-    name = name_of(model, object_kind, number)
-    line = document.line(TAGS_OF_ELEMENT.get(object_kind, ()), name) if name else ""
-    return f"{label(model, object_kind, number)} ({line})" if line else label(model, object_kind, number)
+    name = name_of(mujoco_model, object_kind, object_index)
+    line = model_xml.line(TAGS_OF_ELEMENT.get(object_kind, ()), name) if name else ""
+    return (
+        f"{label(mujoco_model, object_kind, object_index)} ({line})"
+        if line
+        else label(mujoco_model, object_kind, object_index)
+    )
 
 
 ObjectIterator = Iterator[tuple[str, int]]
@@ -135,166 +149,179 @@ ObjectIterator = Iterator[tuple[str, int]]
 NAMELESS_INDEX = -1
 
 
-def _touching_geoms(model: mujoco.MjModel) -> ObjectIterator:
+def _touching_geoms(mujoco_model: mujoco.MjModel) -> ObjectIterator:
     """Geoms that could come into contact with another geom, and explicit contact pairs."""
-    if feature_is_disabled(model, "CONTACT"):
+    if feature_is_disabled(mujoco_model, "CONTACT"):
         return
-    weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
-    of = weld[model.geom_bodyid]
-    parents, filtered = above[of], not feature_is_disabled(model, "FILTERPARENT")
-    for g in range(model.ngeom):
-        fits = (model.geom_contype[g] & model.geom_conaffinity) | (model.geom_conaffinity[g] & model.geom_contype)
+    weld, above = mujoco_model.body_weldid, mujoco_model.body_weldid[mujoco_model.body_parentid]
+    of = weld[mujoco_model.geom_bodyid]
+    parents, filtered = above[of], not feature_is_disabled(mujoco_model, "FILTERPARENT")
+    for g in range(mujoco_model.ngeom):
+        fits = (mujoco_model.geom_contype[g] & mujoco_model.geom_conaffinity) | (
+            mujoco_model.geom_conaffinity[g] & mujoco_model.geom_contype
+        )
         kin = (of != 0) & (of[g] != 0) & ((parents == of[g]) | (parents[g] == of))
         if (fits.astype(bool) & (of != of[g]) & ~(kin & filtered)).any():
             yield "geom", g
-    for p in range(model.npair):
+    for p in range(mujoco_model.npair):
         yield "pair", p
 
 
-def _joints_with_dry_friction(model: mujoco.MjModel) -> ObjectIterator:
-    if feature_is_disabled(model, "FRICTIONLOSS"):
+def _joints_with_dry_friction(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    if feature_is_disabled(mujoco_model, "FRICTIONLOSS"):
         return
-    for j in sorted(set(model.dof_jntid[model.dof_frictionloss > 0.0])):
+    for j in sorted(set(mujoco_model.dof_jntid[mujoco_model.dof_frictionloss > 0.0])):
         yield "joint", int(j)
-    for t in np.flatnonzero(model.tendon_frictionloss > 0.0):
+    for t in np.flatnonzero(mujoco_model.tendon_frictionloss > 0.0):
         yield "tendon", int(t)
 
 
-def _unbuilt_equalities(model: mujoco.MjModel) -> ObjectIterator:
-    if not feature_is_disabled(model, "EQUALITY"):
-        for e in np.flatnonzero(model.eq_active0):
+def _unbuilt_equalities(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    if not feature_is_disabled(mujoco_model, "EQUALITY"):
+        for e in np.flatnonzero(mujoco_model.eq_active0):
             yield "equality", int(e)
 
 
-def _unbuilt_actuators(model: mujoco.MjModel) -> ObjectIterator:
+def _unbuilt_actuators(mujoco_model: mujoco.MjModel) -> ObjectIterator:
     """Actuators that have a state, act along a spatial tendon, or follow a force law that is not affine."""
-    for i in range(model.nu):
-        target = int(model.actuator_trnid[i, 0])
-        kind = int(model.actuator_trntype[i])
-        along_joint = kind in JOINT_TARGETS and int(model.jnt_type[target]) not in (BALL_JOINT, FREE_JOINT)
-        along_tendon = kind == TRN.mjTRN_TENDON and is_fixed(model, target)
-        on_site = pushes_site(model, i) and not any(affine_law(model, i, control)[2] for control in (0.0, 1.0))
-        straight = int(model.actuator_gaintype[i]) in AFFINE_GAINS and int(model.actuator_biastype[i]) in AFFINE_BIASES
-        more = model.actuator_damping[i] or model.actuator_armature[i] or model.actuator_dampingpoly[i].any()
-        stateless = model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE and not model.actuator_delay[i]
+    for i in range(mujoco_model.nu):
+        target = int(mujoco_model.actuator_trnid[i, 0])
+        kind = int(mujoco_model.actuator_trntype[i])
+        along_joint = kind in JOINT_TARGETS and int(mujoco_model.jnt_type[target]) not in (BALL_JOINT, FREE_JOINT)
+        along_tendon = kind == TRN.mjTRN_TENDON and is_fixed(mujoco_model, target)
+        on_site = pushes_site(mujoco_model, i) and not any(
+            affine_law(mujoco_model, i, control)[2] for control in (0.0, 1.0)
+        )
+        straight = (
+            int(mujoco_model.actuator_gaintype[i]) in AFFINE_GAINS
+            and int(mujoco_model.actuator_biastype[i]) in AFFINE_BIASES
+        )
+        more = (
+            mujoco_model.actuator_damping[i]
+            or mujoco_model.actuator_armature[i]
+            or mujoco_model.actuator_dampingpoly[i].any()
+        )
+        stateless = mujoco_model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE and not mujoco_model.actuator_delay[i]
         if not ((along_joint or along_tendon or on_site) and straight and stateless) or more:
             yield "actuator", i
 
 
-def _limited_elements(model: mujoco.MjModel) -> ObjectIterator:
-    if not model.nu:
+def _limited_elements(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    if not mujoco_model.nu:
         return
-    for i in np.flatnonzero(model.actuator_forcelimited):
+    for i in np.flatnonzero(mujoco_model.actuator_forcelimited):
         yield "actuator", int(i)
-    for j in np.flatnonzero(model.jnt_actfrclimited):
+    for j in np.flatnonzero(mujoco_model.jnt_actfrclimited):
         yield "joint", int(j)
-    for t in np.flatnonzero(model.tendon_actfrclimited):
+    for t in np.flatnonzero(mujoco_model.tendon_actfrclimited):
         yield "tendon", int(t)
 
 
-def _spatial_tendons(model: mujoco.MjModel) -> ObjectIterator:
-    for t in range(model.ntendon):
-        forces = model.tendon_stiffness[t] or model.tendon_damping[t] or model.tendon_armature[t]
-        slack = model.tendon_stiffness[t] and np.ptp(model.tendon_lengthspring[t])
-        straight = is_fixed(model, t) or (is_line(model, t) and not model.tendon_armature[t])
+def _spatial_tendons(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    for t in range(mujoco_model.ntendon):
+        forces = mujoco_model.tendon_stiffness[t] or mujoco_model.tendon_damping[t] or mujoco_model.tendon_armature[t]
+        slack = mujoco_model.tendon_stiffness[t] and np.ptp(mujoco_model.tendon_lengthspring[t])
+        straight = is_fixed(mujoco_model, t) or (is_line(mujoco_model, t) and not mujoco_model.tendon_armature[t])
         if (forces and not straight) or slack:
             yield "tendon", t
 
 
-def _turning_laws(model: mujoco.MjModel) -> ObjectIterator:
+def _turning_laws(mujoco_model: mujoco.MjModel) -> ObjectIterator:
     """Ball and free joints with springs, dampers or rotors that act about all three axes at once."""
-    for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
-        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
-        if model.jnt_stiffness[j] or model.dof_damping[first] or _has_rotor(model, int(j)):
+    for j in np.flatnonzero((mujoco_model.jnt_type == BALL_JOINT) | (mujoco_model.jnt_type == FREE_JOINT)):
+        first = int(mujoco_model.jnt_dofadr[j]) + (3 if mujoco_model.jnt_type[j] == FREE_JOINT else 0)
+        if mujoco_model.jnt_stiffness[j] or mujoco_model.dof_damping[first] or _has_rotor(mujoco_model, int(j)):
             yield "joint", int(j)
 
 
-def _has_rotor(model: mujoco.MjModel, joint: int) -> bool:
+def _has_rotor(mujoco_model: mujoco.MjModel, joint: int) -> bool:
     """Whether a ball joint has an armature."""
-    return bool(model.jnt_type[joint] == BALL_JOINT and model.dof_armature[model.jnt_dofadr[joint]])
+    return bool(
+        mujoco_model.jnt_type[joint] == BALL_JOINT and mujoco_model.dof_armature[mujoco_model.jnt_dofadr[joint]]
+    )
 
 
-def _bent_laws(model: mujoco.MjModel) -> ObjectIterator:
-    for j in range(model.njnt):
-        bent = model.jnt_stiffnesspoly[j].any() or model.dof_dampingpoly[model.jnt_dofadr[j]].any()
-        if bent or (model.nplastic and model.jnt_plasticadr[j] >= 0):
+def _bent_laws(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    for j in range(mujoco_model.njnt):
+        bent = mujoco_model.jnt_stiffnesspoly[j].any() or mujoco_model.dof_dampingpoly[mujoco_model.jnt_dofadr[j]].any()
+        if bent or (mujoco_model.nplastic and mujoco_model.jnt_plasticadr[j] >= 0):
             yield "joint", j
-    for t in range(model.ntendon):
-        bent = model.tendon_stiffnesspoly[t].any() or model.tendon_dampingpoly[t].any()
-        if bent or (model.nplastic and model.tendon_plasticadr[t] >= 0):
+    for t in range(mujoco_model.ntendon):
+        bent = mujoco_model.tendon_stiffnesspoly[t].any() or mujoco_model.tendon_dampingpoly[t].any()
+        if bent or (mujoco_model.nplastic and mujoco_model.tendon_plasticadr[t] >= 0):
             yield "tendon", t
 
 
-def _partly_compensated_bodies(model: mujoco.MjModel) -> ObjectIterator:
-    for b in range(1, model.nbody):
-        if 0.0 < compensation(model, b) < 1.0:
+def _partly_compensated_bodies(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    for b in range(1, mujoco_model.nbody):
+        if 0.0 < compensation(mujoco_model, b) < 1.0:
             yield "body", b
 
 
-def _medium_elements(model: mujoco.MjModel) -> ObjectIterator:
-    if model.opt.density or model.opt.viscosity:
+def _medium_elements(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    if mujoco_model.opt.density or mujoco_model.opt.viscosity:
         yield "density and viscosity", NAMELESS_INDEX
 
 
-def _flexible_elements(model: mujoco.MjModel) -> ObjectIterator:
-    for i in range(model.nflex):
+def _flexible_elements(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+    for i in range(mujoco_model.nflex):
         yield "flex", i
 
 
-def _forget_contacts(model: mujoco.MjModel) -> None:
-    model.opt.disableflags |= int(DSBL.mjDSBL_CONTACT)
+def _forget_contacts(mujoco_model: mujoco.MjModel) -> None:
+    mujoco_model.opt.disableflags |= int(DSBL.mjDSBL_CONTACT)
 
 
-def _forget_friction(model: mujoco.MjModel) -> None:
-    model.opt.disableflags |= int(DSBL.mjDSBL_FRICTIONLOSS)
+def _forget_friction(mujoco_model: mujoco.MjModel) -> None:
+    mujoco_model.opt.disableflags |= int(DSBL.mjDSBL_FRICTIONLOSS)
 
 
-def _forget_equalities(model: mujoco.MjModel) -> None:
-    model.opt.disableflags |= int(DSBL.mjDSBL_EQUALITY)
+def _forget_equalities(mujoco_model: mujoco.MjModel) -> None:
+    mujoco_model.opt.disableflags |= int(DSBL.mjDSBL_EQUALITY)
 
 
-def _forget_actuators(model: mujoco.MjModel) -> None:
+def _forget_actuators(mujoco_model: mujoco.MjModel) -> None:
     """Switch off the force of the actuators from ``_unbuilt_actuators``, by setting gain and bias to zero."""
-    for i in [i for _, i in _unbuilt_actuators(model)]:
-        model.actuator_gaintype[i], model.actuator_biastype[i] = GAIN.mjGAIN_FIXED, BIAS.mjBIAS_NONE
-        model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
-        model.actuator_damping[i] = model.actuator_armature[i] = 0.0
-        model.actuator_dampingpoly[i] = 0.0
+    for i in [i for _, i in _unbuilt_actuators(mujoco_model)]:
+        mujoco_model.actuator_gaintype[i], mujoco_model.actuator_biastype[i] = GAIN.mjGAIN_FIXED, BIAS.mjBIAS_NONE
+        mujoco_model.actuator_gainprm[i], mujoco_model.actuator_biasprm[i] = 0.0, 0.0
+        mujoco_model.actuator_damping[i] = mujoco_model.actuator_armature[i] = 0.0
+        mujoco_model.actuator_dampingpoly[i] = 0.0
 
 
-def _forget_bounds(model: mujoco.MjModel) -> None:
-    model.actuator_forcelimited[:] = model.jnt_actfrclimited[:] = model.tendon_actfrclimited[:] = 0
+def _forget_bounds(mujoco_model: mujoco.MjModel) -> None:
+    mujoco_model.actuator_forcelimited[:] = mujoco_model.jnt_actfrclimited[:] = mujoco_model.tendon_actfrclimited[:] = 0
 
 
-def _forget_tendons(model: mujoco.MjModel) -> None:
-    for t in [t for _, t in _spatial_tendons(model)]:
-        model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_armature[t] = 0.0
+def _forget_tendons(mujoco_model: mujoco.MjModel) -> None:
+    for t in [t for _, t in _spatial_tendons(mujoco_model)]:
+        mujoco_model.tendon_stiffness[t] = mujoco_model.tendon_damping[t] = mujoco_model.tendon_armature[t] = 0.0
 
 
-def _forget_turning_laws(model: mujoco.MjModel) -> None:
-    for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
-        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
-        model.dof_damping[first : first + 3] = model.jnt_stiffness[j] = 0.0
-        if model.jnt_type[j] == BALL_JOINT:
-            model.dof_armature[first : first + 3] = 0.0
+def _forget_turning_laws(mujoco_model: mujoco.MjModel) -> None:
+    for j in np.flatnonzero((mujoco_model.jnt_type == BALL_JOINT) | (mujoco_model.jnt_type == FREE_JOINT)):
+        first = int(mujoco_model.jnt_dofadr[j]) + (3 if mujoco_model.jnt_type[j] == FREE_JOINT else 0)
+        mujoco_model.dof_damping[first : first + 3] = mujoco_model.jnt_stiffness[j] = 0.0
+        if mujoco_model.jnt_type[j] == BALL_JOINT:
+            mujoco_model.dof_armature[first : first + 3] = 0.0
 
 
-def _forget_bent_laws(model: mujoco.MjModel) -> None:
+def _forget_bent_laws(mujoco_model: mujoco.MjModel) -> None:
     for numbers in ("jnt_stiffnesspoly", "dof_dampingpoly", "tendon_stiffnesspoly", "tendon_dampingpoly"):
-        getattr(model, numbers)[:] = 0.0
-    model.jnt_springyield[:] = model.tendon_springyield[:] = 0.0
+        getattr(mujoco_model, numbers)[:] = 0.0
+    mujoco_model.jnt_springyield[:] = mujoco_model.tendon_springyield[:] = 0.0
 
 
-def _forget_compensation(model: mujoco.MjModel) -> None:
-    for b in [b for _, b in _partly_compensated_bodies(model)]:
-        model.body_gravcomp[b] = 0.0
+def _forget_compensation(mujoco_model: mujoco.MjModel) -> None:
+    for b in [b for _, b in _partly_compensated_bodies(mujoco_model)]:
+        mujoco_model.body_gravcomp[b] = 0.0
 
 
-def _forget_medium(model: mujoco.MjModel) -> None:
-    model.opt.density = model.opt.viscosity = 0.0
+def _forget_medium(mujoco_model: mujoco.MjModel) -> None:
+    mujoco_model.opt.density = mujoco_model.opt.viscosity = 0.0
 
 
-def _keep_flexes(model: mujoco.MjModel) -> None:
+def _keep_flexes(mujoco_model: mujoco.MjModel) -> None:
     """Does nothing: a model with flexes has been refused before."""
 
 
@@ -341,7 +368,7 @@ CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], ObjectIterator], str, 
 that removes it."""
 
 
-def limits_switched_off(model: mujoco.MjModel) -> list[str]:
+def limits_switched_off(mujoco_model: mujoco.MjModel) -> list[str]:
     """Names of the joints and tendons whose limits were switched off."""
-    joints = [label(model, "joint", int(j)) for j in np.flatnonzero(model.jnt_limited)]
-    return joints + [label(model, "tendon", int(t)) for t in np.flatnonzero(model.tendon_limited)]
+    joints = [label(mujoco_model, "joint", int(j)) for j in np.flatnonzero(mujoco_model.jnt_limited)]
+    return joints + [label(mujoco_model, "tendon", int(t)) for t in np.flatnonzero(mujoco_model.tendon_limited)]

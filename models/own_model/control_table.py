@@ -40,55 +40,55 @@ class ControlTable:
     times: np.ndarray
     values: np.ndarray
 
-    def path_sections(self, twin: TwinModel, step_count: int, step: float) -> list[PathSection]:
-        """Sections of a path of ``step_count`` steps of ``step`` seconds, each with constant controls. Raises
+    def path_sections(self, user_model: TwinModel, step_count: int, time_step: float) -> list[PathSection]:
+        """Sections of a path of ``step_count`` steps of ``time_step`` seconds, each with constant controls. Raises
         InputError where a row's time lies between two steps."""
-        first = self.times / step
+        first = self.times / time_step
         off = np.flatnonzero(abs(first - np.round(first)) > STEP_TIME_TOLERANCE)
         if len(off):
-            time, allowed = float(self.times[off[0]]), f"times must be multiples of the step, {step:g} s"
+            time, allowed = float(self.times[off[0]]), f"times must be multiples of the step, {time_step:g} s"
             raise InputError(self.path, f"row {off[0] + 1}, column 'time'", time, allowed)
         ends = [*np.round(first).astype(int).tolist(), step_count]
         counts = [min(end, step_count) - start for start, end in pairwise(ends) if start < step_count]
         return [
-            PathSection(with_constant_controls(twin, row), count, row)
+            PathSection(with_constant_controls(user_model, row), count, row)
             for row, count in zip(self.values, counts, strict=False)
         ]
 
 
-def constant_sections(twin: TwinModel, step_count: int) -> list[PathSection]:
+def constant_sections(user_model: TwinModel, step_count: int) -> list[PathSection]:
     """Sections of a path that has the model's constant controls throughout: a single one."""
-    return [PathSection(twin, step_count, constant_controls(twin.model))]
+    return [PathSection(user_model, step_count, constant_controls(user_model.model))]
 
 
-def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
+def read_controls(csv_path: Path, mujoco_model: mujoco.MjModel) -> ControlTable:
     """Read a CSV file with columns ``time [s]`` and one per actuator, called by its name (``actuator 3`` if it has
     none).
 
     Raises InputError for what ``read_table`` refuses, a first time that is not 0, and a control out of its range.
     """
-    names = [model.actuator(i).name or f"actuator {i}" for i in range(model.nu)]
+    names = [mujoco_model.actuator(i).name or f"actuator {i}" for i in range(mujoco_model.nu)]
     if not names:
-        raise InputError("--controls", "", str(path), "the model has no actuators")
+        raise InputError("--controls", "", str(csv_path), "the model has no actuators")
     if len({"time", *names}) <= len(names):
-        raise InputError("--controls", "", str(path), "columns would share a name: rename the model's actuators")
-    table = read_table(path, {"time": SECONDS, **dict.fromkeys(names, CONTROL_UNITS)}, increasing="time")
+        raise InputError("--controls", "", str(csv_path), "columns would share a name: rename the model's actuators")
+    table = read_table(csv_path, {"time": SECONDS, **dict.fromkeys(names, CONTROL_UNITS)}, increasing_column="time")
     if table["time"][0] != 0.0:
-        raise InputError(path, "row 1, column 'time'", float(table["time"][0]), "the first row must be of time 0")
+        raise InputError(csv_path, "row 1, column 'time'", float(table["time"][0]), "the first row must be of time 0")
     for i, name in enumerate(names):
-        low, high = model.actuator_ctrlrange[i] if model.actuator_ctrllimited[i] else (-np.inf, np.inf)
+        low, high = mujoco_model.actuator_ctrlrange[i] if mujoco_model.actuator_ctrllimited[i] else (-np.inf, np.inf)
         beyond = np.flatnonzero((table[name] < low) | (table[name] > high))
         if len(beyond):
             place = f"row {beyond[0] + 1}, column {name!r}"
-            raise InputError(path, place, float(table[name][beyond[0]]), f"its range is from {low:g} to {high:g}")
-    return ControlTable(path, table["time"], np.column_stack([table[name] for name in names]))
+            raise InputError(csv_path, place, float(table[name][beyond[0]]), f"its range is from {low:g} to {high:g}")
+    return ControlTable(csv_path, table["time"], np.column_stack([table[name] for name in names]))
 
 
-def with_constant_controls(twin: TwinModel, controls: np.ndarray) -> TwinModel:
+def with_constant_controls(user_model: TwinModel, controls: np.ndarray) -> TwinModel:
     """Model whose actuators ignore their control and act as they do with the constant controls (nu,)."""
-    model = copy.copy(twin.model)
+    model = copy.copy(user_model.model)
     for i in range(model.nu):
-        model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(controls[i]))
+        model.actuator_biasprm[i, :3] = affine_law(user_model.model, i, float(controls[i]))
         model.actuator_gainprm[i, :3] = 0.0
         model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
-    return described_model(model, twin.name)
+    return described_model(model, user_model.name)

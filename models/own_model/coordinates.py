@@ -42,15 +42,19 @@ class QuaternionJoint:
 class Coordinates:
     """Coordinates of one model, in the order of MuJoCo's degrees of freedom, and their conversion to MuJoCo's state."""
 
-    def __init__(self, model: mujoco.MjModel, design: mujoco.MjData) -> None:
-        """design : data of the model in the design position, with kinematics computed."""
-        self.size = int(model.nv)
-        self._zero = np.array(model.qpos0)
+    def __init__(self, mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> None:
+        """design_data : data of the model in the design position, with kinematics computed."""
+        self.size = int(mujoco_model.nv)
+        self._zero = np.array(mujoco_model.qpos0)
         self._plain = list[tuple[int, int]]()
         self.turnings = list[QuaternionJoint]()
-        for j in range(model.njnt):
-            kind, place, first = int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
-            axes = design.xmat[model.jnt_bodyid[j]].reshape(3, 3).copy()
+        for j in range(mujoco_model.njnt):
+            kind, place, first = (
+                int(mujoco_model.jnt_type[j]),
+                int(mujoco_model.jnt_qposadr[j]),
+                int(mujoco_model.jnt_dofadr[j]),
+            )
+            axes = design_data.xmat[mujoco_model.jnt_bodyid[j]].reshape(3, 3).copy()
             if kind == FREE_JOINT:
                 self._plain += [(first + i, place + i) for i in range(3)]
                 self.turnings.append(QuaternionJoint(first + 3, place + 3, axes, True))
@@ -86,13 +90,13 @@ class Coordinates:
         return MujocoState(qpos, jacobian @ v, jacobian, rest)
 
 
-def joint_coordinate_slices(model: mujoco.MjModel) -> tuple[slice, ...]:
+def joint_coordinate_slices(mujoco_model: mujoco.MjModel) -> tuple[slice, ...]:
     """For every coordinate (n,), the slice of its joint's coordinates that together rotate or translate a body along
     three axes."""
     groups = list[slice]()
-    for j in range(model.njnt):
-        first = int(model.jnt_dofadr[j])
-        starts = {FREE_JOINT: (first, first + 3), BALL_JOINT: (first,)}.get(int(model.jnt_type[j]), ())
+    for j in range(mujoco_model.njnt):
+        first = int(mujoco_model.jnt_dofadr[j])
+        starts = {FREE_JOINT: (first, first + 3), BALL_JOINT: (first,)}.get(int(mujoco_model.jnt_type[j]), ())
         groups += [slice(start, start + 3) for start in starts for _ in range(3)] or [slice(first, first + 1)]
     return tuple(groups)
 

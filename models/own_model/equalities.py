@@ -13,88 +13,96 @@ from models.own_model.names import feature_is_disabled, label, mass_body_name, m
 CONNECT_EQUALITY, WELD_EQUALITY = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 
 
-def couples_joints(model: mujoco.MjModel, equality: int) -> bool:
+def couples_joints(mujoco_model: mujoco.MjModel, equality: int) -> bool:
     """Whether an equality constraint couples a hinge or slide linearly to another joint, or fixes it."""
-    if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
+    if mujoco_model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or mujoco_model.eq_data[equality, 2:5].any():
         return False
-    joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
-    return not any(model.jnt_type[j] in (BALL_JOINT, FREE_JOINT) for j in joints)
+    joints = [j for j in (mujoco_model.eq_obj1id[equality], mujoco_model.eq_obj2id[equality]) if j >= 0]
+    return not any(mujoco_model.jnt_type[j] in (BALL_JOINT, FREE_JOINT) for j in joints)
 
 
-def joint_couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
+def joint_couplings(mujoco_model: mujoco.MjModel) -> Iterator[Coupling]:
     """Couplings of the description from the active equality constraints of one or two joints."""
-    if feature_is_disabled(model, "EQUALITY"):
+    if feature_is_disabled(mujoco_model, "EQUALITY"):
         return
-    for e in (e for e in range(model.neq) if model.eq_active0[e] and couples_joints(model, e)):
-        first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-        driver = int(model.jnt_dofadr[second]) if second >= 0 else None
-        offset, ratio = model.eq_data[e, :2].tolist()
-        softness = stiffness_and_damping(model, model.eq_solref[e], model.eq_solimp[e])
-        yield Coupling(label(model, "equality", e), int(model.jnt_dofadr[first]), driver, ratio, offset, *softness)
+    for e in (e for e in range(mujoco_model.neq) if mujoco_model.eq_active0[e] and couples_joints(mujoco_model, e)):
+        first, second = int(mujoco_model.eq_obj1id[e]), int(mujoco_model.eq_obj2id[e])
+        driver = int(mujoco_model.jnt_dofadr[second]) if second >= 0 else None
+        offset, ratio = mujoco_model.eq_data[e, :2].tolist()
+        softness = stiffness_and_damping(mujoco_model, mujoco_model.eq_solref[e], mujoco_model.eq_solimp[e])
+        yield Coupling(
+            label(mujoco_model, "equality", e), int(mujoco_model.jnt_dofadr[first]), driver, ratio, offset, *softness
+        )
 
 
 def stiffness_and_damping(
-    model: mujoco.MjModel, solref: np.ndarray, solimp: np.ndarray
+    mujoco_model: mujoco.MjModel, solref: np.ndarray, solimp: np.ndarray
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """MuJoCo's solref (2,) of a constraint, converted to stiffness and damping so that it does not depend on the step,
     and its solimp (5,)."""
     time, ratio = solref.tolist()
     if time > 0.0 and ratio > 0.0:
-        time = time if feature_is_disabled(model, "REFSAFE") else max(time, 2.0 * float(model.opt.timestep))
+        time = (
+            time if feature_is_disabled(mujoco_model, "REFSAFE") else max(time, 2.0 * float(mujoco_model.opt.timestep))
+        )
         time, ratio = -1.0 / (time * ratio) ** 2, -2.0 / time
     return (time, ratio), tuple(solimp.tolist())
 
 
-def joins_bodies(model: mujoco.MjModel, equality: int) -> bool:
+def joins_bodies(mujoco_model: mujoco.MjModel, equality: int) -> bool:
     """Whether an equality constraint connects points of two bodies, or fixes the bodies to each other."""
-    return int(model.eq_type[equality]) in (CONNECT_EQUALITY, WELD_EQUALITY)
+    return int(mujoco_model.eq_type[equality]) in (CONNECT_EQUALITY, WELD_EQUALITY)
 
 
-def is_between_sites(model: mujoco.MjModel, equality: int) -> bool:
+def is_between_sites(mujoco_model: mujoco.MjModel, equality: int) -> bool:
     """Whether an equality constraint is defined by two sites instead of bodies."""
-    return bool(model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE)
+    return bool(mujoco_model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE)
 
 
-def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
+def connections(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> Iterator[Connection]:
     """Connections of the description from the active equality constraints between points, or between points and axes,
     of two bodies."""
-    if feature_is_disabled(model, "EQUALITY"):
+    if feature_is_disabled(mujoco_model, "EQUALITY"):
         return
-    numbers = moving_bodies(model)
-    for e in (e for e in range(model.neq) if model.eq_active0[e] and joins_bodies(model, e)):
-        things = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-        bodies = [int(model.site_bodyid[thing]) if is_between_sites(model, e) else thing for thing in things]
+    numbers = moving_bodies(mujoco_model)
+    for e in (e for e in range(mujoco_model.neq) if mujoco_model.eq_active0[e] and joins_bodies(mujoco_model, e)):
+        things = int(mujoco_model.eq_obj1id[e]), int(mujoco_model.eq_obj2id[e])
+        bodies = [
+            int(mujoco_model.site_bodyid[thing]) if is_between_sites(mujoco_model, e) else thing for thing in things
+        ]
         first, second = (mass_body_name(b) if b in numbers else None for b in bodies)
         if first == second:
             continue
-        (start, turned), (end, other) = _frames_of_ends(model, design, e)
-        turns = model.eq_type[e] == WELD_EQUALITY and model.eq_data[e, 10]
+        (start, turned), (end, other) = _frames_of_ends(mujoco_model, design_data, e)
+        turns = mujoco_model.eq_type[e] == WELD_EQUALITY and mujoco_model.eq_data[e, 10]
         axes = (turned, other) if turns else None
-        softness = stiffness_and_damping(model, model.eq_solref[e], model.eq_solimp[e])
+        softness = stiffness_and_damping(mujoco_model, mujoco_model.eq_solref[e], mujoco_model.eq_solimp[e])
         ends = (first, vector_of(start)), (second, vector_of(end))
-        yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
+        yield Connection(label(mujoco_model, "equality", e), ends, axes, *softness, float(mujoco_model.eq_data[e, 10]))
 
 
-def _frames_of_ends(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def _frames_of_ends(
+    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, equality: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Points (3,) in m and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
     constraint is satisfied.
 
     A weld between bodies gives its point on the second body first.
     """
-    things, data = (model.eq_obj1id[equality], model.eq_obj2id[equality]), model.eq_data[equality]
-    if is_between_sites(model, equality):
-        return [(design.site_xpos[s].copy(), design.site_xmat[s].reshape(3, 3).copy()) for s in things]
+    things, data = (mujoco_model.eq_obj1id[equality], mujoco_model.eq_obj2id[equality]), mujoco_model.eq_data[equality]
+    if is_between_sites(mujoco_model, equality):
+        return [(design_data.site_xpos[s].copy(), design_data.site_xmat[s].reshape(3, 3).copy()) for s in things]
     points, axes = [data[:3], data[3:6]], [np.eye(3), np.eye(3)]
-    if model.eq_type[equality] == WELD_EQUALITY:
+    if mujoco_model.eq_type[equality] == WELD_EQUALITY:
         points, axes = points[::-1], [rotation_matrix(data[6:10]), np.eye(3)]
-    turns = [design.xmat[b].reshape(3, 3) for b in things]
-    places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
+    turns = [design_data.xmat[b].reshape(3, 3) for b in things]
+    places = [design_data.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
     return [(place, turn @ axis) for place, turn, axis in zip(places, turns, axes, strict=True)]
 
 
-def coupling_rows(couplings: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
+def coupling_rows(couplings: Sequence[Coupling], coordinate_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Linear equations rows q = offsets that couplings impose on n coordinates q: rows (c, n) and offsets (c,)."""
-    rows = np.zeros((len(couplings), size))
+    rows = np.zeros((len(couplings), coordinate_count))
     for row, coupling in zip(rows, couplings, strict=True):
         row[coupling.driven] = 1.0
         if coupling.driver is not None:

@@ -68,11 +68,11 @@ class Difference:
         """Identification of the property that differs: its kind and owner."""
         return self.kind, self.owner
 
-    def sentence(self, files: Sequence[str]) -> str:
+    def sentence(self, file_names: Sequence[str]) -> str:
         """Text such as "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
         values = [np.zeros(0) if value is None else value for value in (self.first, self.second)]
         first, second = distinct_texts(values[0], values[1], self.unit)
-        return f"{self.said or self.kind} of {self.owner}: {first} in {files[0]}, {second} in {files[1]}"
+        return f"{self.said or self.kind} of {self.owner}: {first} in {file_names[0]}, {second} in {file_names[1]}"
 
 
 @dataclass(frozen=True)
@@ -120,26 +120,29 @@ class Comparison:
         )
 
 
-def compare(first: TwinModel, second: TwinModel, count: int = STATE_COUNT) -> Comparison:
+def compare(first_model: TwinModel, second_model: TwinModel, state_count: int = STATE_COUNT) -> Comparison:
     """Comparison of two model files, at random states within the ranges of the first file."""
-    unmatched = _unmatched_coordinates(first, second)
+    unmatched = _unmatched_coordinates(first_model, second_model)
     if unmatched:
-        return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
-    order = [second.names.index(name) for name in first.names]
-    states = comparison_states(first, count)
+        return Comparison(None, tuple(_differences(first_model, second_model, None)), np.inf, tuple(unmatched))
+    order = [second_model.names.index(name) for name in first_model.names]
+    states = comparison_states(first_model, state_count)
     places = _reordered_states(states, order)
-    here, there = reference_of_file(first, states, PLAIN_BUILD), reference_of_file(second, places, PLAIN_BUILD)
+    here, there = (
+        reference_of_file(first_model, states, PLAIN_BUILD),
+        reference_of_file(second_model, places, PLAIN_BUILD),
+    )
     apart = agreement_of_build(
         "the second file", _with_larger_sensitivity(here, there, order), _reordered_motion(there.motions, order)
     )
     trial = _PropertyTrial(
-        first, states, replace(here, motions=motion_at(equations_of_build(first, PLAIN_BUILD), states))
+        first_model, states, replace(here, motions=motion_at(equations_of_build(first_model, PLAIN_BUILD), states))
     )
     back = _PropertyTrial(
-        second, places, replace(there, motions=motion_at(equations_of_build(second, PLAIN_BUILD), places))
+        second_model, places, replace(there, motions=motion_at(equations_of_build(second_model, PLAIN_BUILD), places))
     )
-    differences = sorted(_differences(first, second, (trial, back)), key=_importance_key)
-    model, taken = trial.with_all(elements_of_model(second.model), differences)
+    differences = sorted(_differences(first_model, second_model, (trial, back)), key=_importance_key)
+    model, taken = trial.with_all(elements_of_model(second_model.model), differences)
     changed = trial.motions(model)
     alone = [each.key for each in differences if each.first is None and each.key not in taken]
     remaining = back.motions(back.without(alone))
@@ -162,66 +165,77 @@ class _PropertyTrial:
     states: States
     base: Reference
 
-    def influence(self, model: mujoco.MjModel) -> float | None:
+    def influence(self, mujoco_model: mujoco.MjModel) -> float | None:
         """Largest relative change that a changed model causes in accelerations, or in the mass matrix if these do not
         change; None if it cannot be built."""
         try:
-            change = agreement_of_build("", self.base, self.motions(model))
+            change = agreement_of_build("", self.base, self.motions(mujoco_model))
             return change.acceleration if change.acceleration > NO_EFFECT_SHARE else change.mass
         except RunFailed:
             return None
 
     def with_all(
-        self, values: dict[Key, Element], differences: Sequence[Difference]
+        self, other_elements: dict[Key, Element], differences: Sequence[Difference]
     ) -> tuple[mujoco.MjModel, list[Key]]:
         """The model with all differing properties changed to the other file's values where possible, and the properties
         that were changed."""
         model, taken = copy(self.twin.model), list[Key]()
         for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
-            value = values[each.key].value if each.key in values else np.zeros_like(each.first)
+            value = other_elements[each.key].value if each.key in other_elements else np.zeros_like(each.first)
             with suppress(ValueError, KeyError):
                 set_value(model, each.key, value)
                 taken.append(each.key)
         return model, taken
 
-    def with_one(self, key: Key, value: np.ndarray) -> mujoco.MjModel:
+    def with_one(self, property_key: Key, new_value: np.ndarray) -> mujoco.MjModel:
         """The model with one property set to another value."""
         model = copy(self.twin.model)
-        set_value(model, key, value)
+        set_value(model, property_key, new_value)
         return model
 
-    def without(self, keys: Sequence[Key]) -> mujoco.MjModel:
+    def without(self, property_keys: Sequence[Key]) -> mujoco.MjModel:
         """The model with the given properties removed, where they can be."""
         model = copy(self.twin.model)
-        for key in keys:
+        for key in property_keys:
             remove(model, key)
         return model
 
-    def motions(self, model: mujoco.MjModel) -> list[Motion]:
+    def motions(self, mujoco_model: mujoco.MjModel) -> list[Motion]:
         """Motion of a changed model at the states of the trial."""
-        return motion_at(equations_of_build(described_model(model, self.twin.name), PLAIN_BUILD), self.states)
+        return motion_at(equations_of_build(described_model(mujoco_model, self.twin.name), PLAIN_BUILD), self.states)
 
 
-def _reordered_states(states: States, order: list[int]) -> States:
+def _reordered_states(states: States, coordinate_order: list[int]) -> States:
     """States of the first file, reordered to the coordinates of the second."""
-    places = np.argsort(order)
+    places = np.argsort(coordinate_order)
     return [(q[places], v[places]) for q, v in states]
 
 
-def _reordered_motion(moved: Sequence[Motion], order: list[int]) -> list[Motion]:
+def _reordered_motion(second_motions: Sequence[Motion], coordinate_order: list[int]) -> list[Motion]:
     """Motion of the second file, reordered to the coordinates of the first."""
-    return [Motion(each.mass[np.ix_(order, order)], each.force[order], each.acceleration[order]) for each in moved]
+    return [
+        Motion(
+            each.mass[np.ix_(coordinate_order, coordinate_order)],
+            each.force[coordinate_order],
+            each.acceleration[coordinate_order],
+        )
+        for each in second_motions
+    ]
 
 
-def _with_larger_sensitivity(first_reference: Reference, second_reference: Reference, order: list[int]) -> Reference:
+def _with_larger_sensitivity(
+    first_reference: Reference, second_reference: Reference, coordinate_order: list[int]
+) -> Reference:
     """The first file's reference, with the larger rounding sensitivity of the two files."""
-    pairs = zip(first_reference.sensitivities, _reordered_motion(second_reference.sensitivities, order), strict=True)
+    pairs = zip(
+        first_reference.sensitivities, _reordered_motion(second_reference.sensitivities, coordinate_order), strict=True
+    )
     return replace(first_reference, sensitivities=[Motion(*map(np.maximum, first, second)) for first, second in pairs])
 
 
-def _unmatched_coordinates(first: TwinModel, second: TwinModel) -> list[str]:
+def _unmatched_coordinates(first_model: TwinModel, second_model: TwinModel) -> list[str]:
     """Sentences on the coordinates of each file that do not exist in the other."""
-    names = [(twin.name, twin.names) for twin in (first, second)]
+    names = [(twin.name, twin.names) for twin in (first_model, second_model)]
     rows = list[str]()
     for (file, listed), (_, others) in (names, names[::-1]):
         rows += [f"{name} of {file} has no partner" for name in listed if name not in others]
@@ -229,12 +243,16 @@ def _unmatched_coordinates(first: TwinModel, second: TwinModel) -> list[str]:
 
 
 def _differences(
-    first: TwinModel, second: TwinModel, trials: tuple[_PropertyTrial, _PropertyTrial] | None
+    first_model: TwinModel, second_model: TwinModel, property_trials: tuple[_PropertyTrial, _PropertyTrial] | None
 ) -> list[Difference]:
-    """Properties that differ between the files; trials : one for the first and one for the second file, None if they
-    have no common states."""
-    rows, listed, others = list[Difference](), elements_of_model(first.model), elements_of_model(second.model)
-    rubbing = first.driven.frictions or second.driven.frictions
+    """Properties that differ between the files; property_trials : one for the first and one for the second file, None
+    if they have no common states."""
+    rows, listed, others = (
+        list[Difference](),
+        elements_of_model(first_model.model),
+        elements_of_model(second_model.model),
+    )
+    rubbing = first_model.driven.frictions or second_model.driven.frictions
     for key in dict.fromkeys((*listed, *others)):
         element, other = listed.get(key), others.get(key)
         if element is not None and other is not None and element.has_same_value(other):
@@ -242,7 +260,9 @@ def _differences(
         there = element if element is not None else other
         if there is None or _is_insignificant(there, element, other):
             continue
-        influence = _influence_of_difference(trials, key, element, other) if trials is not None else None
+        influence = (
+            _influence_of_difference(property_trials, key, element, other) if property_trials is not None else None
+        )
         first_value, second_value = (None if each is None else each.value for each in (element, other))
         kind = "orientation of the inertia" if _differ_in_orientation_alone(key[0], element, other) else key[0]
         off = key[0] in UNCOMPARED_KINDS or (key[0] == "friction loss" and not rubbing)
@@ -251,26 +271,28 @@ def _differences(
 
 
 def _influence_of_difference(
-    trials: tuple[_PropertyTrial, _PropertyTrial],
-    key: Key,
+    property_trials: tuple[_PropertyTrial, _PropertyTrial],
+    property_key: Key,
     first_element: Element | None,
     second_element: Element | None,
 ) -> float | None:
     """Influence of one difference: the first file takes over the other's value, or the second file loses a property
     that only it has. None if the first file cannot have that value."""
-    first, second = trials
+    first, second = property_trials
     if first_element is None:
-        return second.influence(second.without([key]))
+        return second.influence(second.without([property_key]))
     value = np.zeros_like(first_element.value) if second_element is None else second_element.value
     try:
-        return first.influence(first.with_one(key, value))
+        return first.influence(first.with_one(property_key, value))
     except ValueError:
         return None
 
 
-def _differ_in_orientation_alone(kind: str, first_element: Element | None, second_element: Element | None) -> bool:
+def _differ_in_orientation_alone(
+    property_kind: str, first_element: Element | None, second_element: Element | None
+) -> bool:
     """Whether two inertias have the same principal moments and differ only in orientation."""
-    if kind != "inertia" or first_element is None or second_element is None:
+    if property_kind != "inertia" or first_element is None or second_element is None:
         return False
     first, second = (np.linalg.eigvalsh(tensor_of(each.value)) for each in (first_element, second_element))
     return bool(np.abs(first - second).max() <= 1e-9 * first.max())
@@ -283,20 +305,24 @@ def _is_insignificant(present_element: Element, first_element: Element | None, s
     )
 
 
-def removals_that_agree(twin: TwinModel, build: str, count: int = STATE_COUNT) -> list[tuple[Element, float]]:
+def removals_that_agree(
+    user_model: TwinModel, build_name: str, state_count: int = STATE_COUNT
+) -> list[tuple[Element, float]]:
     """Properties whose removal makes a build agree with the file's model in MuJoCo; each is removed from both.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """
-    states = comparison_states(twin, count)
+    states = comparison_states(user_model, state_count)
     rows = list[tuple[Element, float]]()
-    for key, element in elements_of_model(twin.model).items():
-        model = copy(twin.model)
+    for key, element in elements_of_model(user_model.model).items():
+        model = copy(user_model.model)
         if not element.is_nonzero or not remove(model, key):
             continue
-        less = described_model(model, twin.name)
+        less = described_model(model, user_model.name)
         seen = agreement_of_build(
-            build, reference_of_file(less, states, build), motion_at(equations_of_build(less, build), states)
+            build_name,
+            reference_of_file(less, states, build_name),
+            motion_at(equations_of_build(less, build_name), states),
         )
         if seen.alike:
             rows.append((element, seen.acceleration))

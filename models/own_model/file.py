@@ -60,93 +60,96 @@ class ModelFile:
     notes: tuple[str, ...]
 
 
-def read(path: Path, without: Collection[str] = (), folder: Path | None = None) -> ModelFile:
+def read(model_path: Path, left_out_kinds: Collection[str] = (), allowed_folder: Path | None = None) -> ModelFile:
     """Read the model file at a path. Raises InputError for what cannot be read, or has no equivalent and is not named
-    in ``without``.
+    in ``left_out_kinds``.
 
-    folder : in which all files must lie that the model names; the file's own if None.
+    allowed_folder : in which all files must lie that the model names; the file's own if None.
     """
-    document = checked_document(path, folder)
+    document = checked_document(model_path, allowed_folder)
     model, notes = compiled_model(document)
-    check_sane(model, path.name, document.kind)
-    left_out = check_and_leave_out(model, document, without)
-    twin = described_model(model, path.stem)
+    check_sane(model, model_path.name, document.kind)
+    left_out = check_and_leave_out(model, document, left_out_kinds)
+    twin = described_model(model, model_path.stem)
     return ModelFile(document, twin, tuple(left_out), tuple(limits_switched_off(model)), tuple(notes))
 
 
-def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
+def compiled_model(model_xml: Document) -> tuple[mujoco.MjModel, list[str]]:
     """The document compiled by MuJoCo's parser, and notes. Raises InputError with the parser's message, the line of
     what it names, and what may help."""
-    path, urdf = document.path, document.urdf
+    path, urdf = model_xml.path, model_xml.urdf
     try:
         with without_warnings():
             if urdf is None:
                 return mujoco.MjModel.from_xml_path(str(path)), []
-            if not any(element.tag == "mesh" for element in document.elements):
+            if not any(element.tag == "mesh" for element in model_xml.elements):
                 return mujoco.MjModel.from_xml_string(urdf.text), list(urdf.notes)
             spec = mujoco.MjSpec.from_string(urdf.text)
             spec.modelfiledir = str(path.resolve().parent)  # a string alone has its meshes in the current folder
             return spec.compile(), list(urdf.notes)
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         reason = " ".join(str(error).split()).removesuffix(FUSED_REMARK).rstrip()
-        told = f"MuJoCo's parser refuses it: {reason}{_place_text(document, reason)}{_remedy_text(document, reason)}"
+        told = f"MuJoCo's parser refuses it: {reason}{_place_text(model_xml, reason)}{_remedy_text(model_xml, reason)}"
         raise InputError(path.name, "", None, told) from None
 
 
-def _place_text(document: Document, reason: str) -> str:
+def _place_text(model_xml: Document, parser_message: str) -> str:
     """Text " (FILE:LINE)" of the element that a message of MuJoCo's parser names without its line, or with line 0 for
     an include; "" if unknown."""
-    if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", reason):
-        place = document.line(("link", "joint", "body", "geom", "mesh"), named[1])
+    if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", parser_message):
+        place = model_xml.line(("link", "joint", "body", "geom", "mesh"), named[1])
     else:
-        attribute, tag = re.search(r"attribute: '([^']+)'", reason), re.search(r"Element '([^']+)', line 0", reason)
-        place = document.line_of_attribute(tag[1], attribute[1]) if tag and attribute else ""
+        attribute, tag = (
+            re.search(r"attribute: '([^']+)'", parser_message),
+            re.search(r"Element '([^']+)', line 0", parser_message),
+        )
+        place = model_xml.line_of_attribute(tag[1], attribute[1]) if tag and attribute else ""
     return f" ({place})" if place else ""
 
 
-def _remedy_text(document: Document, reason: str) -> str:
+def _remedy_text(model_xml: Document, parser_message: str) -> str:
     """Text on how to correct a mistake that a message of MuJoCo's parser reports; "" where that is plain."""
-    said = next((remedy for part, remedy in REMEDIES.items() if part in reason), "")
-    return f". {said.format(place=COMPILER_PLACES[document.kind])}" if said else ""
+    said = next((remedy for part, remedy in REMEDIES.items() if part in parser_message), "")
+    return f". {said.format(place=COMPILER_PLACES[model_xml.kind])}" if said else ""
 
 
-def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:
+def check_sane(mujoco_model: mujoco.MjModel, file_name: str, file_kind: str = "MJCF") -> None:
     """Raise InputError if nothing can move, if a number that affects motion is not finite, if the time step is not
     above 0, or if dry friction is negative."""
-    if not model.nv:
+    if not mujoco_model.nv:
         stands = "; its first link stands on the world: a joint of type floating, from a link before it, sets it free"
-        allowed = f"nothing in it can move: it has no joint{stands if kind == 'URDF' else ''}"
-        raise InputError(name, "", None, allowed)
+        allowed = f"nothing in it can move: it has no joint{stands if file_kind == 'URDF' else ''}"
+        raise InputError(file_name, "", None, allowed)
     for numbers in NUMBERS_OF_MOTION:
-        _check_numbers(model, name, numbers)
-    if not np.isfinite(model.opt.gravity).all():
-        raise InputError(name, "option gravity", None, "must be finite numbers")
-    if not (np.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):
-        raise InputError(name, "option timestep", model.opt.timestep, "must be a finite number above 0")
-    if (model.dof_frictionloss < 0.0).any():
-        raise InputError(name, "frictionloss", float(model.dof_frictionloss.min()), "must be 0 or more")
+        _check_numbers(mujoco_model, file_name, numbers)
+    if not np.isfinite(mujoco_model.opt.gravity).all():
+        raise InputError(file_name, "option gravity", None, "must be finite numbers")
+    if not (np.isfinite(mujoco_model.opt.timestep) and mujoco_model.opt.timestep > 0.0):
+        raise InputError(file_name, "option timestep", mujoco_model.opt.timestep, "must be a finite number above 0")
+    if (mujoco_model.dof_frictionloss < 0.0).any():
+        raise InputError(file_name, "frictionloss", float(mujoco_model.dof_frictionloss.min()), "must be 0 or more")
 
 
-def _check_numbers(model: mujoco.MjModel, name: str, array_name: str) -> None:
+def _check_numbers(mujoco_model: mujoco.MjModel, file_name: str, array_name: str) -> None:
     """Raise InputError, naming the part of the model, if one of its numbers is not finite or too large."""
-    values = np.asarray(getattr(model, array_name))
+    values = np.asarray(getattr(mujoco_model, array_name))
     rows = np.array([np.abs(each).max(initial=0.0) for each in values])
     for row in np.flatnonzero(~(rows <= LARGEST_NUMBER)):
-        place = ": ".join(filter(None, (_owner_name(model, array_name, int(row)), array_name)))
+        place = ": ".join(filter(None, (_owner_name(mujoco_model, array_name, int(row)), array_name)))
         if not np.isfinite(rows[row]):
-            raise InputError(name, place, None, "must be finite numbers")
-        raise InputError(name, place, float(rows[row]), f"must be {LARGEST_NUMBER:g} or less")
+            raise InputError(file_name, place, None, "must be finite numbers")
+        raise InputError(file_name, place, float(rows[row]), f"must be {LARGEST_NUMBER:g} or less")
 
 
 OWNERS = {"jnt": "joint", "eq": "equality", "body": "body", "site": "site", "tendon": "tendon", "actuator": "actuator"}
 """Kinds of parts of a model by the prefix of the names of their numbers."""
 
 
-def _owner_name(model: mujoco.MjModel, array_name: str, row: int) -> str:
+def _owner_name(mujoco_model: mujoco.MjModel, array_name: str, row_index: int) -> str:
     """Name of the part of the model to which a row of the numbers belongs; "" where it belongs to none."""
     prefix = array_name.partition("_")[0]
     if prefix == "dof":
-        return label(model, "joint", int(model.dof_jntid[row]))
+        return label(mujoco_model, "joint", int(mujoco_model.dof_jntid[row_index]))
     if prefix.startswith("qpos"):
-        return label(model, "joint", int(np.searchsorted(model.jnt_qposadr, row, side="right")) - 1)
-    return label(model, OWNERS[prefix], row) if prefix in OWNERS else ""
+        return label(mujoco_model, "joint", int(np.searchsorted(mujoco_model.jnt_qposadr, row_index, side="right")) - 1)
+    return label(mujoco_model, OWNERS[prefix], row_index) if prefix in OWNERS else ""

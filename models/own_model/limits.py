@@ -21,15 +21,15 @@ LIMIT_CONSTRAINTS = {
 """MuJoCo's constraint types that are limits, with the kind of object that they limit."""
 
 
-def limits_struck(twin: TwinModel) -> Callable[[np.ndarray], tuple[str, ...]]:
+def limits_struck(user_model: TwinModel) -> Callable[[np.ndarray], tuple[str, ...]]:
     """Returns a function of coordinates (n,) that returns the names of the joints and tendons whose limits act there in
     MuJoCo's model of the file."""
-    model = copy(twin.model)
+    model = copy(user_model.model)
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
-    data, still = mujoco.MjData(model), np.zeros(twin.size)
+    data, still = mujoco.MjData(model), np.zeros(user_model.size)
 
     def struck(q: np.ndarray) -> tuple[str, ...]:
-        data.qpos[:] = twin.coordinates.to_mujoco(q, still).qpos
+        data.qpos[:] = user_model.coordinates.to_mujoco(q, still).qpos
         mujoco.mj_fwdPosition(model, data)
         rows = zip(data.efc_type.tolist(), data.efc_id.tolist(), strict=True)
         return tuple(

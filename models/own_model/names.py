@@ -17,60 +17,62 @@ NAMES_SHOWN = 3
 CONSTRAINT_FEATURES = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
-def first_names_text(names: Sequence[str]) -> str:
+def first_names_text(object_names: Sequence[str]) -> str:
     """Text with the first names, and how many more there are."""
-    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-    return ", ".join(names[:NAMES_SHOWN]) + more
+    more = f" and {len(object_names) - NAMES_SHOWN} more" if len(object_names) > NAMES_SHOWN else ""
+    return ", ".join(object_names[:NAMES_SHOWN]) + more
 
 
-def label(model: mujoco.MjModel, kind: str, number: int) -> str:
+def label(mujoco_model: mujoco.MjModel, object_kind: str, object_index: int) -> str:
     """Text that names a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
-    name = name_of(model, kind, number)
-    return f"{kind} {name!r}" if name else f"{kind} {number}"
+    name = name_of(mujoco_model, object_kind, object_index)
+    return f"{object_kind} {name!r}" if name else f"{object_kind} {object_index}"
 
 
-def name_of(model: mujoco.MjModel, kind: str, number: int) -> str:
+def name_of(mujoco_model: mujoco.MjModel, object_kind: str, object_index: int) -> str:
     """Name of an object in the file; "" if there is none."""
-    return mujoco.mj_id2name(model, int(getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")), number) or ""
+    return (
+        mujoco.mj_id2name(mujoco_model, int(getattr(mujoco.mjtObj, f"mjOBJ_{object_kind.upper()}")), object_index) or ""
+    )
 
 
-def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
+def coordinate_names(mujoco_model: mujoco.MjModel) -> tuple[str, ...]:
     """Name of every coordinate: its joint and, where the joint has several freedoms, which freedom."""
     names = list[str]()
-    for j in range(model.njnt):
-        of = FREEDOMS_OF_JOINT.get(int(model.jnt_type[j]), ())
-        names += [f"{label(model, 'joint', j)} {freedom}" for freedom in of] or [label(model, "joint", j)]
+    for j in range(mujoco_model.njnt):
+        of = FREEDOMS_OF_JOINT.get(int(mujoco_model.jnt_type[j]), ())
+        names += [f"{label(mujoco_model, 'joint', j)} {freedom}" for freedom in of] or [label(mujoco_model, "joint", j)]
     return tuple(names)
 
 
-def coordinate_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
+def coordinate_of(mujoco_model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
     """Coordinate of a hinge or slide in the description: body and freedom."""
-    return joint_body_name(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
+    return joint_body_name(joint), "x" if mujoco_model.jnt_type[joint] == SLIDE_JOINT else "rx"
 
 
-def moving_bodies(model: mujoco.MjModel) -> dict[int, None]:
+def moving_bodies(mujoco_model: mujoco.MjModel) -> dict[int, None]:
     """Indices, in order, of the bodies that move: they or a body before them in the tree have a joint."""
     numbers = dict[int, None]()
-    for b in range(1, model.nbody):
-        if model.body_jntnum[b] or int(model.body_parentid[b]) in numbers:
+    for b in range(1, mujoco_model.nbody):
+        if mujoco_model.body_jntnum[b] or int(mujoco_model.body_parentid[b]) in numbers:
             numbers[b] = None
     return numbers
 
 
-def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
+def joints_above(mujoco_model: mujoco.MjModel, body: int) -> list[int]:
     """Numbers of all joints that move a body, from the body to the world."""
     joints = list[int]()
     while body:
-        first = int(model.body_jntadr[body])
-        joints += range(first, first + int(model.body_jntnum[body]))
-        body = int(model.body_parentid[body])
+        first = int(mujoco_model.body_jntadr[body])
+        joints += range(first, first + int(mujoco_model.body_jntnum[body]))
+        body = int(mujoco_model.body_parentid[body])
     return joints
 
 
-def feature_is_disabled(model: mujoco.MjModel, feature: str) -> bool:
+def feature_is_disabled(mujoco_model: mujoco.MjModel, feature: str) -> bool:
     """Whether a file switches off a feature, such as "GRAVITY", or all constraints at once."""
     kinds = (feature, "CONSTRAINT") if feature in CONSTRAINT_FEATURES else (feature,)
-    return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
+    return any(mujoco_model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
 
 
 def joint_body_name(joint: int) -> str:
@@ -84,9 +86,9 @@ def mass_body_name(body: int) -> str:
     return f"body {body}"
 
 
-def vector_of(numbers: np.ndarray) -> Vector:
+def vector_of(components: np.ndarray) -> Vector:
     """Three numbers as a tuple, the form of vectors in descriptions."""
-    x, y, z = np.asarray(numbers, float).tolist()
+    x, y, z = np.asarray(components, float).tolist()
     return x, y, z
 
 

@@ -50,46 +50,46 @@ EquationsOfModel = Callable[[TwinModel], Equations]
 
 
 def sensitivities(
-    twin: TwinModel, equations_of: EquationsOfModel, states: Sequence[State], motions: Sequence[Motion]
+    user_model: TwinModel, equations_of: EquationsOfModel, states: Sequence[State], motions: Sequence[Motion]
 ) -> list[Motion]:
     """Rounding sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative
     random change of all input numbers.
 
     equations_of, motions : the equations of MuJoCo's model of the file, and its motion at the states.
     """
-    draw, reach = np.random.default_rng(SEED), reach_of(twin)
+    draw, reach = np.random.default_rng(SEED), reach_of(user_model)
     squares = [Motion(*map(np.zeros_like, each)) for each in motions]
     for _ in range(RANDOM_CHANGES):
-        move = equations_of(replace(twin, model=changed_model(twin.model, draw, reach)))
+        move = equations_of(replace(user_model, model=changed_model(user_model.model, draw, reach)))
         for square, exact, (q, v) in zip(squares, motions, states, strict=True):
-            other = move(*_changed_state(twin, draw, q, v))
+            other = move(*_changed_state(user_model, draw, q, v))
             for total, there, here in zip(square, other, exact, strict=True):
                 total += ((there - here) / CHANGED_SHARE) ** 2 / RANDOM_CHANGES
     by_numbers = [
         _with_solver_rounding(_with_summation_rounding(Motion(*map(np.sqrt, square)), exact, sums), exact)
-        for square, exact, sums in zip(squares, motions, _sums_of_rates(twin, states), strict=True)
+        for square, exact, sums in zip(squares, motions, _sums_of_rates(user_model, states), strict=True)
     ]
     return (
         by_numbers
-        if not twin.driven.tied
-        else list(map(_with_constraint_rounding, by_numbers, _unconstrained_motion(twin, states)))
+        if not user_model.driven.tied
+        else list(map(_with_constraint_rounding, by_numbers, _unconstrained_motion(user_model, states)))
     )
 
 
-def _with_summation_rounding(sensitivity: Motion, motion: Motion, sums: np.ndarray) -> Motion:
-    """Rounding sensitivities, with the rounding of summing forces of the sizes (n,) ``sums`` added; these forces may
-    cancel."""
-    by_sums = np.abs(np.linalg.pinv(motion.mass)) @ sums
-    return sensitivity._replace(force=sensitivity.force + sums, acceleration=sensitivity.acceleration + by_sums)
+def _with_summation_rounding(sensitivity: Motion, motion: Motion, force_sums: np.ndarray) -> Motion:
+    """Rounding sensitivities, with the rounding of summing forces of the sizes (n,) ``force_sums`` added; these
+    forces may cancel."""
+    by_sums = np.abs(np.linalg.pinv(motion.mass)) @ force_sums
+    return sensitivity._replace(force=sensitivity.force + force_sums, acceleration=sensitivity.acceleration + by_sums)
 
 
-def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndarray]:
+def _sums_of_rates(user_model: TwinModel, states: Sequence[State]) -> Iterator[np.ndarray]:
     """For each state, the sums (n,) over the bodies of the sizes of the velocity-dependent forces on each coordinate:
     mass times centripetal acceleration by lever, and gyroscopic moments."""
-    model, data = twin.model, mujoco.MjData(twin.model)
-    shifts, turns, shifting, turning = (np.empty((3, twin.size)) for _ in range(4))
+    model, data = user_model.model, mujoco.MjData(user_model.model)
+    shifts, turns, shifting, turning = (np.empty((3, user_model.size)) for _ in range(4))
     for q, v in states:
-        state, sums = forward_state(twin, data, q, v), np.zeros(twin.size)
+        state, sums = forward_state(user_model, data, q, v), np.zeros(user_model.size)
         for b in moving_bodies(model):
             mujoco.mj_jacBodyCom(model, data, shifts, turns, b)
             mujoco.mj_jacDot(model, data, shifting, turning, data.xipos[b], b)
@@ -115,75 +115,77 @@ def _with_solver_rounding(sensitivity: Motion, motion: Motion) -> Motion:
     return sensitivity._replace(acceleration=sensitivity.acceleration + solution)
 
 
-def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Motion]:
+def _unconstrained_motion(user_model: TwinModel, states: Sequence[State]) -> list[Motion]:
     """Motion of the file's model in MuJoCo at the states, without its equality constraints."""
-    model = copy(twin.model)
+    model = copy(user_model.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
-    move = equations_of_file(replace(twin, model=model))
+    move = equations_of_file(replace(user_model, model=model))
     return [move(q, v) for q, v in states]
 
 
-def _with_constraint_rounding(sensitivity: Motion, unconstrained: Motion) -> Motion:
+def _with_constraint_rounding(sensitivity: Motion, unconstrained_motion: Motion) -> Motion:
     """Rounding sensitivities, with the motion that constraints suppress added. Rounding errors of all other coordinates
     remain in a stopped coordinate, weighted with the root of inertia."""
-    weight = np.sqrt(unconstrained.mass.diagonal())
-    taken = float((weight * np.abs(unconstrained.acceleration)).max())
+    weight = np.sqrt(unconstrained_motion.mass.diagonal())
+    taken = float((weight * np.abs(unconstrained_motion.acceleration)).max())
     return sensitivity._replace(
         force=sensitivity.force + taken * weight, acceleration=sensitivity.acceleration + taken / weight
     )
 
 
-def reach_of(twin: TwinModel) -> float:
+def reach_of(user_model: TwinModel) -> float:
     """Largest distance (m) of a body, a centre of mass or an anchor from the world's origin in the design position."""
-    data = mujoco.MjData(twin.model)
-    forward_state(twin, data, np.zeros(twin.size), np.zeros(twin.size))
+    data = mujoco.MjData(user_model.model)
+    forward_state(user_model, data, np.zeros(user_model.size), np.zeros(user_model.size))
     places = np.concatenate((data.xpos, data.xipos, data.xanchor, data.site_xpos))
     return float(np.linalg.norm(places, axis=1).max())
 
 
-def changed_model(model: mujoco.MjModel, draw: np.random.Generator, reach: float) -> mujoco.MjModel:
+def changed_model(
+    mujoco_model: mujoco.MjModel, random_generator: np.random.Generator, largest_distance: float
+) -> mujoco.MjModel:
     """A copy of the model in which all numbers that affect motion are changed at random by a small relative amount."""
-    model = copy(model)
+    mujoco_model = copy(mujoco_model)
 
     def unit(shape: tuple[int, ...]) -> np.ndarray:
-        return CHANGED_SHARE * draw.uniform(-1.0, 1.0, shape)
+        return CHANGED_SHARE * random_generator.uniform(-1.0, 1.0, shape)
 
     for name in RELATIVE_NUMBERS:
-        numbers = getattr(model, name)
+        numbers = getattr(mujoco_model, name)
         numbers *= 1.0 + unit(numbers.shape)
     for name in LENGTH_NUMBERS:
-        numbers = getattr(model, name)
-        numbers += reach * unit(numbers.shape)
+        numbers = getattr(mujoco_model, name)
+        numbers += largest_distance * unit(numbers.shape)
     for name in DIRECTION_NUMBERS:
-        numbers = getattr(model, name)
+        numbers = getattr(mujoco_model, name)
         numbers += unit(numbers.shape)
         numbers /= np.linalg.norm(numbers, axis=-1, keepdims=True)
-    model.opt.gravity += np.linalg.norm(model.opt.gravity) * unit((3,))
-    for e, size in _equality_magnitudes(model, reach):
-        model.eq_data[e] += size * unit(size.shape)
-    model.body_sameframe[:] = model.site_sameframe[:] = 0
-    return model
+    mujoco_model.opt.gravity += np.linalg.norm(mujoco_model.opt.gravity) * unit((3,))
+    for e, size in _equality_magnitudes(mujoco_model, largest_distance):
+        mujoco_model.eq_data[e] += size * unit(size.shape)
+    mujoco_model.body_sameframe[:] = mujoco_model.site_sameframe[:] = 0
+    return mujoco_model
 
 
-def _equality_magnitudes(model: mujoco.MjModel, reach: float) -> Iterator[tuple[int, np.ndarray]]:
+def _equality_magnitudes(mujoco_model: mujoco.MjModel, largest_distance: float) -> Iterator[tuple[int, np.ndarray]]:
     """For every equality constraint, its index and the magnitudes (k,) of its numbers: positions between bodies, else
     factors."""
-    for e in range(model.neq):
-        size = np.abs(model.eq_data[e])
-        if joins_bodies(model, e):
-            size[:6] = np.maximum(size[:6], reach)
+    for e in range(mujoco_model.neq):
+        size = np.abs(mujoco_model.eq_data[e])
+        if joins_bodies(mujoco_model, e):
+            size[:6] = np.maximum(size[:6], largest_distance)
             size[6:10] = 1.0
         yield e, size
 
 
-def _changed_state(twin: TwinModel, draw: np.random.Generator, q: np.ndarray, v: np.ndarray) -> State:
+def _changed_state(user_model: TwinModel, random_generator: np.random.Generator, q: np.ndarray, v: np.ndarray) -> State:
     """State changed at random by a small relative amount; coordinates are changed including the offset that the file
     gives them."""
-    model, size = twin.model, np.abs(q)
+    model, size = user_model.model, np.abs(q)
     for j in range(model.njnt):
         first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL_JOINT, FREE_JOINT))
         place, shifts = int(model.jnt_qposadr[j]), 3 if model.jnt_type[j] == FREE_JOINT else 0 if several else 1
         size[first : first + shifts] += np.abs(model.qpos0[place : place + shifts])
         size[first + shifts : first + shifts + 3 * several] += 1.0
-    share = CHANGED_SHARE * draw.uniform(-1.0, 1.0, (2, twin.size))
+    share = CHANGED_SHARE * random_generator.uniform(-1.0, 1.0, (2, user_model.size))
     return q + size * share[0], v * (1.0 + share[1])

@@ -27,76 +27,81 @@ UNMET_REASON = (
 )
 
 
-def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Random coordinates and rates (count, n), uniform in their ranges; equal for equal ``count`` and ``seed``.
+def random_states(user_model: TwinModel, state_count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+    """Random coordinates and rates (count, n), uniform in their ranges; equal for equal ``state_count`` and ``seed``.
 
     Those that constraints tie go to the nearest place, and the nearest rate, that satisfies them. RunFailed where no
     state does.
     """
-    draw, (low, high) = np.random.default_rng(seed), drawing_bounds(twin.model)
-    q, v = draw.uniform(low, high, (count, len(low))), draw.uniform(-LARGEST_SPEED, LARGEST_SPEED, (count, len(low)))
-    if twin.driven.connections:
-        return _constrained_states(twin, q, v)
-    rows, offsets = coupling_rows(twin.driven.couplings, twin.size)
+    draw, (low, high) = np.random.default_rng(seed), drawing_bounds(user_model.model)
+    q, v = (
+        draw.uniform(low, high, (state_count, len(low))),
+        draw.uniform(-LARGEST_SPEED, LARGEST_SPEED, (state_count, len(low))),
+    )
+    if user_model.driven.connections:
+        return _constrained_states(user_model, q, v)
+    rows, offsets = coupling_rows(user_model.driven.couplings, user_model.size)
     if not len(rows):
         return q, v
     nearest = np.linalg.pinv(rows).T
     q, v = q - (q @ rows.T - offsets) @ nearest, v - v @ rows.T @ nearest
     unmet = np.abs(q @ rows.T - offsets).max(axis=0) > UNMET_GAP
     if unmet.any():
-        names = [tie.name for tie, off in zip(twin.driven.couplings, unmet, strict=True) if off]
+        names = [tie.name for tie, off in zip(user_model.driven.couplings, unmet, strict=True) if off]
         raise RunFailed("twin", f"{' and '.join(names)} contradict each other: no coordinates satisfy all of them")
     return q, v
 
 
-def _constrained_states(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _constrained_states(user_model: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States (count, n) that satisfy the constraints between bodies, computed from random ones; a state moves towards
     the design position where no solution is near."""
-    constraints, (low, high) = plain_constraints(twin), file_limits(twin.model)
+    constraints, (low, high) = plain_constraints(user_model), file_limits(user_model.model)
     middle = np.clip(0.0, low, high)
 
-    def nearest(place: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def nearest(coordinates: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         for ranges in ((-np.inf, np.inf), (low, high)):  # within them alone where the nearest ones lie beyond
             for share in DISTANCE_SHARES:
-                state = satisfying_state(constraints, middle + share * (place - middle), rate, ranges)
+                state = satisfying_state(constraints, middle + share * (coordinates - middle), rates, ranges)
                 if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
                     return state
-        names = [each.name for each in twin.driven.couplings] + [each.name for each in twin.driven.connections]
+        names = [each.name for each in user_model.driven.couplings] + [
+            each.name for each in user_model.driven.connections
+        ]
         raise RunFailed("twin", UNMET_REASON.format(first_names_text(names)))
 
     states = [nearest(*each) for each in zip(q, v, strict=True)]
     return np.array([place for place, _ in states]), np.array([rate for _, rate in states])
 
 
-def drawing_bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+def drawing_bounds(mujoco_model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates (n,) between which random states are drawn."""
-    high = np.full(model.nv, LARGEST_ANGLE)
+    high = np.full(mujoco_model.nv, LARGEST_ANGLE)
     low = -high
-    for j in range(model.njnt):
-        first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
-        if model.jnt_type[j] in (FREE_JOINT, BALL_JOINT):
-            turn = first + (3 if model.jnt_type[j] == FREE_JOINT else 0)
-            reach = model.jnt_range[j, 1] - model.jnt_margin[j] if model.jnt_limited[j] else np.inf
+    for j in range(mujoco_model.njnt):
+        first, place = int(mujoco_model.jnt_dofadr[j]), int(mujoco_model.jnt_qposadr[j])
+        if mujoco_model.jnt_type[j] in (FREE_JOINT, BALL_JOINT):
+            turn = first + (3 if mujoco_model.jnt_type[j] == FREE_JOINT else 0)
+            reach = mujoco_model.jnt_range[j, 1] - mujoco_model.jnt_margin[j] if mujoco_model.jnt_limited[j] else np.inf
             high[first:turn], high[turn : turn + 3] = LARGEST_SHIFT, min(LARGEST_TILT, reach / np.sqrt(3.0))
             low[first : turn + 3] = -high[first : turn + 3]
-        elif model.jnt_limited[j]:
-            margin = min(float(model.jnt_margin[j]), 0.5 * float(np.ptp(model.jnt_range[j])))
-            low[first], high[first] = model.jnt_range[j] - model.qpos0[place] + (margin, -margin)
-        elif model.jnt_type[j] == SLIDE_JOINT:
+        elif mujoco_model.jnt_limited[j]:
+            margin = min(float(mujoco_model.jnt_margin[j]), 0.5 * float(np.ptp(mujoco_model.jnt_range[j])))
+            low[first], high[first] = mujoco_model.jnt_range[j] - mujoco_model.qpos0[place] + (margin, -margin)
+        elif mujoco_model.jnt_type[j] == SLIDE_JOINT:
             low[first], high[first] = -LARGEST_SHIFT, LARGEST_SHIFT
     return low, high
 
 
-def file_limits(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+def file_limits(mujoco_model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates (n,) of the ranges in the file, infinite where there is no range.
 
     The middle one of three angles keeps away from a quarter turn all the same.
     """
-    low, high = drawing_bounds(model)
-    for j in range(model.njnt):
-        first, several = int(model.jnt_dofadr[j]), model.jnt_type[j] in (FREE_JOINT, BALL_JOINT)
-        free = model.jnt_type[j] == FREE_JOINT
-        if not model.jnt_limited[j] or free:
+    low, high = drawing_bounds(mujoco_model)
+    for j in range(mujoco_model.njnt):
+        first, several = int(mujoco_model.jnt_dofadr[j]), mujoco_model.jnt_type[j] in (FREE_JOINT, BALL_JOINT)
+        free = mujoco_model.jnt_type[j] == FREE_JOINT
+        if not mujoco_model.jnt_limited[j] or free:
             of = slice(first, first + (6 if free else 3 if several else 1))
             low[of], high[of] = -np.inf, np.inf
         if several:

@@ -45,12 +45,12 @@ class PathGap:
         )
 
 
-def compare_two_paths(first: TwinModel, second: TwinModel) -> PathGap:
+def compare_two_paths(first_model: TwinModel, second_model: TwinModel) -> PathGap:
     """Difference between two files' paths over 1 s, at the step of the first file; both files must have coordinates of
     the same names."""
-    steps, (q,), (v,) = step_count_of_path(first), *random_states(first, 1)
-    step, order = PATH_DURATION / steps, [first.names.index(name) for name in second.names]
-    legs = [constant_sections(twin, steps) for twin in (first, second)]
+    steps, (q,), (v,) = step_count_of_path(first_model), *random_states(first_model, 1)
+    step, order = PATH_DURATION / steps, [first_model.names.index(name) for name in second_model.names]
+    legs = [constant_sections(twin, steps) for twin in (first_model, second_model)]
     try:
         with np.errstate(all="ignore"):  # what blows up is told
             path = path_of_build(legs[0], ENGINES[0], (q, v), step)
@@ -61,7 +61,7 @@ def compare_two_paths(first: TwinModel, second: TwinModel) -> PathGap:
     if has_diverged(path) or has_diverged(other):
         return PathGap(0.0, np.nan, "", "the motion blows up at this step")
     rows, places = count_of_equal_states(path, disturbed, steps), np.argsort(order)
-    there = other[:rows, np.concatenate((places, first.size + places))]
+    there = other[:rows, np.concatenate((places, first_model.size + places))]
     apart = np.abs(there - path[:rows]).max(axis=0)
     at, size = int(apart.argmax()), max(1.0, float(np.abs(path[:rows]).max()))
-    return PathGap((rows - 1) * step, float(apart[at]) / size, first.names[at % first.size])
+    return PathGap((rows - 1) * step, float(apart[at]) / size, first_model.names[at % first_model.size])

@@ -69,32 +69,34 @@ class _LinkMass:
         self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
 
 
-def misread_numbers(file: ModelFile) -> list[MisreadNumber]:
+def misread_numbers(model_file: ModelFile) -> list[MisreadNumber]:
     """Numbers of a URDF that differ in MuJoCo's compiled model, each with the file's and the parser's value."""
-    root = parsed_root(file.document.path.read_bytes())
-    model, design = file.twin.model, mujoco.MjData(file.twin.model)
+    root = parsed_root(model_file.document.path.read_bytes())
+    model, design = model_file.twin.model, mujoco.MjData(model_file.twin.model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
-    links, joints = _links_in_place(root, file.document.path.name)
+    links, joints = _links_in_place(root, model_file.document.path.name)
     rows = list[MisreadNumber]()
-    for name, expected in _masses_of_groups(root, links, file.document.path.name).items():
+    for name, expected in _masses_of_groups(root, links, model_file.document.path.name).items():
         rows += _compared_mass(model, design, name, expected)
     for name, (anchor, axis) in joints.items():
         rows += _compared_joint(model, design, name, anchor, axis)
     return rows
 
 
-def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expected: _LinkMass) -> list[MisreadNumber]:
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    stands = body <= 0 or model.body_weldid[body] == 0
-    if stands or expected.centre is None or expected.inertia is None:
+def _compared_mass(
+    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, body_name: str, expected_mass: _LinkMass
+) -> list[MisreadNumber]:
+    body = mujoco.mj_name2id(mujoco_model, mujoco.mjtObj.mjOBJ_BODY, body_name)
+    stands = body <= 0 or mujoco_model.body_weldid[body] == 0
+    if stands or expected_mass.centre is None or expected_mass.inertia is None:
         return []
-    axes, owner = design.ximat[body].reshape(3, 3), label(model, "body", body)
-    tensor = axes * model.body_inertia[body] @ axes.T
+    axes, owner = design_data.ximat[body].reshape(3, 3), label(mujoco_model, "body", body)
+    tensor = axes * mujoco_model.body_inertia[body] @ axes.T
     pairs = (
-        ("mass", "kg", np.array([expected.mass]), np.array([model.body_mass[body]])),
-        ("centre of mass", "m", expected.centre, design.xipos[body]),
-        ("inertia", "kg m^2", expected.inertia, tensor),
+        ("mass", "kg", np.array([expected_mass.mass]), np.array([mujoco_model.body_mass[body]])),
+        ("centre of mass", "m", expected_mass.centre, design_data.xipos[body]),
+        ("inertia", "kg m^2", expected_mass.inertia, tensor),
     )
     return [
         MisreadNumber(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)
@@ -102,33 +104,40 @@ def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expe
 
 
 def _compared_joint(
-    model: mujoco.MjModel, design: mujoco.MjData, name: str, anchor: np.ndarray, axis: np.ndarray
+    mujoco_model: mujoco.MjModel,
+    design_data: mujoco.MjData,
+    joint_name: str,
+    expected_anchor: np.ndarray,
+    expected_axis: np.ndarray,
 ) -> list[MisreadNumber]:
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    joint = mujoco.mj_name2id(mujoco_model, mujoco.mjtObj.mjOBJ_JOINT, joint_name)
     if joint < 0:
         return []
-    owner = label(model, "joint", joint)
-    pairs = (("axis", "", axis, design.xaxis[joint]), ("anchor", "m", anchor, design.xanchor[joint]))
+    owner = label(mujoco_model, "joint", joint)
+    pairs = (
+        ("axis", "", expected_axis, design_data.xaxis[joint]),
+        ("anchor", "m", expected_anchor, design_data.xanchor[joint]),
+    )
     return [
         MisreadNumber(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)
     ]
 
 
-def _equal_numbers(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
-    least = 1.0 if kind in ("axis", "anchor", "centre of mass") else 0.0
-    size = max(np.abs(expected).max(), np.abs(parsed).max(), least)
-    return bool(np.abs(expected - parsed).max() <= PARSER_TOLERANCE * size)
+def _equal_numbers(expected_numbers: np.ndarray, parsed_numbers: np.ndarray, quantity_name: str) -> bool:
+    least = 1.0 if quantity_name in ("axis", "anchor", "centre of mass") else 0.0
+    size = max(np.abs(expected_numbers).max(), np.abs(parsed_numbers).max(), least)
+    return bool(np.abs(expected_numbers - parsed_numbers).max() <= PARSER_TOLERANCE * size)
 
 
 def _links_in_place(
-    root: ElementTree.Element, file: str
+    xml_root: ElementTree.Element, urdf_path: str
 ) -> tuple[dict[str, _UrdfLink], dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Links by name in the design position; and for hinges and slides by name, their anchors and axes in space."""
-    joints = list(root.iter("joint"))
+    joints = list(xml_root.iter("joint"))
     children = {_link_name(joint, "child") for joint in joints}
     links = {
         name: _UrdfLink(np.zeros(3), np.eye(3), name)
-        for name in (link.get("name", "") for link in root.iter("link"))
+        for name in (link.get("name", "") for link in xml_root.iter("link"))
         if name not in children
     }
     axes, waiting = dict[str, tuple[np.ndarray, np.ndarray]](), joints
@@ -138,64 +147,66 @@ def _links_in_place(
             return links, axes  # a loop, which MuJoCo's parser has refused
         for joint in ready:
             above, child = links[_link_name(joint, "parent")], _link_name(joint, "child")
-            shift, turn = _origin_of(joint, file)
+            shift, turn = _origin_of(joint, urdf_path)
             moves = joint.get("type") in MOVING_JOINT_TYPES
             link = _UrdfLink(above.position + above.axes @ shift, above.axes @ turn, child if moves else above.group)
             links[child] = link
             if joint.get("type") in MOVING_JOINT_TYPES[:3]:
-                axis = _numbers_in_attribute(joint.find("axis"), "xyz", (1.0, 0.0, 0.0), file)
+                axis = _numbers_in_attribute(joint.find("axis"), "xyz", (1.0, 0.0, 0.0), urdf_path)
                 axes[joint.get("name", "")] = link.position, link.axes @ (axis / np.linalg.norm(axis))
         waiting = [joint for joint in waiting if joint not in ready]
     return links, axes
 
 
-def _masses_of_groups(root: ElementTree.Element, links: dict[str, _UrdfLink], file: str) -> dict[str, _LinkMass]:
+def _masses_of_groups(
+    xml_root: ElementTree.Element, links: dict[str, _UrdfLink], urdf_path: str
+) -> dict[str, _LinkMass]:
     """Mass, centre and inertia of each group of links that are fixed to one another, by the name of its moving link."""
     sums = dict[str, _LinkMass]()
-    for element in root.iter("link"):
+    for element in xml_root.iter("link"):
         inertial, link = element.find("inertial"), links.get(element.get("name", ""))
         if inertial is None or link is None:
             continue
-        shift, turn = _origin_of(inertial, file)
-        mass = float(_numbers_in_attribute(inertial.find("mass"), "value", (0.0,), file)[0])
-        tensor, axes = _inertia_tensor(inertial.find("inertia"), file), link.axes @ turn
+        shift, turn = _origin_of(inertial, urdf_path)
+        mass = float(_numbers_in_attribute(inertial.find("mass"), "value", (0.0,), urdf_path)[0])
+        tensor, axes = _inertia_tensor(inertial.find("inertia"), urdf_path), link.axes @ turn
         sums.setdefault(link.group, _LinkMass()).add(mass, link.position + link.axes @ shift, axes @ tensor @ axes.T)
     return sums
 
 
-def _inertia_tensor(element: ElementTree.Element | None, file: str) -> np.ndarray:
+def _inertia_tensor(xml_element: ElementTree.Element | None, urdf_path: str) -> np.ndarray:
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    xx, xy, xz, yy, yz, zz = (float(_numbers_in_attribute(element, name, (0.0,), file)[0]) for name in names)
+    xx, xy, xz, yy, yz, zz = (float(_numbers_in_attribute(xml_element, name, (0.0,), urdf_path)[0]) for name in names)
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
 
-def _link_name(joint: ElementTree.Element, end_tag: str) -> str:
-    end = joint.find(end_tag)
+def _link_name(joint_element: ElementTree.Element, end_tag: str) -> str:
+    end = joint_element.find(end_tag)
     return "" if end is None else end.get("link", "")
 
 
-def _origin_of(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
+def _origin_of(xml_element: ElementTree.Element, urdf_path: str) -> tuple[np.ndarray, np.ndarray]:
     """Translation (3,) in m and rotation (3, 3) of the <origin> in an element."""
-    origin = element.find("origin")
-    roll, pitch, yaw = _numbers_in_attribute(origin, "rpy", (0.0, 0.0, 0.0), file)
+    origin = xml_element.find("origin")
+    roll, pitch, yaw = _numbers_in_attribute(origin, "rpy", (0.0, 0.0, 0.0), urdf_path)
     (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
     x = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     y = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))
     z = np.array(((cc, -sc, 0.0), (sc, cc, 0.0), (0.0, 0.0, 1.0)))
-    return _numbers_in_attribute(origin, "xyz", (0.0, 0.0, 0.0), file), z @ y @ x
+    return _numbers_in_attribute(origin, "xyz", (0.0, 0.0, 0.0), urdf_path), z @ y @ x
 
 
 def _numbers_in_attribute(
-    element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str
+    xml_element: ElementTree.Element | None, attribute_name: str, default_numbers: tuple[float, ...], urdf_path: str
 ) -> np.ndarray:
     """Numbers in an attribute of an element. Raises InputError where they are not numbers, or not as many as wanted."""
-    text = None if element is None else element.get(name)
+    text = None if xml_element is None else xml_element.get(attribute_name)
     if text is None:
-        return np.array(default)
+        return np.array(default_numbers)
     try:
         numbers = np.array([float(part) for part in text.split()])
     except ValueError:
-        raise InputError(file, name, text, "must be numbers") from None
-    if len(numbers) != len(default):
-        raise InputError(file, name, text, f"must be {len(default)} numbers")
+        raise InputError(urdf_path, attribute_name, text, "must be numbers") from None
+    if len(numbers) != len(default_numbers):
+        raise InputError(urdf_path, attribute_name, text, f"must be {len(default_numbers)} numbers")
     return numbers

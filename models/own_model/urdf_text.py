@@ -45,83 +45,87 @@ class _Writer:
     pieces: list[str] = field(default_factory=list)
     line: int = 1
 
-    def write(self, content: bytes) -> str:
+    def write(self, file_content: bytes) -> str:
         parser = self._parser = expat.ParserCreate()
         parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
-        parser.Parse(content, True)
+        parser.Parse(file_content, True)
         return "".join(self.pieces)
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+    def _start(self, xml_tag: str, attributes: dict[str, str]) -> None:
         if self.enclosing_tags == ["robot"]:
-            self.link = attributes.get("name", "") if tag == "link" else ""
-        if self.removed_depth or self._is_unwanted(tag):
-            self.removed_tags.update([] if self.removed_depth else [tag])
+            self.link = attributes.get("name", "") if xml_tag == "link" else ""
+        if self.removed_depth or self._is_unwanted(xml_tag):
+            self.removed_tags.update([] if self.removed_depth else [xml_tag])
             self.removed_depth += 1
             return
         line = self._parser.CurrentLineNumber
         told = "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())
-        self.pieces += ["\n" * (line - self.line), f"<{tag}{told}>"]
+        self.pieces += ["\n" * (line - self.line), f"<{xml_tag}{told}>"]
         self.line = max(line, self.line)
-        self.enclosing_tags.append(tag)
+        self.enclosing_tags.append(xml_tag)
 
-    def _is_unwanted(self, tag: str) -> bool:
+    def _is_unwanted(self, xml_tag: str) -> bool:
         if self.enclosing_tags == ["robot"]:
-            return tag not in READ_TAGS
+            return xml_tag not in READ_TAGS
         if self.enclosing_tags != ["robot", "link"]:
             return False
-        if tag == "visual" or (self.link in self.fixed_links and tag in ("inertial", "collision")):
+        if xml_tag == "visual" or (self.link in self.fixed_links and xml_tag in ("inertial", "collision")):
             return True
-        return tag == "collision" and self.link in self.links_with_mass
+        return xml_tag == "collision" and self.link in self.links_with_mass
 
-    def _end(self, tag: str) -> None:
+    def _end(self, xml_tag: str) -> None:
         if self.removed_depth:
             self.removed_depth -= 1
             return
-        self.pieces.append(f"</{tag}>")
+        self.pieces.append(f"</{xml_tag}>")
         self.enclosing_tags.pop()
 
 
-def text_for_mujoco(content: bytes) -> UrdfText:
+def text_for_mujoco(file_content: bytes) -> UrdfText:
     """Text of a well-formed URDF for MuJoCo's parser."""
-    root = parsed_root(content)
+    root = parsed_root(file_content)
     links = root.findall("link")
     massive = frozenset(link.get("name", "") for link in links if link.find("inertial") is not None)
     standing = fixed_links(root)
     writer = _Writer(frozenset(standing), massive)
-    text = writer.write(content)
+    text = writer.write(file_content)
     return UrdfText(text, tuple(_notes(root, standing, massive, writer.removed_tags)))
 
 
-def parsed_root(content: bytes) -> ElementTree.Element:
+def parsed_root(file_content: bytes) -> ElementTree.Element:
     """Root element of a well-formed URDF, with the tags freed of namespaces."""
-    root = ElementTree.fromstring(content)
+    root = ElementTree.fromstring(file_content)
     for element in root.iter():
         if isinstance(element.tag, str):
             element.tag = element.tag.rpartition("}")[2]
     return root
 
 
-def fixed_links(root: ElementTree.Element) -> list[str]:
+def fixed_links(xml_root: ElementTree.Element) -> list[str]:
     """Names of the links that do not move in MuJoCo: the root links, and all that are fixed to them."""
     joints = [
-        (joint.get("type"), _link_name(joint, "parent"), _link_name(joint, "child")) for joint in root.findall("joint")
+        (joint.get("type"), _link_name(joint, "parent"), _link_name(joint, "child"))
+        for joint in xml_root.findall("joint")
     ]
     children = {child for _, _, child in joints}
-    standing = [name for name in (link.get("name", "") for link in root.findall("link")) if name not in children]
+    standing = [name for name in (link.get("name", "") for link in xml_root.findall("link")) if name not in children]
     for name in standing:  # which grows
         standing += [child for kind, above, child in joints if kind == "fixed" and above == name != child]
-        if len(standing) > len(joints) + len(root):
+        if len(standing) > len(joints) + len(xml_root):
             break  # a link with two parents in a circle: MuJoCo's parser refuses it
     return standing
 
 
-def _link_name(joint: ElementTree.Element, end_tag: str) -> str:
-    end = joint.find(end_tag)
+def _link_name(joint_element: ElementTree.Element, end_tag: str) -> str:
+    end = joint_element.find(end_tag)
     return "" if end is None else end.get("link", "")
 
 
 def _notes(
-    root: ElementTree.Element, fixed_links: Sequence[str], links_with_mass: frozenset[str], removed_tags: Counter[str]
+    xml_root: ElementTree.Element,
+    fixed_links: Sequence[str],
+    links_with_mass: frozenset[str],
+    removed_tags: Counter[str],
 ) -> list[str]:
     """Notes on a URDF: what was left out, and what MuJoCo makes of links without joints or masses."""
     notes = list[str]()
@@ -135,7 +139,7 @@ def _notes(
             f"link {heavy[0]!r} stands on the world, since MuJoCo reads a URDF so: to set it free, put a link without "
             "mass before it, and a joint of type floating between the two"
         )
-    shaped = [link.get("name", "") for link in root.findall("link") if link.find("collision") is not None]
+    shaped = [link.get("name", "") for link in xml_root.findall("link") if link.find("collision") is not None]
     if light := [name for name in shaped if name not in links_with_mass and name not in fixed_links]:
         more = f" and {len(light) - 1} more links" if len(light) > 1 else ""
         notes.append(f"link {light[0]!r}{more} without <inertial>: MuJoCo takes 1000 kg/m^3 for the collision shapes")

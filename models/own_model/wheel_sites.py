@@ -40,66 +40,88 @@ class WheelSite:
     cornering: float
 
 
-def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[WheelSite, ...]:
+def wheel_sites(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, model_xml: Document) -> tuple[WheelSite, ...]:
     """Wheel sites from front to rear, left before right. Raises InputError if the sites do not form the axles of a car.
 
-    design : data of the model in the design position, with kinematics computed.
+    design_data : data of the model in the design position, with kinematics computed.
     """
-    sites = {s: match[1] for s in range(model.nsite) if (match := WHEEL_SITE_PATTERN.fullmatch(model.site(s).name))}
+    sites = {
+        s: match[1]
+        for s in range(mujoco_model.nsite)
+        if (match := WHEEL_SITE_PATTERN.fullmatch(mujoco_model.site(s).name))
+    }
     if not sites:
         said = (
             f"no site is named as a tyre or a hub: a vehicle needs one at the centre of every wheel, as {EXAMPLE_SITE}"
         )
-        raise InputError(document.path.name, "worldbody", None, said)
+        raise InputError(model_xml.path.name, "worldbody", None, said)
     for s, name in sites.items():
-        _check_site(model, design, document, s, name, list(sites.values()).count(name) > 1)
-    axles = _axles(design, document, model, sorted(sites, key=lambda s: -design.site_xpos[s, 0]))
+        _check_site(mujoco_model, design_data, model_xml, s, name, list(sites.values()).count(name) > 1)
+    axles = _axles(design_data, model_xml, mujoco_model, sorted(sites, key=lambda s: -design_data.site_xpos[s, 0]))
     return tuple(
         WheelSite(
-            sites[s], s, int(model.site_bodyid[s]), design.site_xpos[s].copy(), axle, *_tyre_numbers(model, document, s)
+            sites[s],
+            s,
+            int(mujoco_model.site_bodyid[s]),
+            design_data.site_xpos[s].copy(),
+            axle,
+            *_tyre_numbers(mujoco_model, model_xml, s),
         )
         for axle, abreast in enumerate(axles)
         for s in abreast
     )
 
 
-def site_text(model: mujoco.MjModel, document: Document, site: int) -> str:
+def site_text(mujoco_model: mujoco.MjModel, model_xml: Document, site: int) -> str:
     """Text by which messages name a site."""
-    name = model.site(site).name
-    line = document.line(("site",), name)
+    name = mujoco_model.site(site).name
+    line = model_xml.line(("site",), name)
     return f"site {name!r}" + (f" ({line})" if line else "")
 
 
-def _refuse(model: mujoco.MjModel, document: Document, site: int, value: object, reason: str) -> NoReturn:
-    raise InputError(document.path.name, site_text(model, document, site), value, reason)
+def _refuse(mujoco_model: mujoco.MjModel, model_xml: Document, site: int, wrong_value: object, reason: str) -> NoReturn:
+    raise InputError(model_xml.path.name, site_text(mujoco_model, model_xml, site), wrong_value, reason)
 
 
 def _check_site(
-    model: mujoco.MjModel, design: mujoco.MjData, document: Document, site: int, name: str, is_repeated: bool
+    mujoco_model: mujoco.MjModel,
+    design_data: mujoco.MjData,
+    model_xml: Document,
+    site: int,
+    site_name: str,
+    is_repeated: bool,
 ) -> None:
-    if not name:
-        _refuse(model, document, site, None, 'needs the name of its tyre behind "tyre" or "hub", as "tyre front_left"')
+    if not site_name:
+        _refuse(
+            mujoco_model,
+            model_xml,
+            site,
+            None,
+            'needs the name of its tyre behind "tyre" or "hub", as "tyre front_left"',
+        )
     if is_repeated:
-        _refuse(model, document, site, name, "two sites have this name behind their first word")
-    if not model.site_bodyid[site]:
-        _refuse(model, document, site, None, "lies in the world: it must be in the body of its wheel")
-    height = float(design.site_xpos[site, 2])
+        _refuse(mujoco_model, model_xml, site, site_name, "two sites have this name behind their first word")
+    if not mujoco_model.site_bodyid[site]:
+        _refuse(mujoco_model, model_xml, site, None, "lies in the world: it must be in the body of its wheel")
+    height = float(design_data.site_xpos[site, 2])
     if not height > 0.0:
-        _refuse(model, document, site, height, "m is its height: a wheel's centre must lie above the road, z = 0")
+        _refuse(
+            mujoco_model, model_xml, site, height, "m is its height: a wheel's centre must lie above the road, z = 0"
+        )
 
 
 def _axles(
-    design: mujoco.MjData, document: Document, model: mujoco.MjModel, ordered: list[int]
+    design_data: mujoco.MjData, model_xml: Document, mujoco_model: mujoco.MjModel, ordered_sites: list[int]
 ) -> list[tuple[int, ...]]:
     """Numbers of the sites of every axle, from the front. Raises InputError where they do not form axles."""
-    axles, x = [ordered[:1]], design.site_xpos[:, 0]
-    for before, site in pairwise(ordered):
+    axles, x = [ordered_sites[:1]], design_data.site_xpos[:, 0]
+    for before, site in pairwise(ordered_sites):
         apart = round(float(x[before] - x[site]), 9)
         if SAME_AXLE_DISTANCE < apart < AXLE_SEPARATION:
-            other = model.site(before).name
+            other = mujoco_model.site(before).name
             _refuse(
-                model,
-                document,
+                mujoco_model,
+                model_xml,
                 site,
                 apart,
                 f"m behind {other!r}: one axle within {SAME_AXLE_DISTANCE:g} m, or {AXLE_SEPARATION:g} m apart",
@@ -108,38 +130,46 @@ def _axles(
             axles.append([])
         axles[-1].append(site)
     for sites in axles:
-        sites.sort(key=lambda site: -design.site_xpos[site, 1])
-        _check_axle(design, document, model, sites)
+        sites.sort(key=lambda site: -design_data.site_xpos[site, 1])
+        _check_axle(design_data, model_xml, mujoco_model, sites)
     return [tuple(sites) for sites in axles]
 
 
-def _check_axle(design: mujoco.MjData, document: Document, model: mujoco.MjModel, sites: list[int]) -> None:
+def _check_axle(
+    design_data: mujoco.MjData, model_xml: Document, mujoco_model: mujoco.MjModel, sites: list[int]
+) -> None:
     """Raise InputError unless an axle has a left and a right wheel, or one wheel in the middle."""
-    y, at = design.site_xpos[sites, 1], f"the axle at x = {design.site_xpos[sites[0], 0]:.6g} m"
+    y, at = design_data.site_xpos[sites, 1], f"the axle at x = {design_data.site_xpos[sites[0], 0]:.6g} m"
     if len(sites) > MOST_WHEELS_PER_AXLE:
-        names = ", ".join(repr(model.site(s).name) for s in sites)
+        names = ", ".join(repr(mujoco_model.site(s).name) for s in sites)
         _refuse(
-            model,
-            document,
+            mujoco_model,
+            model_xml,
             sites[-1],
             None,
             f"{at} has {len(sites)} wheels, {names}: {MOST_WHEELS_PER_AXLE} at the most",
         )
     if len(sites) == MOST_WHEELS_PER_AXLE and not y[0] > 0.0 > y[1]:
         _refuse(
-            model, document, sites[-1], y.tolist(), f"{at} must have a left wheel, y above 0, and a right one, below"
+            mujoco_model,
+            model_xml,
+            sites[-1],
+            y.tolist(),
+            f"{at} must have a left wheel, y above 0, and a right one, below",
         )
     if len(sites) == 1 and abs(y[0]) > SAME_AXLE_DISTANCE:
-        _refuse(model, document, sites[0], float(y[0]), f"m is y of the only wheel of {at}: its partner is missing")
+        _refuse(
+            mujoco_model, model_xml, sites[0], float(y[0]), f"m is y of the only wheel of {at}: its partner is missing"
+        )
 
 
-def _tyre_numbers(model: mujoco.MjModel, document: Document, site: int) -> tuple[float, float, float]:
+def _tyre_numbers(mujoco_model: mujoco.MjModel, model_xml: Document, site: int) -> tuple[float, float, float]:
     """Stiffness (N/m), damping (N s/m) and cornering stiffness (N/rad) from a site's ``user`` attribute."""
     numbers = np.zeros(3)
-    given = model.site_user[site][:3] if model.nuser_site else numbers[:0]
+    given = mujoco_model.site_user[site][:3] if mujoco_model.nuser_site else numbers[:0]
     numbers[: len(given)] = given
     if not np.isfinite(numbers).all() or (numbers < 0.0).any() or not numbers[0] > 0.0:
         allowed = "user must hold the tyre's stiffness in N/m above 0, then damping in N s/m and cornering in N/rad: "
-        _refuse(model, document, site, numbers.tolist(), f"{allowed}{EXAMPLE_SITE}")
+        _refuse(mujoco_model, model_xml, site, numbers.tolist(), f"{allowed}{EXAMPLE_SITE}")
     stiffness, damping, cornering = numbers.tolist()
     return stiffness, damping, cornering

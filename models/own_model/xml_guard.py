@@ -51,16 +51,16 @@ class Document:
     elements: tuple[XmlElement, ...]
     urdf: UrdfText | None = None
 
-    def line(self, tags: tuple[str, ...], name: str) -> str:
+    def line(self, tags: tuple[str, ...], element_name: str) -> str:
         """Position "FILE:LINE" of the first element with one of the tags and the name; "" if there is none."""
         for element in self.elements:
-            if element.tag in tags and element.attributes.get("name") == name:
+            if element.tag in tags and element.attributes.get("name") == element_name:
                 return f"{element.file}:{element.line}"
         return ""
 
-    def line_of_attribute(self, tag: str, attribute: str) -> str:
+    def line_of_attribute(self, xml_tag: str, attribute: str) -> str:
         """Position "FILE:LINE" of the first element with this tag that has an attribute; "" if there is none."""
-        there = (each for each in self.elements if each.tag == tag and attribute in each.attributes)
+        there = (each for each in self.elements if each.tag == xml_tag and attribute in each.attributes)
         return next((f"{each.file}:{each.line}" for each in there), "")
 
 
@@ -70,12 +70,12 @@ class _Reader:
     elements: list[XmlElement] = field(default_factory=list)
     enclosing_tags: list[str] = field(default_factory=list)
 
-    def read(self, content: bytes) -> list[XmlElement]:
+    def read(self, file_content: bytes) -> list[XmlElement]:
         parser = self._parser = expat.ParserCreate()
         parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
         parser.StartDoctypeDeclHandler = self._refuse_types
         try:
-            parser.Parse(content, True)
+            parser.Parse(file_content, True)
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
             raise InputError(self.path.name, f"line {error.lineno}", None, f"is no well-formed XML: {what}") from None
@@ -83,12 +83,12 @@ class _Reader:
             raise InputError(self.path.name, f"line {parser.CurrentLineNumber}", None, f"is no XML: {error}") from None
         return self.elements
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+    def _start(self, xml_tag: str, attributes: dict[str, str]) -> None:
         line = self._parser.CurrentLineNumber
-        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.enclosing_tags)))
-        self.enclosing_tags.append(tag)
+        self.elements.append(XmlElement(xml_tag, attributes, self.path.name, line, tuple(self.enclosing_tags)))
+        self.enclosing_tags.append(xml_tag)
 
-    def _end(self, tag: str) -> None:
+    def _end(self, xml_tag: str) -> None:
         self.enclosing_tags.pop()
 
     def _refuse_types(self, *_: Any) -> None:
@@ -106,124 +106,134 @@ class _Folders(NamedTuple):
     elements: list[XmlElement]
 
 
-def checked_document(path: Path, folder: Path | None = None) -> Document:
+def checked_document(model_path: Path, allowed_folder: Path | None = None) -> Document:
     """Elements of a model file after checks. Raises InputError for content that must not reach the parser.
 
-    folder : in which all files must lie that the model names; its own if None.
+    allowed_folder : in which all files must lie that the model names; its own if None.
     """
-    base = path.resolve().parent
-    allowed, elements = base if folder is None else folder.resolve(), list[XmlElement]()
+    base = model_path.resolve().parent
+    allowed, elements = base if allowed_folder is None else allowed_folder.resolve(), list[XmlElement]()
     if not base.is_relative_to(allowed):
-        raise InputError("--folder", "", str(folder), f"must be a folder that holds {path}")
-    content = _file_content(path)
-    root = _Reader(path).read(content)[0]
+        raise InputError("--folder", "", str(allowed_folder), f"must be a folder that holds {model_path}")
+    content = _file_content(model_path)
+    root = _Reader(model_path).read(content)[0]
     if root.tag not in FORMAT_OF_ROOT:
         part = f": <{PART_ROOT}> is a part of other models: give the model that includes it"
         told = f"must be <mujoco> (MJCF) or <robot> (URDF){part if root.tag == PART_ROOT else ''}"
-        raise InputError(path.name, f"line {root.line}", f"<{root.tag}>", told)
+        raise InputError(model_path.name, f"line {root.line}", f"<{root.tag}>", told)
     urdf = text_for_mujoco(content) if FORMAT_OF_ROOT[root.tag] == "URDF" else None
     folders = _Folders(allowed, base, [])
-    _read_elements(path, urdf.text.encode() if urdf else content, folders, elements, 0)
+    _read_elements(model_path, urdf.text.encode() if urdf else content, folders, elements, 0)
     _check_assets(folders)
-    return Document(path, FORMAT_OF_ROOT[root.tag], tuple(elements), urdf)
+    return Document(model_path, FORMAT_OF_ROOT[root.tag], tuple(elements), urdf)
 
 
-def _file_content(path: Path) -> bytes:
+def _file_content(xml_path: Path) -> bytes:
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(str(path), "", path.stat().st_size, f"bytes: a model may have {LARGEST_FILE} at the most")
-        return path.read_bytes()
+        if xml_path.stat().st_size > LARGEST_FILE:
+            raise InputError(
+                str(xml_path), "", xml_path.stat().st_size, f"bytes: a model may have {LARGEST_FILE} at the most"
+            )
+        return xml_path.read_bytes()
     except OSError as error:
-        raise InputError(str(path), "", None, f"cannot be read: {error.strerror or error}") from None
+        raise InputError(str(xml_path), "", None, f"cannot be read: {error.strerror or error}") from None
 
 
-def _read_model(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
+def _read_model(xml_path: Path, include_folders: _Folders, elements: list[XmlElement], include_depth: int) -> None:
     """Read a model with all that it includes, and check where the files of its meshes and pictures lie."""
-    _read_elements(path, _file_content(path), folders, elements, depth)
-    _check_assets(folders)
+    _read_elements(xml_path, _file_content(xml_path), include_folders, elements, include_depth)
+    _check_assets(include_folders)
 
 
-def _read_elements(path: Path, content: bytes, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
-    for element in _Reader(path).read(content):
+def _read_elements(
+    xml_path: Path, file_content: bytes, include_folders: _Folders, elements: list[XmlElement], include_depth: int
+) -> None:
+    for element in _Reader(xml_path).read(file_content):
         elements.append(element)
-        folders.elements.append(element)
+        include_folders.elements.append(element)
         place = f"line {element.line}"
         if element.tag in PLUGIN_TAGS or "plugin" in element.attributes:
-            raise InputError(path.name, place, f"<{element.tag}>", "plugins are code: none is loaded")
+            raise InputError(xml_path.name, place, f"<{element.tag}>", "plugins are code: none is loaded")
         if element.tag in ("include", "model") and "file" in element.attributes:
-            _read_included(path, folders, element, elements, depth)
-        _check_counts(path, element, place)
+            _read_included(xml_path, include_folders, element, elements, include_depth)
+        _check_counts(xml_path, element, place)
 
 
-def _read_included(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
+def _read_included(
+    xml_path: Path, include_folders: _Folders, element: XmlElement, elements: list[XmlElement], include_depth: int
+) -> None:
     """Read a file that an element includes or attaches. Raises InputError if it lies outside the allowed folder."""
     name, place = element.attributes["file"], f"line {element.line}"
-    target = (folders.model_folder / name).resolve()
-    if not target.is_relative_to(folders.allowed_folder):
-        raise InputError(path.name, place, name, _outside_text(element, folders, target))
+    target = (include_folders.model_folder / name).resolve()
+    if not target.is_relative_to(include_folders.allowed_folder):
+        raise InputError(xml_path.name, place, name, _outside_text(element, include_folders, target))
     if not target.is_file():
-        raise InputError(path.name, place, name, f"<{element.tag}> names a file that is not there: {target}")
-    if depth >= DEEPEST_INCLUDE:
-        raise InputError(path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
+        raise InputError(xml_path.name, place, name, f"<{element.tag}> names a file that is not there: {target}")
+    if include_depth >= DEEPEST_INCLUDE:
+        raise InputError(xml_path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
     if element.tag == "model":
-        _read_model(target, _Folders(folders.allowed_folder, target.parent, []), elements, depth + 1)
+        _read_model(target, _Folders(include_folders.allowed_folder, target.parent, []), elements, include_depth + 1)
     else:
-        _read_elements(target, _file_content(target), folders, elements, depth + 1)
+        _read_elements(target, _file_content(target), include_folders, elements, include_depth + 1)
 
 
-def _outside_text(element: XmlElement, folders: _Folders, target: Path) -> str:
+def _outside_text(element: XmlElement, include_folders: _Folders, outside_path: Path) -> str:
     """Text on the folder that is allowed in place of an outside file, and the option that allows this file."""
-    both = Path(os.path.commonpath((folders.allowed_folder, target.parent)))
+    both = Path(os.path.commonpath((include_folders.allowed_folder, outside_path.parent)))
     option = f"; if all below {both} may be read: `--folder {both}`" if both != Path(both.anchor) else ""
     return f"<{element.tag}> must name a file in the folder of the model{option}"
 
 
-def _check_assets(folders: _Folders) -> None:
+def _check_assets(include_folders: _Folders) -> None:
     """Raise InputError for a mesh or picture file outside the allowed folder, in any folder that a <compiler> names."""
-    compilers = [element.attributes for element in folders.elements if element.tag == "compiler"]
-    urdf = folders.elements[0].tag == "robot"
+    compilers = [element.attributes for element in include_folders.elements if element.tag == "compiler"]
+    urdf = include_folders.elements[0].tag == "robot"
     strips = any(_strips_paths(compiler, urdf) for compiler in compilers or [{}])
-    for element in (element for element in folders.elements if element.tag in ASSET_FOLDERS):
+    for element in (element for element in include_folders.elements if element.tag in ASSET_FOLDERS):
         keys = (ASSET_FOLDERS[element.tag], "assetdir")
         within = {compiler[key] for compiler in compilers for key in keys if key in compiler} or {""}
         names = [name for key, name in element.attributes.items() if key.startswith("file")]
         names = [Path(name).name for name in names] if strips else names
         for path in (Path(folder) / name for name in names for folder in within):
-            target = (folders.model_folder / path).resolve()
-            if not target.is_relative_to(folders.allowed_folder):
-                told = _outside_text(element, folders, target)
+            target = (include_folders.model_folder / path).resolve()
+            if not target.is_relative_to(include_folders.allowed_folder):
+                told = _outside_text(element, include_folders, target)
                 raise InputError(element.file, f"line {element.line}", str(path), told)
 
 
-def _strips_paths(compiler: dict[str, str], urdf: bool) -> bool:
+def _strips_paths(compiler_attributes: dict[str, str], is_urdf: bool) -> bool:
     """Whether MuJoCo drops the folders from the names of files, as it does in a URDF unless told otherwise."""
-    return compiler.get("strippath", str(urdf).lower()) == "true"
+    return compiler_attributes.get("strippath", str(is_urdf).lower()) == "true"
 
 
-def _check_counts(path: Path, element: XmlElement, place: str) -> None:
+def _check_counts(xml_path: Path, element: XmlElement, element_place: str) -> None:
     if element.tag not in ("replicate", "composite", "flexcomp", "size"):
         return
     if element.tag == "size":
         for name in ("memory", "nstack", "njmax", "nconmax", "nuserdata"):
             if name in element.attributes and not _memory_is_modest(element.attributes[name]):
-                raise InputError(path.name, place, element.attributes[name], f"<size> asks for too much {name}")
+                raise InputError(
+                    xml_path.name, element_place, element.attributes[name], f"<size> asks for too much {name}"
+                )
         return
     product = 1.0
     for text in element.attributes.get("count", "1").split():
         try:
             product *= max(1.0, abs(float(text)))
         except ValueError:
-            raise InputError(path.name, place, text, "count must be whole numbers") from None
+            raise InputError(xml_path.name, element_place, text, "count must be whole numbers") from None
     if not product <= LARGEST_COPY_COUNT:
         raise InputError(
-            path.name, place, element.attributes["count"], f"asks for more than {LARGEST_COPY_COUNT} copies"
+            xml_path.name, element_place, element.attributes["count"], f"asks for more than {LARGEST_COPY_COUNT} copies"
         )
 
 
-def _memory_is_modest(text: str) -> bool:
+def _memory_is_modest(memory_text: str) -> bool:
     """Whether an amount of memory, in MuJoCo's notation such as 100M, is below 4 GB."""
     units = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
-    number, unit = (text[:-1], units[text[-1:].upper()]) if text[-1:].upper() in units else (text, 1)
+    number, unit = (
+        (memory_text[:-1], units[memory_text[-1:].upper()]) if memory_text[-1:].upper() in units else (memory_text, 1)
+    )
     try:
         return float(number) * unit <= 4 * 2**30
     except ValueError:

@@ -118,7 +118,7 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
     InputError names the line that is wrong.
     """
-    table = read_table(path, TABLE_COLUMNS, least_rows=FEWEST_ROWS)
+    table = read_table(path, TABLE_COLUMNS, least_row_count=FEWEST_ROWS)
     return RollingRadiusTable(table["y"], table["dr"], str(path))
 
 

@@ -220,5 +220,7 @@ def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.nda
     """
     together, path = max(1, SAMPLES_PER_BLOCK // copies), 0
     while True:
-        yield from normal_samples(seed, path, together * copies, channels, source=ROAD).reshape(together, copies, -1).mT
+        yield from (
+            normal_samples(seed, path, together * copies, channels, noise_source=ROAD).reshape(together, copies, -1).mT
+        )
         path += 1

@@ -58,7 +58,9 @@ class RoadPath:
         met, buffer = np.empty((0, len(F), copies)), np.empty((len(F), copies))
         while True:
             fresh = 2 * step_count + (0 if len(met) else 1 + max(lags))
-            drawn = normal_samples(seed, first_path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
+            drawn = normal_samples(seed, first_path, fresh * copies, len(F), noise_source=ROAD).reshape(
+                fresh, copies, -1
+            )
             drawn = np.concatenate(
                 [met[-1:] if len(met) else _stationary_root(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
             )

@@ -47,7 +47,7 @@ def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
 
 def read_csv_tracks(path: str | Path) -> tuple[SplineProfile, SplineProfile]:
     """Left and right track of a road in a CSV file; file, frame and errors as in :func:`read_csv_road`."""
-    table = read_table(path, _ROAD_COLUMNS, increasing="s", least_rows=4)
+    table = read_table(path, _ROAD_COLUMNS, increasing_column="s", least_row_count=4)
     station = table["s"] - table["s"][0]
     name = Path(path).name
     return _track_profile(station, table["left"], f"{name}, left"), _track_profile(

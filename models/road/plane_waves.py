@@ -26,5 +26,5 @@ def plane_waves(density_level: float, wave_count: int = 48, seed: int = 0) -> np
     number = np.sqrt(edges[:-1] * edges[1:])
     direction = 2.0 * np.pi * np.modf(GOLDEN_RATIO * np.arange(wave_count))[0]
     deviation = np.sqrt(np.pi * density_level * (1.0 / edges[:-1] - 1.0 / edges[1:]))
-    amplitudes = deviation[:, None] * normal_samples(seed, 0, wave_count, 2, source=ROAD)
+    amplitudes = deviation[:, None] * normal_samples(seed, 0, wave_count, 2, noise_source=ROAD)
     return np.column_stack([number * np.cos(direction), number * np.sin(direction), amplitudes])

@@ -53,7 +53,7 @@ def measured_attitude(
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
     its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
-    noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in path_numbers], axis=1)
+    noise = np.stack([normal_samples(seed, path, len(rates), 3, noise_source=GYRO) for path in path_numbers], axis=1)
     return true_attitude(rates[:, None, :] + deviation * noise, sample_period, start_attitude)
 
 
@@ -174,7 +174,7 @@ def bias_path(
     """
     _check_numbers(period=sample_period, correlation_time=correlation_time)
     _check_numbers(minimum=0.0, turn_on=turn_on, instability=instability)
-    drawn = normal_samples(seed, path, sample_count + 1, 1, source=GYRO_BIAS)[:, 0]
+    drawn = normal_samples(seed, path, sample_count + 1, 1, noise_source=GYRO_BIAS)[:, 0]
     decay = math.exp(-sample_period / correlation_time)
     kicks = drawn[1:] * math.sqrt(-math.expm1(-2 * sample_period / correlation_time))
     kicks[:1] = drawn[1:2]

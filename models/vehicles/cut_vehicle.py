@@ -91,69 +91,73 @@ class CutVehicle:
         return len(self.tree.coordinates())
 
 
-def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
-    """The cut vehicle: the tyres of a vehicle whose body ``chassis`` has all six freedoms are removed. Raises
+def cut(vehicle: SpatialVehicle, chassis_name: str) -> CutVehicle:
+    """The cut vehicle: the tyres of a vehicle whose body ``chassis_name`` has all six freedoms are removed. Raises
     InputError if the vehicle cannot be cut."""
-    _check(vehicle, chassis)
-    sprung = sliding_springs(with_chassis_as_parent(vehicle, chassis))
-    whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
+    _check(vehicle, chassis_name)
+    sprung = sliding_springs(with_chassis_as_parent(vehicle, chassis_name))
+    whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis_name)
     held = preloads(whole)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
-    return CutVehicle(chassis, _tree(whole, chassis), whole, elements_of(whole, held), loads)
+    return CutVehicle(chassis_name, _tree(whole, chassis_name), whole, elements_of(whole, held), loads)
 
 
 def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, ...]:
     """Elements for the springs, then the bars, of a vehicle whose springs and bars all name their frames; preloads :
     their static forces."""
 
-    def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:
-        first, second, axis = map(np.array, places)
-        force = preloads.parts[part.name]
+    def element(
+        spring_or_bar: SpringDamper | AntiRollBar, first_body: str, second_body: str, *attachment_points: Vector
+    ) -> Element:
+        first, second, axis = map(np.array, attachment_points)
+        force = preloads.parts[spring_or_bar.name]
         return Element(
-            part.name,
+            spring_or_bar.name,
             first_body,
             second_body,
             first,
             second,
             axis,
-            part.stiffness,
-            part.damping,
+            spring_or_bar.stiffness,
+            spring_or_bar.damping,
             force,
-            str(part.frame),
+            str(spring_or_bar.frame),
         )
 
-    def bent(s: SpringDamper) -> Element:
-        straight = element(s, s.first_body, str(s.second_body), s.first_point, s.second_point, s.axis)
-        rough = replace(straight, friction=s.friction, friction_rate=s.friction_rate)
-        return replace(rough, travel_force=s.travel_force, rate_force=s.rate_force)
+    def bent(spring: SpringDamper) -> Element:
+        straight = element(
+            spring, spring.first_body, str(spring.second_body), spring.first_point, spring.second_point, spring.axis
+        )
+        rough = replace(straight, friction=spring.friction, friction_rate=spring.friction_rate)
+        return replace(rough, travel_force=spring.travel_force, rate_force=spring.rate_force)
 
     springs = map(bent, vehicle.springs)
     bars = (element(b, b.left, b.right, b.point_left, b.point_right, (0.0, 0.0, 1.0 / b.track)) for b in vehicle.bars)
     return (*springs, *bars)
 
 
-def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
+def _tree(vehicle: SpatialVehicle, chassis_name: str) -> SpatialVehicle:
     """Bodies of the cut vehicle in tree order: massless carriers for heading and pitch, the chassis with roll, and all
     other bodies behind it."""
-    body = vehicle.body(chassis)
+    body = vehicle.body(chassis_name)
     carriers = (
-        Body(f"{chassis} heading", 0.0, body.position, ("x", "y", "z", "rz")),
-        Body(f"{chassis} pitch", 0.0, body.position, ("ry",), parent=f"{chassis} heading"),
+        Body(f"{chassis_name} heading", 0.0, body.position, ("x", "y", "z", "rz")),
+        Body(f"{chassis_name} pitch", 0.0, body.position, ("ry",), parent=f"{chassis_name} heading"),
     )
-    turned = replace(body, freedoms=("rx",), parent=f"{chassis} pitch")
-    others = tuple(body for body in vehicle.bodies if body.name != chassis)
+    turned = replace(body, freedoms=("rx",), parent=f"{chassis_name} pitch")
+    others = tuple(body for body in vehicle.bodies if body.name != chassis_name)
     return SpatialVehicle(vehicle.name, (*carriers, turned, *others), (), (), vehicle.axles, gravity=vehicle.gravity)
 
 
-def _check(vehicle: SpatialVehicle, chassis: str) -> None:
+def _check(vehicle: SpatialVehicle, chassis_name: str) -> None:
     names = tuple(body.name for body in vehicle.bodies)
-    if chassis not in names:
-        raise InputError(vehicle.name, "chassis", chassis, "no such body", names)
-    body = vehicle.body(chassis)
+    if chassis_name not in names:
+        raise InputError(vehicle.name, "chassis", chassis_name, "no such body", names)
+    body = vehicle.body(chassis_name)
     if len(body.freedoms) != 6 or body.parent is not None:
         raise InputError(
             vehicle.name,
-            f"bodies[{chassis}].freedoms",
+            f"bodies[{chassis_name}].freedoms",
             body.freedoms,
             "what is left of a vehicle without tyres is free: its chassis needs x, y, z, rx, ry and rz",
         )
@@ -161,9 +165,9 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
         if spring.second_body is None:
             raise InputError(vehicle.name, f"springs[{spring.name}].bodies", "ground", "a cut vehicle has no ground")
     for bar in vehicle.bars:
-        if bar.body != chassis:
+        if bar.body != chassis_name:
             place = f"anti_roll_bars[{bar.name}].body"
-            raise InputError(vehicle.name, place, bar.body, "must be the chassis", (chassis,))
+            raise InputError(vehicle.name, place, bar.body, "must be the chassis", (chassis_name,))
     if not vehicle.tyres:
         raise InputError(vehicle.name, "tyres", None, "there is nothing to cut: no tyre")
 
@@ -192,30 +196,32 @@ class RigidVehicle:
         parts = wrenches.reshape(len(wrenches), -1, 6)
         return (np.cross(self.arms, parts[:, :, :3]) + parts[:, :, 3:]).sum(axis=1)
 
-    def turning(self, deviation: np.ndarray) -> np.ndarray:
+    def turning(self, standard_deviations: np.ndarray) -> np.ndarray:
         """Covariance (3, 3) of the angular accelerations, rad^2/s^4, caused by noise with standard deviations (6 h,), N
         and N m, of the hub samples."""
-        rows = self.moments(np.eye(len(deviation)))
+        rows = self.moments(np.eye(len(standard_deviations)))
         inverse = np.linalg.inv(self.inertia)
-        return inverse @ (rows.T * deviation**2) @ rows @ inverse
+        return inverse @ (rows.T * standard_deviations**2) @ rows @ inverse
 
     def toppling_rates(self) -> np.ndarray:
         """Growth rates (2,) of roll and pitch, 1/s, under forces whose directions are fixed in space."""
         loads = -self.arms[:, 2].mean() * self.mass * GRAVITY
         return np.sqrt(np.maximum(loads, 0.0) / np.diag(self.inertia)[:2])
 
-    def angle_variance(self, deviation: np.ndarray, period: float, times: np.ndarray) -> np.ndarray:
+    def angle_variance(self, standard_deviations: np.ndarray, sampling_period: float, times: np.ndarray) -> np.ndarray:
         """Variances (m, 3) of roll, pitch and heading (rad^2) caused by noise of the hub samples, at times (m,) after a
         start from rest."""
-        return np.outer(times**3 / 3, period * np.diag(self.turning(deviation)))
+        return np.outer(times**3 / 3, sampling_period * np.diag(self.turning(standard_deviations)))
 
-    def position_variance(self, deviation: np.ndarray, period: float, times: np.ndarray, frame: str) -> np.ndarray:
+    def position_variance(
+        self, standard_deviations: np.ndarray, sampling_period: float, times: np.ndarray, frame: str
+    ) -> np.ndarray:
         """Variances (m, 3) of x, y, z (m^2) caused by noise of the hub samples, at times (m,) after a start from rest;
         ``frame`` : of the forces."""
-        force = period * (deviation.reshape(-1, 6)[:, :3] ** 2).sum(axis=0) / self.mass**2
+        force = sampling_period * (standard_deviations.reshape(-1, 6)[:, :3] ** 2).sum(axis=0) / self.mass**2
         variances = np.outer(times**3 / 3, force)
         if frame != "inertial":
-            turning = period * np.diag(self.turning(deviation))
+            turning = sampling_period * np.diag(self.turning(standard_deviations))
             variances[:, :2] += GRAVITY**2 * np.outer(times**7 / 252, turning[[1, 0]])
         return variances
 

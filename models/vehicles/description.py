@@ -119,10 +119,10 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return mass, damping, stiffness
 
 
-def _vertical(point: Point, coordinates: tuple[tuple[str, str], ...]) -> np.ndarray:
+def _vertical(point: Point, coordinate_names: tuple[tuple[str, str], ...]) -> np.ndarray:
     """Row (n,) that maps small coordinates to the vertical displacement of a point (m, down): z - x pitch."""
-    row = np.zeros(len(coordinates))
-    for i, (body, kind) in enumerate(coordinates):
+    row = np.zeros(len(coordinate_names))
+    for i, (body, kind) in enumerate(coordinate_names):
         if body == point.body:
             row[i] = 1.0 if kind == "z" else -point.x
     return row

@@ -25,14 +25,13 @@ SWAY_FREEDOMS: tuple[Freedom, ...] = ("z", "rx", "ry")
 
 
 def free_vehicle(
-    vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0, fixed: tuple[str, ...] = ()
+    vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0, bodies_without_spin: tuple[str, ...] = ()
 ) -> SpatialVehicle:
     """The vehicle on a yawing carrier body, without side forces, drag and outputs; its bodies are in tree order.
 
     gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle where its tyre names none, 0 for wheels that do
-    not spin; fixed : tyres whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six
-    freedoms and no parent, and where a body that carries a tyre turns about the vertical beside it.
-    """
+    not spin; bodies_without_spin : tyres whose wheels do not spin. Raises InputError unless the vehicle's chassis has
+    all six freedoms and no parent, and where a body that carries a tyre turns about the vertical beside it."""
     chassis = chassis_of(vehicle)
     _check_headings(vehicle, chassis.name)
     x, y, _ = chassis.position
@@ -47,7 +46,7 @@ def free_vehicle(
     bodies += [
         Body(rotor(tyre.name), ROTOR_MASS, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
         for tyre in vehicle.tyres
-        if spin_inertia and tyre.name not in fixed
+        if spin_inertia and tyre.name not in bodies_without_spin
     ]
     bars = tuple(_bar_on_sway(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
     free = replace(
@@ -65,13 +64,14 @@ def _about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
     return (0.0, 0.0, 0.0), (0.0, inertia, 0.0), (0.0, 0.0, 0.0)
 
 
-def with_chassis_as_parent(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
+def with_chassis_as_parent(vehicle: SpatialVehicle, chassis_name: str) -> SpatialVehicle:
     """The vehicle with the chassis as the parent of every body that had none, so that these move in the chassis'
     axes."""
     return replace(
         vehicle,
         bodies=tuple(
-            body if body.parent or body.name == chassis else replace(body, parent=chassis) for body in vehicle.bodies
+            body if body.parent or body.name == chassis_name else replace(body, parent=chassis_name)
+            for body in vehicle.bodies
         ),
     )
 
@@ -94,30 +94,30 @@ def chassis_of(vehicle: SpatialVehicle) -> Body:
     return chassis
 
 
-def _check_headings(vehicle: SpatialVehicle, chassis: str) -> None:
+def _check_headings(vehicle: SpatialVehicle, chassis_name: str) -> None:
     """Raise InputError for an axle that can yaw relative to the body that carries it, since tyre forces follow that
     body's heading."""
     hitches = {vehicle.body(name).parent for name in vehicle.towed}
     for tyre in vehicle.tyres:
         for name in vehicle.chain(tyre.body):
-            if name != chassis and name not in hitches and "rz" in vehicle.body(name).freedoms:
+            if name != chassis_name and name not in hitches and "rz" in vehicle.body(name).freedoms:
                 allowed = (
                     f"must not have rz: the body carries the tyre {tyre.name!r}, and tyres of a vehicle file keep to "
-                    f"the heading of {chassis!r}, or of a body with a hitch, by which a trailer is towed"
+                    f"the heading of {chassis_name!r}, or of a body with a hitch, by which a trailer is towed"
                 )
                 raise InputError(vehicle.name, f"bodies[{name}].freedoms", list(vehicle.body(name).freedoms), allowed)
 
 
-def rotor(tyre: str) -> str:
+def rotor(tyre_name: str) -> str:
     """Name of the rotating body of a wheel."""
-    return f"{tyre} {ROTOR}"
+    return f"{tyre_name} {ROTOR}"
 
 
-def last_coordinate_and_joint(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
+def last_coordinate_and_joint(vehicle: SpatialVehicle, body_name: str) -> tuple[int, Vector]:
     """Index of the last coordinate that moves a body, -1 if none does, and the position (m) of that coordinate's joint
     in the design position."""
-    given_body = vehicle.body(body)
-    last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body]
+    given_body = vehicle.body(body_name)
+    last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body_name]
     if last:
         return last[-1], given_body.position
     return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else last_coordinate_and_joint(vehicle, given_body.parent)
@@ -151,9 +151,9 @@ def _bodies_before_riders(bodies: list[Body]) -> tuple[Body, ...]:
     """Bodies in tree order: each body is followed directly by all bodies that it carries, as engines number them."""
     walked: list[Body] = []
 
-    def walk(parent: str | None) -> None:
+    def walk(parent_name: str | None) -> None:
         for body in bodies:
-            if body.parent == parent:
+            if body.parent == parent_name:
                 walked.append(body)
                 walk(body.name)
 

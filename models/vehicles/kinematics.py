@@ -31,11 +31,11 @@ class Kinematics:
         bodies = ((body.name, body.parent, body.position, body.freedoms) for body in vehicle.bodies)
         self._shifts = _shifts_of(tuple(bodies))
 
-    def coordinate(self, body: str, freedom: str) -> np.ndarray:
+    def coordinate(self, body_name: str, freedom: str) -> np.ndarray:
         """Row (n,) that selects a coordinate from all coordinates q; zeros if the body does not have it."""
         row = np.zeros(self.size)
-        if (body, freedom) in self._index:
-            row[self._index[body, freedom]] = 1.0  # type: ignore[index]
+        if (body_name, freedom) in self._index:
+            row[self._index[body_name, freedom]] = 1.0  # type: ignore[index]
         return row
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
@@ -47,9 +47,9 @@ class Kinematics:
             self._shifts[place].flags.writeable = False
         return self._shifts[place]
 
-    def _shift_of(self, body: str | None, point: Vector) -> np.ndarray:
+    def _shift_of(self, body_name: str | None, point: Vector) -> np.ndarray:
         columns = np.zeros((3, self.size))
-        for rider, freedom, i in self._motions(body):
+        for rider, freedom, i in self._motions(body_name):
             along = FREEDOMS.index(freedom)
             columns[:, i] = (
                 UNIT_AXES[along] if along < 3 else ROTATION_GENERATORS[along - 3] @ np.subtract(point, rider.position)
@@ -65,11 +65,11 @@ class Kinematics:
                 columns[:, i] = UNIT_AXES[along - 3]
         return columns
 
-    def second_derivatives(self, body: str | None, point: Vector) -> np.ndarray:
+    def second_derivatives(self, body_name: str | None, point: Vector) -> np.ndarray:
         """Second derivatives (3, n, n) of a point's displacement (m) with respect to the coordinates."""
-        first = self.shift(body, point)
+        first = self.shift(body_name, point)
         second = np.zeros((3, self.size, self.size))
-        motions = self._motions(body)
+        motions = self._motions(body_name)
         for k, (_, freedom, outer) in enumerate(motions):
             along = FREEDOMS.index(freedom)
             if along >= 3:
@@ -77,36 +77,36 @@ class Kinematics:
                     second[:, outer, inner] = second[:, inner, outer] = ROTATION_GENERATORS[along - 3] @ first[:, inner]
         return second
 
-    def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
+    def turned_axis(self, frame_body: str | None, axis: Vector) -> np.ndarray:
         """Change (3, n) of an axis fixed in a body, per coordinate; zeros for an axis fixed in space, None."""
         return (
             np.zeros((3, self.size))
-            if frame is None
-            else -np.tensordot(axis, ROTATION_GENERATORS, 1) @ self.turn(frame)
+            if frame_body is None
+            else -np.tensordot(axis, ROTATION_GENERATORS, 1) @ self.turn(frame_body)
         )
 
     def travel_second_derivatives(
-        self, first_end: SpringEnd, second_end: SpringEnd, axis: Vector, frame: str | None
+        self, first_end: SpringEnd, second_end: SpringEnd, axis: Vector, frame_body: str | None
     ) -> np.ndarray:
         """Second derivatives (n, n) of the travel axis . (second point - first point) with respect to the coordinates;
-        the axis is fixed in ``frame``, a body or space."""
+        the axis is fixed in ``frame_body``, a body or space."""
         ends, second = (
             self.shift(*second_end) - self.shift(*first_end),
             self.second_derivatives(*second_end) - self.second_derivatives(*first_end),
         )
         total = np.tensordot(axis, second, 1)
-        if frame is None:
+        if frame_body is None:
             return total
-        mixed, (x, y, z) = self.turned_axis(frame, axis).T @ ends, self._bodies[frame].position
+        mixed, (x, y, z) = self.turned_axis(frame_body, axis).T @ ends, self._bodies[frame_body].position
         beyond = x + axis[0], y + axis[1], z + axis[2]
-        bent = self.second_derivatives(frame, beyond) - self.second_derivatives(frame, (x, y, z))
+        bent = self.second_derivatives(frame_body, beyond) - self.second_derivatives(frame_body, (x, y, z))
         return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(second_end[1], first_end[1]), bent, 1))
 
-    def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
+    def _motions(self, body_name: str | None) -> list[tuple[Body, str, int]]:
         """Coordinates that move a body, from the ground outwards: (body that has the coordinate, freedom, index)."""
-        if body is None:
+        if body_name is None:
             return []
-        rider = self._bodies[body]
+        rider = self._bodies[body_name]
         coordinates = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
         return self._motions(rider.parent) + coordinates
 

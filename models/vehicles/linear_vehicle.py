@@ -96,13 +96,13 @@ def eigenvalues(vehicle: LinearVehicle) -> np.ndarray:
     return values[np.lexsort((values.imag, np.round(np.abs(values), 6)))]
 
 
-def eigenvalue_shifts(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
+def eigenvalue_shifts(unloaded_vehicle: LinearVehicle, loaded_vehicle: LinearVehicle) -> np.ndarray:
     """Complex change (1/s) of each eigenvalue (2 n,) of the unloaded vehicle by the load.
 
     Eigenvalues of both vehicles are paired such that the sum of all distances is smallest.
     """
     from scipy.optimize import linear_sum_assignment
 
-    before, after = eigenvalues(unloaded), eigenvalues(loaded)
+    before, after = eigenvalues(unloaded_vehicle), eigenvalues(loaded_vehicle)
     rows, columns = linear_sum_assignment(np.abs(before[:, None] - after[None, :]))
     return after[columns] - before[rows]

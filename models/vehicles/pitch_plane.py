@@ -42,29 +42,36 @@ class Parameters(Strict):
         return np.array([getattr(self, name) for name in type(self).model_fields])
 
 
-def describe(p: Parameters, geometry: Geometry = "exact") -> Vehicle:
+def describe(parameters: Parameters, geometry: Geometry = "exact") -> Vehicle:
     """Description of the pitch-plane vehicle on its tyres, over a flat road, as bodies and struts."""
-    bodies = (Body("wheel1", p.m1), Body("wheel2", p.m2), Body("chassis", p.m3, p.I))
+    bodies = (
+        Body("wheel1", parameters.m1),
+        Body("wheel2", parameters.m2),
+        Body("chassis", parameters.m3, parameters.I),
+    )
     front, rear, ground = Point("wheel1"), Point("wheel2"), Point(None)
     struts = (
-        Strut("tyre1", front, ground, p.k1, p.d1),
-        Strut("tyre2", rear, ground, p.k2, p.d2),
-        Strut("suspension3", Point("chassis", p.b), front, p.k3, p.d3),
-        Strut("suspension4", Point("chassis", -p.a), rear, p.k4, p.d4),
+        Strut("tyre1", front, ground, parameters.k1, parameters.d1),
+        Strut("tyre2", rear, ground, parameters.k2, parameters.d2),
+        Strut("suspension3", Point("chassis", parameters.b), front, parameters.k3, parameters.d3),
+        Strut("suspension4", Point("chassis", -parameters.a), rear, parameters.k4, parameters.d4),
     )
-    axles = (Axle("front", "wheel1", p.b), Axle("rear", "wheel2", -p.a))
-    return Vehicle(bodies, struts, axles, p.g, geometry)
+    axles = (Axle("front", "wheel1", parameters.b), Axle("rear", "wheel2", -parameters.a))
+    return Vehicle(bodies, struts, axles, parameters.g, geometry)
 
 
-def equilibrium(p: Parameters, geometry: Geometry = "exact") -> np.ndarray:
+def equilibrium(parameters: Parameters, geometry: Geometry = "exact") -> np.ndarray:
     """Static equilibrium of the pitch-plane vehicle on the flat road: state, shape (8,), with zero rates.
 
     Closed form: the axle loads follow from the moment about the other axle, and the two strut lengths
     give heave and (the sine of) pitch.
     """
-    f3, f4 = p.m3 * p.g * p.a / (p.a + p.b), p.m3 * p.g * p.b / (p.a + p.b)
-    z1, z2 = (f3 + p.m1 * p.g) / p.k1, (f4 + p.m2 * p.g) / p.k2
-    front, rear = z1 + f3 / p.k3, z2 + f4 / p.k4
-    sine = (rear - front) / (p.a + p.b)
+    f3, f4 = (
+        parameters.m3 * parameters.g * parameters.a / (parameters.a + parameters.b),
+        parameters.m3 * parameters.g * parameters.b / (parameters.a + parameters.b),
+    )
+    z1, z2 = (f3 + parameters.m1 * parameters.g) / parameters.k1, (f4 + parameters.m2 * parameters.g) / parameters.k2
+    front, rear = z1 + f3 / parameters.k3, z2 + f4 / parameters.k4
+    sine = (rear - front) / (parameters.a + parameters.b)
     pitch = math.asin(sine) if geometry == "exact" else sine
-    return np.array([z1, z2, front + p.b * sine, pitch, 0.0, 0.0, 0.0, 0.0])
+    return np.array([z1, z2, front + parameters.b * sine, pitch, 0.0, 0.0, 0.0, 0.0])

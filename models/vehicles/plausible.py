@@ -104,62 +104,62 @@ class VehicleFigures:
         return any(e.stiffness and body in chain for e in self.vehicle.joint_elements for body, _ in e.coordinates)
 
 
-def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
+def plausible(vehicle: SpatialVehicle, accepted_queries: Sequence[str] = ()) -> tuple[Finding, ...]:
     """Findings on implausible values of a vehicle, in SI units, without those that the user has accepted; empty for an
     ordinary vehicle."""
     whole = VehicleFigures(vehicle)
     queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
-    return tuple(query for query in queries if query.check not in accept)
+    return tuple(query for query in queries if query.check not in accepted_queries)
 
 
-def _query(check: str, place: str, message: str, size: float, unit: str) -> Finding:
-    return Finding(check, "doubt", place, f"{place}: {message}.", size, unit)
+def _query(check_name: str, entry_name: str, query_text: str, size_of_doubt: float, unit: str) -> Finding:
+    return Finding(check_name, "doubt", entry_name, f"{entry_name}: {query_text}.", size_of_doubt, unit)
 
 
-def _is_unusual(value: float, usual: tuple[float, float]) -> bool:
-    return not usual[0] <= value <= usual[1]
+def _is_unusual(value: float, usual_range: tuple[float, float]) -> bool:
+    return not usual_range[0] <= value <= usual_range[1]
 
 
-def _masses(figures: VehicleFigures) -> Iterator[Finding]:
-    if _is_unusual(figures.total_mass, USUAL_MASS):
+def _masses(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+    if _is_unusual(vehicle_figures.total_mass, USUAL_MASS):
         yield _query(
             "mass",
             "mass of the vehicle",
-            f"{figures.total_mass:.4g} kg; usual are {USUAL_MASS[0]:g} to {USUAL_MASS[1]:g} kg. "
-            f"{_tonnes(figures.total_mass)}",
-            figures.total_mass,
+            f"{vehicle_figures.total_mass:.4g} kg; usual are {USUAL_MASS[0]:g} to {USUAL_MASS[1]:g} kg. "
+            f"{_tonnes(vehicle_figures.total_mass)}",
+            vehicle_figures.total_mass,
             "kg",
         )
-    unsprung = sum(figures.vehicle.body(name).mass for name in figures.wheels)
+    unsprung = sum(vehicle_figures.vehicle.body(name).mass for name in vehicle_figures.wheels)
     if (
-        figures.wheels
-        and not _is_unusual(figures.total_mass, USUAL_MASS)
-        and figures.total_mass - unsprung < LEAST_SPRUNG_RATIO * unsprung
+        vehicle_figures.wheels
+        and not _is_unusual(vehicle_figures.total_mass, USUAL_MASS)
+        and vehicle_figures.total_mass - unsprung < LEAST_SPRUNG_RATIO * unsprung
     ):
         yield _query(
             "mass",
-            f"bodies[{figures.sprung_body.name}].mass",
-            f"{figures.sprung_body.mass:.4g} kg; all that is carried "
-            f"weighs {figures.total_mass - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
-            f"{_tonnes(figures.sprung_body.mass)}",
-            figures.sprung_body.mass,
+            f"bodies[{vehicle_figures.sprung_body.name}].mass",
+            f"{vehicle_figures.sprung_body.mass:.4g} kg; all that is carried "
+            f"weighs {vehicle_figures.total_mass - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
+            f"{_tonnes(vehicle_figures.sprung_body.mass)}",
+            vehicle_figures.sprung_body.mass,
             "kg",
         )
 
 
-def _tonnes(value: float) -> str:
-    return "Masses are in kg, not in tonnes" if value < 100 else "Masses are in kg, not in g or lb"
+def _tonnes(mass_in_kg: float) -> str:
+    return "Masses are in kg, not in tonnes" if mass_in_kg < 100 else "Masses are in kg, not in g or lb"
 
 
-def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
+def _sizes(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     metres = "Lengths are in m, not in mm"
     for name, value, usual in (
-        ("wheelbase", figures.wheelbase, USUAL_WHEELBASE),
-        ("track", figures.track, USUAL_TRACK),
+        ("wheelbase", vehicle_figures.wheelbase, USUAL_WHEELBASE),
+        ("track", vehicle_figures.track, USUAL_TRACK),
     ):
         if value and _is_unusual(value, usual):
             yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
-    for body in figures.vehicle.bodies:
+    for body in vehicle_figures.vehicle.bodies:
         if _is_unusual(body.position[2], (-0.01, LARGEST_HEIGHT)):
             yield _query(
                 "size",
@@ -170,9 +170,12 @@ def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
             )
 
 
-def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
+def _inertias(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the inertia of the sprung body (radii of gyration) and on tensors that would need negative mass."""
-    body, spans = figures.sprung_body, {"rx": figures.track, "ry": figures.wheelbase, "rz": figures.wheelbase}
+    body, spans = (
+        vehicle_figures.sprung_body,
+        {"rx": vehicle_figures.track, "ry": vehicle_figures.wheelbase, "rz": vehicle_figures.wheelbase},
+    )
     about = dict(zip(USUAL_GYRATION_RATIOS, np.diag(body.inertia).tolist(), strict=True))
     for freedom, usual in USUAL_GYRATION_RATIOS.items():
         span, inertia = spans[freedom], about[freedom]
@@ -187,7 +190,7 @@ def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
                 inertia,
                 "kg m^2",
             )
-    for each in figures.vehicle.bodies:
+    for each in vehicle_figures.vehicle.bodies:
         low, middle, high = sorted(np.diag(each.inertia).tolist())
         if low > 0 and high > 1.05 * (low + middle):
             yield _query(
@@ -200,13 +203,13 @@ def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
             )
 
 
-def _struts(figures: VehicleFigures) -> Iterator[Finding]:
+def _struts(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on wheels without a strut, and on struts far from their wheels."""
-    for wheel, tyres in figures.wheels.items():
-        struts = figures.struts(wheel)
-        if figures.has_joint_elements(wheel):
+    for wheel, tyres in vehicle_figures.wheels.items():
+        struts = vehicle_figures.struts(wheel)
+        if vehicle_figures.has_joint_elements(wheel):
             continue
-        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != figures.sprung_body.name:
+        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != vehicle_figures.sprung_body.name:
             kind = "damper alone" if struts else "strut"
             yield _query(
                 "strut",
@@ -236,36 +239,36 @@ def _distance_from_wheel(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...
     return float(np.hypot(x - tyres[0].point[0], max(min(beside) - y, y - max(beside), 0.0)))
 
 
-def _statics(figures: VehicleFigures) -> Iterator[Finding]:
+def _statics(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on static loads and the values that follow from them; empty if masses or lengths are already
     implausible."""
-    if any(_masses(figures)) or any(_sizes(figures)):
+    if any(_masses(vehicle_figures)) or any(_sizes(vehicle_figures)):
         return
     try:
-        figures.static_forces  # noqa: B018
+        vehicle_figures.static_forces  # noqa: B018
     except InputError as error:
         yield _query("load", error.place, error.allowed, 0.0, "N")
         return
-    yield from _loads(figures)
-    yield from _frequencies(figures)
-    yield from _dampers(figures)
+    yield from _loads(vehicle_figures)
+    yield from _frequencies(vehicle_figures)
+    yield from _dampers(vehicle_figures)
 
 
-def _loads(figures: VehicleFigures) -> Iterator[Finding]:
-    weight, axles = figures.total_mass * GRAVITY, dict[int, list[Tyre]]()
-    for tyre in figures.vehicle.tyres:
+def _loads(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+    weight, axles = vehicle_figures.total_mass * GRAVITY, dict[int, list[Tyre]]()
+    for tyre in vehicle_figures.vehicle.tyres:
         axles.setdefault(tyre.axle, []).append(tyre)
-        if figures.static_forces[tyre.name] < 0:
+        if vehicle_figures.static_forces[tyre.name] < 0:
             yield _query(
                 "load",
                 f"tyres[{tyre.name}]",
-                f"its static load is {figures.static_forces[tyre.name]:.4g} N: the wheel "
+                f"its static load is {vehicle_figures.static_forces[tyre.name]:.4g} N: the wheel "
                 "pulls on the road. The centre of mass lies beyond the axles, or an axle at a wrong place",
-                figures.static_forces[tyre.name],
+                vehicle_figures.static_forces[tyre.name],
                 "N",
             )
     for tyres in axles.values():
-        loads = [figures.static_forces[tyre.name] for tyre in tyres]
+        loads = [vehicle_figures.static_forces[tyre.name] for tyre in tyres]
         names = " and ".join(tyre.name for tyre in tyres)
         if len(axles) > 1 and 0 <= sum(loads) < LEAST_AXLE_SHARE * weight:
             yield _query(
@@ -288,24 +291,24 @@ def _loads(figures: VehicleFigures) -> Iterator[Finding]:
                 )
 
 
-def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
+def _frequencies(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the frequencies of the sprung body, from its static deflection, and of each wheel between road and
     body, and on the tyres' static deflections."""
     remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
-    sunk = _static_deflection(figures)
+    sunk = _static_deflection(vehicle_figures)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
     if _is_unusual(bounce, USUAL_BOUNCE_FREQUENCY):
         yield _query(
             "frequency",
-            f"bodies[{figures.sprung_body.name}]",
+            f"bodies[{vehicle_figures.sprung_body.name}]",
             f"sinks {sunk:.4g} m under the vehicle's weight, a "
             f"natural frequency of {bounce:.3g} Hz; usual are {USUAL_BOUNCE_FREQUENCY[0]:g} to "
             f"{USUAL_BOUNCE_FREQUENCY[1]:g} Hz. {remedy}",
             bounce,
             "Hz",
         )
-    for wheel in figures.wheels:
-        hop = _hop_frequency(figures, wheel)
+    for wheel in vehicle_figures.wheels:
+        hop = _hop_frequency(vehicle_figures, wheel)
         if hop is not None and _is_unusual(hop, USUAL_HOP_FREQUENCY):
             yield _query(
                 "frequency",
@@ -315,14 +318,14 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
                 hop,
                 "Hz",
             )
-    for tyre in figures.vehicle.tyres:
-        pressed = figures.static_forces[tyre.name] / tyre.stiffness
+    for tyre in vehicle_figures.vehicle.tyres:
+        pressed = vehicle_figures.static_forces[tyre.name] / tyre.stiffness
         if pressed > 0 and _is_unusual(pressed, USUAL_TYRE_DEFLECTION):
             yield _query(
                 "frequency",
                 f"tyres[{tyre.name}].stiffness",
                 f"{tyre.stiffness:.4g} N/m gives way by "
-                f"{pressed:.3g} m under {figures.static_forces[tyre.name]:.4g} N; usual are "
+                f"{pressed:.3g} m under {vehicle_figures.static_forces[tyre.name]:.4g} N; usual are "
                 f"{USUAL_TYRE_DEFLECTION[0]:g} to "
                 f"{USUAL_TYRE_DEFLECTION[1]:g} m. {remedy}",
                 pressed,
@@ -330,31 +333,31 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
             )
 
 
-def _static_deflection(figures: VehicleFigures) -> float:
+def _static_deflection(vehicle_figures: VehicleFigures) -> float:
     """Static deflection (m) of the sprung body under the weights, with springs and tyres in series."""
-    vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
+    vehicle, motion = vehicle_figures.vehicle, Kinematics(vehicle_figures.vehicle)
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)  # bars carry no weight
     weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     moved = np.linalg.lstsq(stiffness, np.asarray(weights), rcond=1e-12)[0]
-    return float(motion.shift(figures.sprung_body.name, figures.sprung_body.position)[2] @ moved)
+    return float(motion.shift(vehicle_figures.sprung_body.name, vehicle_figures.sprung_body.position)[2] @ moved)
 
 
-def _hop_frequency(figures: VehicleFigures, wheel: str) -> float | None:
+def _hop_frequency(vehicle_figures: VehicleFigures, wheel: str) -> float | None:
     """Natural frequency (Hz) of the vertical motion of a wheel or an axle with all other bodies fixed; None if it
     cannot move so."""
-    vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
+    vehicle, motion = vehicle_figures.vehicle, Kinematics(vehicle_figures.vehicle)
     row = motion.coordinate(wheel, "z")
-    if not row.any() or wheel == figures.sprung_body.name:
+    if not row.any() or wheel == vehicle_figures.sprung_body.name:
         return None
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)
     return float(np.sqrt((row @ stiffness @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
 
 
-def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
+def _dampers(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the damping ratios of struts with the mass that rests on them."""
-    struts = {strut.name: strut for wheel in figures.wheels for strut in figures.struts(wheel)}
+    struts = {strut.name: strut for wheel in vehicle_figures.wheels for strut in vehicle_figures.struts(wheel)}
     for name, strut in struts.items():
-        stiffness, load = slopes_at_rest(strut)[0], figures.static_forces[name]
+        stiffness, load = slopes_at_rest(strut)[0], vehicle_figures.static_forces[name]
         if not (strut.damping and stiffness > 0 and load > 0):
             continue
         share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)

@@ -42,10 +42,10 @@ def _spring(vehicle: SpatialVehicle, element: JointElement) -> SpringDamper:
     return SpringDamper(element.name, *ends, *points, (x, y, z), *gains, frame=carrier)
 
 
-def _row(element: JointElement, body: str) -> np.ndarray:
+def _row(element: JointElement, body_name: str) -> np.ndarray:
     """Factors (3,) of a joint element for the translations of one body."""
     row = np.zeros(3)
     for (name, freedom), factor in zip(element.coordinates, element.factors, strict=True):
-        if name == body:
+        if name == body_name:
             row[FREEDOMS.index(freedom) % 3] += factor
     return row

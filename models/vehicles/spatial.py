@@ -87,10 +87,10 @@ class Curve:
     arguments: tuple[float, ...]
     forces: tuple[float, ...]
 
-    def __call__(self, argument: float) -> float:
+    def __call__(self, travel_or_rate: float) -> float:
         """Force (N) of the curve at a travel (m) or rate (m/s)."""
-        i = self._piece_of(argument)
-        return self.forces[i] + self._slopes[i] * (argument - self.arguments[i])
+        i = self._piece_of(travel_or_rate)
+        return self.forces[i] + self._slopes[i] * (travel_or_rate - self.arguments[i])
 
     def slope_at_rest(self) -> float:
         """Slope of the curve at 0. At a corner it is the mean of both sides, as a central difference gives."""
@@ -111,9 +111,9 @@ class Curve:
         x, f = self.arguments, self.forces
         return [(f[i + 1] - f[i]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
 
-    def _piece_of(self, argument: float) -> int:
+    def _piece_of(self, travel_or_rate: float) -> int:
         """Index of the curve's straight piece that contains the argument; outer pieces extend to infinity."""
-        return bisect_right(self.arguments, argument, 1, len(self.arguments) - 1) - 1
+        return bisect_right(self.arguments, travel_or_rate, 1, len(self.arguments) - 1) - 1
 
 
 @dataclass(frozen=True)
@@ -344,35 +344,35 @@ class SpatialVehicle:
         """The vehicle with ``pushes_only`` set to this value for all tyres."""
         return replace(self, tyres=tuple(replace(tyre, pushes_only=pushes_only) for tyre in self.tyres))
 
-    def in_frame(self, frame: str) -> "SpatialVehicle":
-        """The vehicle in which every spring and bar without a frame gets the body ``frame`` as its frame."""
+    def in_frame(self, frame_body: str) -> "SpatialVehicle":
+        """The vehicle in which every spring and bar without a frame gets the body ``frame_body`` as its frame."""
         return replace(
             self,
-            springs=tuple(replace(spring, frame=spring.frame or frame) for spring in self.springs),
-            bars=tuple(replace(bar, frame=bar.frame or frame) for bar in self.bars),
+            springs=tuple(replace(spring, frame=spring.frame or frame_body) for spring in self.springs),
+            bars=tuple(replace(bar, frame=bar.frame or frame_body) for bar in self.bars),
         )
 
-    def body(self, name: str) -> Body:
+    def body(self, body_name: str) -> Body:
         """The body with this name; KeyError if there is none."""
-        return {body.name: body for body in self.bodies}[name]
+        return {body.name: body for body in self.bodies}[body_name]
 
-    def chain(self, name: str | None) -> tuple[str, ...]:
+    def chain(self, body_name: str | None) -> tuple[str, ...]:
         """Names of a body and of all bodies that carry it, down to the one without parent; empty for None, the
         ground."""
-        return () if name is None else (name, *self.chain(self.body(name).parent))
+        return () if body_name is None else (body_name, *self.chain(self.body(body_name).parent))
 
-    def towed_under(self, name: str | None) -> str | None:
+    def towed_under(self, body_name: str | None) -> str | None:
         """Name of the towed body that is, or carries, the given body; None if there is none."""
-        return next((body for body in self.chain(name) if body in self.towed), None)
+        return next((body for body in self.chain(body_name) if body in self.towed), None)
 
-    def turns(self, name: str | None) -> bool:
+    def turns(self, body_name: str | None) -> bool:
         """Whether a body can rotate, by its own freedoms or by those of bodies that carry it."""
-        return any(freedom.startswith("r") for body in self.chain(name) for freedom in self.body(body).freedoms)
+        return any(freedom.startswith("r") for body in self.chain(body_name) for freedom in self.body(body).freedoms)
 
 
-def hitch_of(towed: str) -> str:
+def hitch_of(towed_body: str) -> str:
     """Name of the massless body at the hitch of a towed body."""
-    return f"{towed} hitch"
+    return f"{towed_body} hitch"
 
 
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:

@@ -30,21 +30,20 @@ Gains = tuple[float, float]
 
 
 def linearise(
-    vehicle: SpatialVehicle, speed: float | None = None, equivalent: Mapping[str, Gains] | None = None
+    vehicle: SpatialVehicle, speed: float | None = None, equivalent_gains: Mapping[str, Gains] | None = None
 ) -> LinearVehicle:
     """Linear vehicle M q'' + D q' + K q = R z + S z' for small motion about the design position, unloaded without
     gravity, in equilibrium with it.
 
     speed : m/s, above 0, wanted by side forces and drag only; InputError where they miss it.
     Tyres that may leave the road are on it.
-    equivalent : stiffness (N/m) and damping (N s/m) that stand for springs of these names instead of their slopes at
-    rest, as statistical linearisation finds them; InputError for a name that no spring has.
-    """
+    equivalent_gains : stiffness (N/m) and damping (N s/m) that stand for springs of these names instead of their slopes
+    at rest, as statistical linearisation finds them; InputError for a name that no spring has."""
     motion = Kinematics(vehicle)
     gains = _gains(vehicle)
-    for name in set(equivalent or {}) - set(gains):
+    for name in set(equivalent_gains or {}) - set(gains):
         raise InputError(vehicle.name, "equivalent", name, "no such spring", tuple(gains))
-    gains |= equivalent or {}
+    gains |= equivalent_gains or {}
     tyres = _tyres(vehicle, motion)
     damping, stiffness = np.zeros((2, motion.size, motion.size))
     parts = _parts_by_name(vehicle, motion, gains)
@@ -77,11 +76,11 @@ def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
     return tuple(WheelPosition(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
-def outputs(vehicle: SpatialVehicle, motion: Kinematics) -> tuple[Output, ...]:
-    """``Output`` of every output of a vehicle: from the ``motion`` of points (possibly an engine's), and the slopes of
-    the springs at rest."""
-    parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
-    return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
+def outputs(vehicle: SpatialVehicle, kinematics: Kinematics) -> tuple[Output, ...]:
+    """``Output`` of every output of a vehicle: from the ``kinematics`` of points (possibly an engine's), and the slopes
+    of the springs at rest."""
+    parts, tyres = _parts_by_name(vehicle, kinematics, _gains(vehicle)), _tyres(vehicle, kinematics)
+    return tuple(_output(spec, vehicle, kinematics, parts, tyres) for spec in vehicle.outputs)
 
 
 def mass(vehicle: SpatialVehicle) -> np.ndarray:
@@ -152,77 +151,83 @@ def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
 
 
 def _parts_by_name(
-    vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]
+    vehicle: SpatialVehicle, kinematics: Kinematics, gains_by_name: Mapping[str, Gains]
 ) -> dict[str, DeformationRow]:
     """Rows and gains of a vehicle's spring-dampers, bars and joint elements, by name."""
     rows = dict[str, DeformationRow]()
     for spring in vehicle.springs:
-        ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
+        ends = kinematics.shift(spring.second_body, spring.second_point) - kinematics.shift(
             spring.first_body, spring.first_point
         )
         apart, turning = (
             np.subtract(spring.second_point, spring.first_point),
-            motion.turned_axis(spring.frame, spring.axis),
+            kinematics.turned_axis(spring.frame, spring.axis),
         )
-        rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
-    rows |= {bar.name: (_bar_twist_row(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
-    return rows | {e.name: (_joint_row(motion, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
+        rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains_by_name[spring.name]
+    rows |= {bar.name: (_bar_twist_row(kinematics, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
+    return rows | {e.name: (_joint_row(kinematics, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
 
 
-def _joint_row(motion: Kinematics, element: JointElement) -> np.ndarray:
+def _joint_row(kinematics: Kinematics, joint_element: JointElement) -> np.ndarray:
     """Row (n,) of the coordinates' factors in the displacement d of a joint element, which is linear in the
     coordinates."""
-    places = zip(element.coordinates, element.factors, strict=True)
-    return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
+    places = zip(joint_element.coordinates, joint_element.factors, strict=True)
+    return np.asarray(sum(factor * kinematics.coordinate(*place) for place, factor in places))
 
 
-def _bar_twist_row(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
+def _bar_twist_row(kinematics: Kinematics, bar: AntiRollBar) -> np.ndarray:
     """Row (n,) of the coordinates' factors in the twist angle of a bar, whose vertical direction turns with its
     frame."""
-    risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
-    turning = np.subtract(bar.point_right, bar.point_left) @ motion.turned_axis(bar.frame, (0.0, 0.0, 1.0))
-    rolls = 0.0 if bar.frame == bar.body else motion.coordinate(bar.body, "rx")
+    risen = kinematics.shift(bar.left, bar.point_left)[2] - kinematics.shift(bar.right, bar.point_right)[2]
+    turning = np.subtract(bar.point_right, bar.point_left) @ kinematics.turned_axis(bar.frame, (0.0, 0.0, 1.0))
+    rolls = 0.0 if bar.frame == bar.body else kinematics.coordinate(bar.body, "rx")
     return rolls - risen / bar.track + turning / bar.track
 
 
-def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, DeformationRow]:
-    return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
+def _tyres(vehicle: SpatialVehicle, kinematics: Kinematics) -> dict[str, DeformationRow]:
+    return {t.name: (kinematics.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
 
 
-def with_preloads(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
+def with_preloads(vehicle: SpatialVehicle, joint_preloads: Preloads) -> SpatialVehicle:
     """The vehicle with the preloads of its joint elements included in these."""
-    elements = tuple(replace(element, preload=preloads.parts[element.name]) for element in vehicle.joint_elements)
+    elements = tuple(replace(element, preload=joint_preloads.parts[element.name]) for element in vehicle.joint_elements)
     return replace(vehicle, joint_elements=elements)
 
 
-def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+def static_stiffness(vehicle: SpatialVehicle, kinematics: Kinematics) -> np.ndarray:
     """Stiffness (n, n) of springs, bars and tyres at rest, without gravity: N/m, N, N m."""
-    parts = (*_parts_by_name(vehicle, motion, _gains(vehicle)).values(), *_tyres(vehicle, motion).values())
+    parts = (*_parts_by_name(vehicle, kinematics, _gains(vehicle)).values(), *_tyres(vehicle, kinematics).values())
     return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
-def _geometric_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+def _geometric_stiffness(vehicle: SpatialVehicle, kinematics: Kinematics) -> np.ndarray:
     """Geometric stiffness (n, n) from weights and preloads whose lever arms change: -sum of force times second
     derivative."""
-    total = np.zeros((motion.size, motion.size))
+    total = np.zeros((kinematics.size, kinematics.size))
     if not vehicle.gravity:
         return total
     held = preloads(vehicle)
     for body in vehicle.bodies:
-        total += body.mass * vehicle.gravity * motion.second_derivatives(body.name, body.position)[2]
+        total += body.mass * vehicle.gravity * kinematics.second_derivatives(body.name, body.position)[2]
     for spring in vehicle.springs:
         ends = (spring.first_body, spring.first_point), (spring.second_body, spring.second_point)
-        total += held.parts[spring.name] * motion.travel_second_derivatives(*ends, spring.axis, spring.frame)
+        total += held.parts[spring.name] * kinematics.travel_second_derivatives(*ends, spring.axis, spring.frame)
     for bar in vehicle.bars:
         ends = (bar.left, bar.point_left), (bar.right, bar.point_right)
-        total += held.parts[bar.name] / bar.track * motion.travel_second_derivatives(*ends, (0.0, 0.0, 1.0), bar.frame)
+        total += (
+            held.parts[bar.name] / bar.track * kinematics.travel_second_derivatives(*ends, (0.0, 0.0, 1.0), bar.frame)
+        )
     for tyre in vehicle.tyres:
-        total -= held.tyres[tyre.name] * motion.second_derivatives(tyre.body, tyre.point)[2]
+        total -= held.tyres[tyre.name] * kinematics.second_derivatives(tyre.body, tyre.point)[2]
     return total
 
 
 def _add_speed_forces(
-    vehicle: SpatialVehicle, motion: Kinematics, speed: float | None, damping: np.ndarray, stiffness: np.ndarray
+    vehicle: SpatialVehicle,
+    kinematics: Kinematics,
+    speed: float | None,
+    damping_matrix: np.ndarray,
+    stiffness_matrix: np.ndarray,
 ) -> None:
     """Add the contributions of side forces and drag at a speed (m/s) to the damping and stiffness matrices in place."""
     if not vehicle.side_forces and not vehicle.drags:
@@ -231,14 +236,14 @@ def _add_speed_forces(
         allowed = "a vehicle with side forces or drag needs a speed above 0 m/s: its damping depends on it"
         raise InputError(vehicle.name, "speed", speed, allowed)
     for force in vehicle.side_forces:
-        sideways = motion.shift(force.body, force.point)[1]
-        roll, _, yaw = motion.turn(force.chassis)
+        sideways = kinematics.shift(force.body, force.point)[1]
+        roll, _, yaw = kinematics.turn(force.chassis)
         steered = force.roll_steer * roll + yaw
-        damping += force.stiffness / speed * np.outer(sideways, sideways)
-        stiffness -= force.stiffness * np.outer(sideways, steered)
+        damping_matrix += force.stiffness / speed * np.outer(sideways, sideways)
+        stiffness_matrix -= force.stiffness * np.outer(sideways, steered)
     for drag in vehicle.drags:
-        along = motion.shift(drag.body, vehicle.body(drag.body).position)[0]
-        damping += drag.coefficient * speed * np.outer(along, along)
+        along = kinematics.shift(drag.body, vehicle.body(drag.body).position)[0]
+        damping_matrix += drag.coefficient * speed * np.outer(along, along)
 
 
 UNITS = {
@@ -258,78 +263,82 @@ UNITS = {
 
 
 def _output(
-    spec: SpatialOutput,
+    wanted_output: SpatialOutput,
     vehicle: SpatialVehicle,
-    motion: Kinematics,
-    parts: Mapping[str, DeformationRow],
-    tyres: Mapping[str, DeformationRow],
+    kinematics: Kinematics,
+    part_rows: Mapping[str, DeformationRow],
+    tyre_rows: Mapping[str, DeformationRow],
 ) -> Output:
     """``Output`` with the factors of an output of the vehicle."""
-    rows = np.zeros((3, motion.size))  # of q, q', q''
+    rows = np.zeros((3, kinematics.size))  # of q, q', q''
     road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
-    unit, order = UNITS[spec.kind], 2 if "acceleration" in spec.kind else int("velocity" in spec.kind)
-    if isinstance(spec, PointOutput):
-        rows[order] = np.array(spec.axis) @ motion.shift(spec.body, spec.point)
-    elif isinstance(spec, TurnOutput):
-        rows[order] = np.array(spec.axis) @ motion.turn(spec.body)
-    elif isinstance(spec, PartOutput):
-        row, *force_gains = parts[spec.part]
-        gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": force_gains}[spec.kind]
+    unit, order = (
+        UNITS[wanted_output.kind],
+        2 if "acceleration" in wanted_output.kind else int("velocity" in wanted_output.kind),
+    )
+    if isinstance(wanted_output, PointOutput):
+        rows[order] = np.array(wanted_output.axis) @ kinematics.shift(wanted_output.body, wanted_output.point)
+    elif isinstance(wanted_output, TurnOutput):
+        rows[order] = np.array(wanted_output.axis) @ kinematics.turn(wanted_output.body)
+    elif isinstance(wanted_output, PartOutput):
+        row, *force_gains = part_rows[wanted_output.part]
+        gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": force_gains}[wanted_output.kind]
         rows[:2] = np.outer(gains, row)
         turning = {bar.name for bar in vehicle.bars} | {e.name for e in vehicle.joint_elements if _is_angle(e)}
-        if spec.part in turning:
+        if wanted_output.part in turning:
             unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
     else:
-        row, *force_gains = tyres[spec.tyre]
-        gains = {"tyre force": force_gains, "tyre deflection": (1.0, 0.0)}[spec.kind]
-        rows[:2], road[:, list(tyres).index(spec.tyre)] = -np.outer(gains, row), gains
-    return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
+        row, *force_gains = tyre_rows[wanted_output.tyre]
+        gains = {"tyre force": force_gains, "tyre deflection": (1.0, 0.0)}[wanted_output.kind]
+        rows[:2], road[:, list(tyre_rows).index(wanted_output.tyre)] = -np.outer(gains, row), gains
+    return Output(wanted_output.name, unit, wanted_output.kind, rows[2], rows[1], rows[0], road[0], road[1])
 
 
-def _is_angle(element: JointElement) -> bool:
+def _is_angle(joint_element: JointElement) -> bool:
     """Whether the displacement d of a joint element is an angle."""
-    return all(freedom.startswith("r") for _, freedom in element.coordinates)
+    return all(freedom.startswith("r") for _, freedom in joint_element.coordinates)
 
 
-def reduced_vehicle(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
+def reduced_vehicle(linear_vehicle: LinearVehicle, mass_matrix: np.ndarray, motion_matrix: np.ndarray) -> LinearVehicle:
     """Linear vehicle in the remaining coordinates r of a reduced vehicle, with q = N r; the mass matrix may be
     singular.
 
-    mass_matrix : (n, n) of ``mass_matrix_without``; N : (n, r) of ``remaining_motions``. InputError where no coordinate
-    is left."""
-    if not N.size:
+    mass_matrix : (n, n) of ``mass_matrix_without``; motion_matrix : (n, r) of ``remaining_motions``. InputError where
+    no coordinate is left."""
+    if not motion_matrix.size:
         raise InputError("", "effects", None, "nothing is left that could move")
-    moved = [factors @ N for factors in linear.read[:3]] if linear.outputs else [()] * 3
+    moved = [factors @ motion_matrix for factors in linear_vehicle.read[:3]] if linear_vehicle.outputs else [()] * 3
     outputs = tuple(
         Output(o.name, o.unit, o.kind, acceleration, rate, displacement, o.road_factors, o.road_rate_factors)
-        for o, acceleration, rate, displacement in zip(linear.outputs, *moved, strict=True)
+        for o, acceleration, rate, displacement in zip(linear_vehicle.outputs, *moved, strict=True)
     )
     return replace(
-        linear,
-        mass=N.T @ mass_matrix @ N,
-        damping=N.T @ linear.damping @ N,
-        stiffness=N.T @ linear.stiffness @ N,
-        road_stiffness=N.T @ linear.road_stiffness,
-        road_damping=N.T @ linear.road_damping,
-        coordinates=tuple(("", str(i)) for i in range(N.shape[1])),
+        linear_vehicle,
+        mass=motion_matrix.T @ mass_matrix @ motion_matrix,
+        damping=motion_matrix.T @ linear_vehicle.damping @ motion_matrix,
+        stiffness=motion_matrix.T @ linear_vehicle.stiffness @ motion_matrix,
+        road_stiffness=motion_matrix.T @ linear_vehicle.road_stiffness,
+        road_damping=motion_matrix.T @ linear_vehicle.road_damping,
+        coordinates=tuple(("", str(i)) for i in range(motion_matrix.shape[1])),
         outputs=outputs,
     )
 
 
-def mass_matrix_without(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
+def mass_matrix_without(vehicle: SpatialVehicle, massless_bodies: frozenset[str]) -> np.ndarray:
     """Mass matrix (n, n) of a vehicle without the mass of the given bodies; no rounding residue of them remains."""
     light = tuple(
-        replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
+        replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in massless_bodies else body
+        for body in vehicle.bodies
     )
     return mass(replace(vehicle, bodies=light))
 
 
-def remaining_motions(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+def remaining_motions(vehicle: SpatialVehicle, reduction_limits: Limits) -> np.ndarray:
     """Matrix N (n, r) of the motions that remain to a reduced vehicle: unit vectors where only coordinates are locked,
     else a basis of motions that leave the rigid springs' lengths unchanged."""
     coordinates = vehicle.coordinates()
-    kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
-    if not limits.rigid:
+    kept = np.eye(len(coordinates))[:, [c not in reduction_limits.locked for c in coordinates]]
+    if not reduction_limits.rigid:
         return kept
     motion = Kinematics(vehicle)
     rows = [
@@ -337,6 +346,6 @@ def remaining_motions(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
         @ (motion.shift(s.second_body, s.second_point) - motion.shift(s.first_body, s.first_point))
         @ kept
         for s in vehicle.springs
-        if s.name in limits.rigid
+        if s.name in reduction_limits.rigid
     ]
     return kept @ null_space(np.array(rows), rcond=NEGLIGIBLE_TRAVEL) if rows else kept

@@ -12,30 +12,30 @@ from models.vehicles.spatial_linear import mass
 GROUND = "the ground"
 
 
-def check_vehicle(vehicle: SpatialVehicle, file: str) -> None:
+def check_vehicle(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError with the name of the entry in the vehicle file that makes the vehicle impossible."""
-    _check_bodies(vehicle, file)
-    _check_connections(vehicle, file)
-    _check_inertia(vehicle, file)
-    _check_mobility(vehicle, file)
-    _check_towing(vehicle, file)
+    _check_bodies(vehicle, vehicle_file)
+    _check_connections(vehicle, vehicle_file)
+    _check_inertia(vehicle, vehicle_file)
+    _check_mobility(vehicle, vehicle_file)
+    _check_towing(vehicle, vehicle_file)
 
 
-def _check_bodies(vehicle: SpatialVehicle, file: str) -> None:
+def _check_bodies(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     for body in vehicle.bodies:
         place = f"bodies[{body.name}]"
         if len(set(body.freedoms)) < len(body.freedoms):
-            raise InputError(file, f"{place}.freedoms", list(body.freedoms), "a freedom is named twice")
+            raise InputError(vehicle_file, f"{place}.freedoms", list(body.freedoms), "a freedom is named twice")
         if not body.freedoms and body.parent is None:
-            raise InputError(file, f"{place}.freedoms", [], "a body that rides on no other needs a freedom")
+            raise InputError(vehicle_file, f"{place}.freedoms", [], "a body that rides on no other needs a freedom")
         tensor = np.array(body.inertia)
         least = float(np.linalg.eigvalsh(tensor).min())
         if least < -1e-12 * np.abs(tensor).max():
             said = f"the tensor is indefinite, its least principal inertia is {least:.6g} kg m^2: must be 0 or more"
-            raise InputError(file, f"{place}.inertia", tensor.tolist(), said)
+            raise InputError(vehicle_file, f"{place}.inertia", tensor.tolist(), said)
 
 
-def _check_connections(vehicle: SpatialVehicle, file: str) -> None:
+def _check_connections(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError unless springs, tyres and bars connect every body to the ground, and no moving body is held by
     its joint alone."""
     beside = defaultdict[str, set[str]](set)
@@ -56,7 +56,7 @@ def _check_connections(vehicle: SpatialVehicle, file: str) -> None:
     for body in vehicle.bodies:
         if body.name not in reached or (body.freedoms and body.name not in carried):
             said = "unconnected: no spring, mount, seat or tyre leads from this body to the road"
-            raise InputError(file, f"bodies[{body.name}]", None, said)
+            raise InputError(vehicle_file, f"bodies[{body.name}]", None, said)
 
 
 def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
@@ -67,40 +67,40 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
     return springs + tyres + bars + along
 
 
-def _check_inertia(vehicle: SpatialVehicle, file: str) -> None:
+def _check_inertia(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError unless every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
     definite."""
     matrix, coordinates = mass(vehicle), vehicle.coordinates()
     for (name, freedom), inertia in zip(coordinates, matrix.diagonal(), strict=True):
         if inertia <= 0:
             said = f"nothing inert moves with the freedom {freedom}: give an inertia or leave the freedom out"
-            raise InputError(file, f"bodies[{name}].inertia", None, said)
+            raise InputError(vehicle_file, f"bodies[{name}].inertia", None, said)
     scale = 1 / np.sqrt(matrix.diagonal())
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     if values[0] < 1e-10:
         name, freedom = coordinates[int(np.abs(vectors[:, 0]).argmax())]
         said = f"nothing inert moves with a mixture of freedoms, {freedom} of this body most of all"
-        raise InputError(file, f"bodies[{name}].inertia", None, said)
+        raise InputError(vehicle_file, f"bodies[{name}].inertia", None, said)
 
 
-def _check_mobility(vehicle: SpatialVehicle, file: str) -> None:
+def _check_mobility(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError unless every tyre can move vertically, and a chassis with side forces laterally."""
     motion = Kinematics(vehicle)
     for tyre in vehicle.tyres:
         if not motion.shift(tyre.body, tyre.point)[2].any():
-            raise InputError(file, f"tyres[{tyre.name}].body", tyre.body, "this body cannot move up and down")
+            raise InputError(vehicle_file, f"tyres[{tyre.name}].body", tyre.body, "this body cannot move up and down")
     for force in vehicle.side_forces:
         if not motion.shift(force.body, force.point)[1].any():
             said = "side force on a chassis that cannot move sideways: give it the freedom y, or leave it out"
-            raise InputError(file, f"tyres[{force.name}].cornering", force.stiffness, said)
+            raise InputError(vehicle_file, f"tyres[{force.name}].cornering", force.stiffness, said)
 
 
-def _check_towing(vehicle: SpatialVehicle, file: str) -> None:
+def _check_towing(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError unless every towed body, and the vehicle that tows it, has wheels."""
     on_wheels = {vehicle.towed_under(tyre.body) for tyre in vehicle.tyres}
     for name in vehicle.towed:
         if name not in on_wheels:
             said = "is towed without wheels: no tyre is on it, or on a body that rides on it"
-            raise InputError(file, f"bodies[{name}].hitch", None, said)
+            raise InputError(vehicle_file, f"bodies[{name}].hitch", None, said)
     if vehicle.towed and None not in on_wheels:
-        raise InputError(file, "tyres", [tyre.name for tyre in vehicle.tyres], "the towing vehicle has no tyre")
+        raise InputError(vehicle_file, "tyres", [tyre.name for tyre in vehicle.tyres], "the towing vehicle has no tyre")

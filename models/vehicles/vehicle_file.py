@@ -53,81 +53,85 @@ def shipped_vehicles() -> tuple[str, ...]:
 
 
 def load_vehicle(
-    name: str,
-    folder: str | Path = ".",
-    file: str = "",
-    place: str = "",
-    allows_reduced: bool = False,
+    vehicle_name: str,
+    scene_folder: str | Path = ".",
+    scene_path: str = "",
+    key_path: str = "",
+    allows_reduced_vehicle: bool = False,
     allows_towing: bool = False,
 ) -> SpatialVehicle:
-    """The unloaded vehicle that comes with twinrig under a name, or that a user's TOML file, relative to ``folder``,
-    describes.
+    """The unloaded vehicle that comes with twinrig under a name, or that a user's TOML file, relative to
+    ``scene_folder``, describes.
 
-    ``file`` and ``place`` say who asked for it, for the message if there is none. allows_reduced : may it have
-    [reduced]? allows_towing : may it tow bodies by a hitch? Raises InputError."""
-    path = vehicle_path(name, folder, file, place)
+    ``scene_path`` and ``key_path`` say who asked for it, for the message if there is none. allows_reduced_vehicle : may
+    it have [reduced]? allows_towing : may it tow bodies by a hitch? Raises InputError."""
+    path = vehicle_path(vehicle_name, scene_folder, scene_path, key_path)
     vehicle = build_vehicle(parse(path), path.name)
-    if vehicle.limits and not allows_reduced:
+    if vehicle.limits and not allows_reduced_vehicle:
         raise InputError(
-            file,
-            place,
-            name,
+            scene_path,
+            key_path,
+            vehicle_name,
             "has a table [reduced], which only the study ride of linear vehicles reads: name the whole vehicle here",
         )
     if vehicle.towed and not allows_towing:
         allowed = f"tows {vehicle.towed[0]!r} by a hitch, which only handling and braking drive: name a vehicle alone"
-        raise InputError(file, place, name, allowed)
+        raise InputError(scene_path, key_path, vehicle_name, allowed)
     return vehicle
 
 
-def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str = "") -> Path:
+def vehicle_path(vehicle_name: str, scene_folder: str | Path = ".", scene_path: str = "", key_path: str = "") -> Path:
     """Path of the file that ``load_vehicle`` reads for a vehicle. Raises InputError."""
-    if not name.endswith(".toml"):
-        if name not in shipped_vehicles():
+    if not vehicle_name.endswith(".toml"):
+        if vehicle_name not in shipped_vehicles():
             raise InputError(
-                file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped_vehicles()
+                scene_path,
+                key_path,
+                vehicle_name,
+                "no such vehicle; a file of your own ends in .toml or .xml",
+                shipped_vehicles(),
             )
-        return SHIPPED_FOLDER / f"{name}.toml"
-    return existing_file(name, Path(folder), file, place)
+        return SHIPPED_FOLDER / f"{vehicle_name}.toml"
+    return existing_file(vehicle_name, Path(scene_folder), scene_path, key_path)
 
 
-def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:
+def build_vehicle(file_table: Mapping[str, Any], vehicle_file: str) -> SpatialVehicle:
     """The vehicle from nested tables as a TOML file contains them. Raises InputError for the first fault."""
-    return _Builder(_read(table, file), file).vehicle()
+    return _Builder(_read(file_table, vehicle_file), vehicle_file).vehicle()
 
 
-def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
+def _read(file_table: Mapping[str, Any], vehicle_file: str) -> VehicleTable:
     """Checked tables of a vehicle file. An error inside a list of tables is reported with the name of the entry."""
     try:
-        return read(VehicleTable, table, file)
+        return read(VehicleTable, file_table, vehicle_file)
     except InputError as error:
         place = re.match(r"(\w+)\.(\d+)(?=\.|$)", error.place)
         if not place:
             raise
         section, number = place[1], int(place[2])
-        entry = table[section][number]
+        entry = file_table[section][number]
         name = entry.get("name") if isinstance(entry, Mapping) else None
         told = _key_path(section, name or number) + error.place[place.end() :]
-        raise InputError(file, told, error.value, error.allowed) from None
+        raise InputError(vehicle_file, told, error.value, error.allowed) from None
 
 
-def _key_path(table: str, entry_name: object, key: str = "") -> str:
-    return f"{table}[{entry_name}]" + (f".{key}" if key else "")
+def _key_path(table_name: str, entry_name: object, entry_key: str = "") -> str:
+    return f"{table_name}[{entry_name}]" + (f".{entry_key}" if entry_key else "")
 
 
 class _Builder:
     """Builder of the parts of a vehicle from the tables of a vehicle file."""
 
-    def __init__(self, tables: VehicleTable, file: str) -> None:
-        self.tables, self.file = tables, file
-        self._unique("bodies", [*tables.bodies, *tables.seats], reserved=(GROUND,))
-        self._unique("axles", tables.axles)
-        self._unique("tyres", tables.tyres)
-        self._unique("outputs", tables.outputs)
-        self.towed = tuple(body.name for body in tables.bodies if body.hitch is not None)
+    def __init__(self, vehicle_table: VehicleTable, vehicle_file: str) -> None:
+        self.tables, self.file = vehicle_table, vehicle_file
+        self._unique("bodies", [*vehicle_table.bodies, *vehicle_table.seats], reserved_names=(GROUND,))
+        self._unique("axles", vehicle_table.axles)
+        self._unique("tyres", vehicle_table.tyres)
+        self._unique("outputs", vehicle_table.outputs)
+        self.towed = tuple(body.name for body in vehicle_table.bodies if body.hitch is not None)
         self.bodies = self._bodies()
         self.axles = self._axles()
-        self.tyres = {tyre.name: self._tyre(tyre) for tyre in tables.tyres}
+        self.tyres = {tyre.name: self._tyre(tyre) for tyre in vehicle_table.tyres}
 
     def vehicle(self) -> SpatialVehicle:
         """The complete vehicle, after checks."""
@@ -165,24 +169,26 @@ class _Builder:
         locked = frozenset(place for place in places if list(place) in table.locked)
         return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
 
-    def _require(self, condition: Any, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
+    def _require(
+        self, condition: Any, key_path: str, wrong_value: Any, allowed_text: str, allowed_names: Sequence[str] = ()
+    ) -> None:
         """Raise InputError unless the condition ``condition`` holds."""
         if not condition:
-            raise InputError(self.file, place, value, allowed, tuple(choices))
+            raise InputError(self.file, key_path, wrong_value, allowed_text, tuple(allowed_names))
 
-    def _unique(self, table: str, entries: Sequence[Any], reserved: Sequence[str] = ()) -> None:
+    def _unique(self, table_name: str, entries: Sequence[Any], reserved_names: Sequence[str] = ()) -> None:
         names = [entry.name for entry in entries]
         for i, name in enumerate(names):
-            place = _key_path(table, name, "name")
-            self._require(name not in reserved, place, name, "this name means the ground: choose another")
+            place = _key_path(table_name, name, "name")
+            self._require(name not in reserved_names, place, name, "this name means the ground: choose another")
             self._require(name not in names[:i], place, name, "two entries have this name")
 
-    def _known_name(self, place: str, name: str, kind: str, choices: Sequence[str]) -> str:
-        self._require(name in choices, place, name, f"no such {kind}", choices)
-        return name
+    def _known_name(self, key_path: str, given_name: str, entry_kind: str, allowed_names: Sequence[str]) -> str:
+        self._require(given_name in allowed_names, key_path, given_name, f"no such {entry_kind}", allowed_names)
+        return given_name
 
-    def _body(self, place: str, name: str) -> str:
-        return self._known_name(place, name, "body", tuple(self.bodies))
+    def _body(self, key_path: str, body_name: str) -> str:
+        return self._known_name(key_path, body_name, "body", tuple(self.bodies))
 
     def _bodies(self) -> dict[str, Body]:
         """Bodies with parents before their children, otherwise in the order of the file; then the occupants of the
@@ -209,23 +215,28 @@ class _Builder:
             del waiting[ready.name]
         return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
 
-    def _hitch(self, body: Body, point: Vector) -> Body:
+    def _hitch(self, towed_body: Body, hitch_point: Vector) -> Body:
         """Massless body with the rotations of a towed body, at the point where its parent tows it."""
-        place, name = _key_path("bodies", body.name), hitch_of(body.name)
+        place, name = _key_path("bodies", towed_body.name), hitch_of(towed_body.name)
         self._require(
-            body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
+            towed_body.parent,
+            f"{place}.hitch",
+            list(hitch_point),
+            "nothing tows it: name the body that does as its parent",
         )
-        turns = "rz" in body.freedoms and all(freedom.startswith("r") for freedom in body.freedoms)
-        self._require(turns, f"{place}.freedoms", list(body.freedoms), "a towed body turns about its hitch: rz, rx, ry")
+        turns = "rz" in towed_body.freedoms and all(freedom.startswith("r") for freedom in towed_body.freedoms)
+        self._require(
+            turns, f"{place}.freedoms", list(towed_body.freedoms), "a towed body turns about its hitch: rz, rx, ry"
+        )
         names = [each.name for each in (*self.tables.bodies, *self.tables.seats)]
         self._require(name not in names, f"{place}.hitch", name, "is the name of another body: the hitch needs it")
-        return Body(name, 0.0, point, body.freedoms, parent=body.parent)
+        return Body(name, 0.0, hitch_point, towed_body.freedoms, parent=towed_body.parent)
 
-    def _towed_under(self, name: str | None) -> str | None:
+    def _towed_under(self, body_name: str | None) -> str | None:
         """Name of the towed body that is, or carries, the given body; None if there is none."""
-        while name is not None and name not in self.towed:
-            name = self.bodies[name].parent
-        return name
+        while body_name is not None and body_name not in self.towed:
+            body_name = self.bodies[body_name].parent
+        return body_name
 
     def _axles(self) -> dict[str, AxleTable]:
         """Axles by name, in order from the front; each must have a tyre."""
@@ -241,72 +252,74 @@ class _Builder:
             self._require(name in named, _key_path("axles", name), None, "no tyre names this axle")
         return axles
 
-    def _spring(self, spring: SpringTable) -> SpringDamper:
-        place = _key_path("springs", spring.name)
-        ends, points = self._two_bodies(place, spring.bodies), self._points(place, spring)
-        axis = self._axis(place, spring, points)
-        gains = spring.stiffness, spring.damping
-        acts = any((*gains, spring.friction, spring.travel_force, spring.rate_force))
+    def _spring(self, spring_table: SpringTable) -> SpringDamper:
+        place = _key_path("springs", spring_table.name)
+        ends, points = self._two_bodies(place, spring_table.bodies), self._points(place, spring_table)
+        axis = self._axis(place, spring_table, points)
+        gains = spring_table.stiffness, spring_table.damping
+        acts = any((*gains, spring_table.friction, spring_table.travel_force, spring_table.rate_force))
         self._require(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
-        travel, rate = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
+        travel, rate = (
+            self._curve(f"{place}.{key}", getattr(spring_table, key)) for key in ("travel_force", "rate_force")
+        )
         return SpringDamper(
-            spring.name,
+            spring_table.name,
             *ends,
             *points,
             axis,
             *gains,
             travel,
             rate,
-            spring.friction,
-            spring.friction_rate,
-            self._frame(place, spring.frame, ends),
+            spring_table.friction,
+            spring_table.friction_rate,
+            self._frame(place, spring_table.frame, ends),
         )
 
-    def _frame(self, place: str, name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
+    def _frame(self, key_path: str, frame_name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
         """Name of the body in which an axis is fixed: the body that the table names, else the towed body that carries
         both ends, if any."""
-        if name is not None:
-            return self._body(f"{place}.frame", name)
+        if frame_name is not None:
+            return self._body(f"{key_path}.frame", frame_name)
         first, second = map(self._towed_under, end_bodies)
         return first if first == second else None
 
-    def _two_bodies(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
+    def _two_bodies(self, key_path: str, body_names: Sequence[str]) -> tuple[str, str | None]:
         """Names of the two bodies that a part connects; None for the ground."""
-        (first, second), place = bodies, f"{place}.bodies"
-        self._require(first != second, place, bodies, "connects a body with itself")
-        self._require(first != GROUND, place, bodies, "name the ground second")
-        return self._body(place, first), None if second == GROUND else self._body(place, second)
+        (first, second), key_path = body_names, f"{key_path}.bodies"
+        self._require(first != second, key_path, body_names, "connects a body with itself")
+        self._require(first != GROUND, key_path, body_names, "name the ground second")
+        return self._body(key_path, first), None if second == GROUND else self._body(key_path, second)
 
-    def _points(self, place: str, spring: SpringTable) -> tuple[Vector, Vector]:
-        both = (spring.point is None) != (spring.points is None)
-        self._require(both, f"{place}.point", None, "give either point, the place of both ends, or points, both")
-        first, second = (spring.point, spring.point) if spring.points is None else spring.points
+    def _points(self, key_path: str, spring_table: SpringTable) -> tuple[Vector, Vector]:
+        both = (spring_table.point is None) != (spring_table.points is None)
+        self._require(both, f"{key_path}.point", None, "give either point, the place of both ends, or points, both")
+        first, second = (spring_table.point, spring_table.point) if spring_table.points is None else spring_table.points
         return _vector(first), _vector(second)
 
-    def _axis(self, place: str, spring: SpringTable, points: tuple[Vector, Vector]) -> Vector:
+    def _axis(self, key_path: str, spring_table: SpringTable, points: tuple[Vector, Vector]) -> Vector:
         """Unit vector of a spring's axis: the given direction, else from the second point to the first, else
         upwards."""
-        if spring.direction is not None:
-            return self._unit(f"{place}.direction", spring.direction)
+        if spring_table.direction is not None:
+            return self._unit(f"{key_path}.direction", spring_table.direction)
         apart = np.subtract(*points)
         distance = float(np.linalg.norm(apart))
         return _vector(apart / distance) if distance else (0.0, 0.0, 1.0)
 
-    def _unit(self, place: str, direction: Sequence[float]) -> Vector:
+    def _unit(self, key_path: str, direction: Sequence[float]) -> Vector:
         length = float(np.linalg.norm(direction))
-        self._require(length, place, list(direction), "a direction needs a length")
+        self._require(length, key_path, list(direction), "a direction needs a length")
         return _vector(np.array(direction) / length)
 
-    def _curve(self, place: str, table: CurveTable | None) -> Curve | None:
-        if table is None:
+    def _curve(self, key_path: str, curve_table: CurveTable | None) -> Curve | None:
+        if curve_table is None:
             return None
-        at, force = table.at, table.force
-        self._require(len(at) == len(force), f"{place}.force", force, f"must hold as many values as at, {len(at)}")
+        at, force = curve_table.at, curve_table.force
+        self._require(len(at) == len(force), f"{key_path}.force", force, f"must hold as many values as at, {len(at)}")
         rises = all(before < after for before, after in pairwise(at))
-        self._require(rises, f"{place}.at", at, "must rise from value to value")
+        self._require(rises, f"{key_path}.at", at, "must rise from value to value")
         curve = Curve(tuple(at), tuple(force))
         still = abs(curve(0.0)) <= 1e-9 * max(map(abs, force))
-        self._require(still, f"{place}.force", curve(0.0), "must be 0 N at 0: the design position is at rest")
+        self._require(still, f"{key_path}.force", curve(0.0), "must be 0 N at 0: the design position is at rest")
         return curve
 
     def _mounts(self) -> Iterator[SpringDamper]:
@@ -319,34 +332,34 @@ class _Builder:
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
                 yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
 
-    def _seat_spring(self, seat: SeatTable) -> SpringDamper:
+    def _seat_spring(self, seat_table: SeatTable) -> SpringDamper:
         """Spring of a seat, with the occupant as first and the carrier as second body, so that force is positive in
         compression."""
-        carrier = self._body(_key_path("seats", seat.name, "body"), seat.body)
-        at = _vector(seat.position)
-        law, frame = (seat.stiffness, seat.damping), self._towed_under(carrier)
-        return SpringDamper(seat.name, seat.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
+        carrier = self._body(_key_path("seats", seat_table.name, "body"), seat_table.body)
+        at = _vector(seat_table.position)
+        law, frame = (seat_table.stiffness, seat_table.damping), self._towed_under(carrier)
+        return SpringDamper(seat_table.name, seat_table.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
 
-    def _tyre(self, tyre: TyreTable) -> Tyre:
-        place, axle = _key_path("tyres", tyre.name), self.axles[tyre.axle]
-        x, y, z = self.bodies[self._body(f"{place}.body", tyre.body)].position
+    def _tyre(self, tyre_table: TyreTable) -> Tyre:
+        place, axle = _key_path("tyres", tyre_table.name), self.axles[tyre_table.axle]
+        x, y, z = self.bodies[self._body(f"{place}.body", tyre_table.body)].position
         allowed = f"its body lies at x = {x:g} m, its axle {axle.name!r} at {axle.x:g} m: they must agree"
-        self._require(abs(x - axle.x) <= 1e-9, f"{place}.axle", tyre.axle, allowed)
-        at, number = (axle.x, y if tyre.y is None else tyre.y, z), list(self.axles).index(tyre.axle)
-        return Tyre(tyre.name, tyre.body, at, number, tyre.stiffness, tyre.damping)
+        self._require(abs(x - axle.x) <= 1e-9, f"{place}.axle", tyre_table.axle, allowed)
+        at, number = (axle.x, y if tyre_table.y is None else tyre_table.y, z), list(self.axles).index(tyre_table.axle)
+        return Tyre(tyre_table.name, tyre_table.body, at, number, tyre_table.stiffness, tyre_table.damping)
 
-    def _bar(self, bar: BarTable) -> AntiRollBar:
-        place, names = _key_path("anti_roll_bars", bar.name), tuple(self.tyres)
-        body = self.bodies[self._body(f"{place}.body", bar.body)]
+    def _bar(self, bar_table: BarTable) -> AntiRollBar:
+        place, names = _key_path("anti_roll_bars", bar_table.name), tuple(self.tyres)
+        body = self.bodies[self._body(f"{place}.body", bar_table.body)]
         towed = body.name in self.towed
         rolls = towed or ("rx" in body.freedoms and body.parent is None)
         allowed = "needs a body with the freedom rx and without a parent, or a towed one"
-        self._require(rolls, f"{place}.body", bar.body, allowed)
-        left, right = (self.tyres[self._known_name(f"{place}.tyres", name, "tyre", names)] for name in bar.tyres)
+        self._require(rolls, f"{place}.body", bar_table.body, allowed)
+        left, right = (self.tyres[self._known_name(f"{place}.tyres", name, "tyre", names)] for name in bar_table.tyres)
         pair = left.axle == right.axle and left.point[1] > right.point[1]
-        self._require(pair, f"{place}.tyres", bar.tyres, "must be the left and the right tyre of one axle")
+        self._require(pair, f"{place}.tyres", bar_table.tyres, "must be the left and the right tyre of one axle")
         ends, frame = (left.body, right.body, left.point, right.point), body.name if towed else None
-        return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping, frame)
+        return AntiRollBar(bar_table.name, bar_table.body, *ends, bar_table.stiffness, bar_table.damping, frame)
 
     def _side_forces(self) -> tuple[SideForce, ...]:
         """Side forces of the tyres. They act on the chassis, which guides the wheels laterally."""
@@ -371,27 +384,27 @@ class _Builder:
             forces.append(SideForce(tyre.name, carrying, (x, y, 0.0), carrying, tyre.cornering, steer))
         return tuple(forces)
 
-    def _output(self, output: OutputTable, parts: tuple[str, ...]) -> SpatialOutput:
-        place, kind = _key_path("outputs", output.name), output.kind
+    def _output(self, output_table: OutputTable, part_names: tuple[str, ...]) -> SpatialOutput:
+        place, kind = _key_path("outputs", output_table.name), output_table.kind
         needed = "part" if kind in ("travel", "travel rate", "force") else "tyre" if "tyre" in kind else "body"
         foreign = {"part": "body point tyre", "tyre": "body point part", "body": "part tyre"}[needed].split()
         for key in foreign:
-            value = getattr(output, key)
+            value = getattr(output_table, key)
             self._require(value is None, f"{place}.{key}", value, f"{kind} is read of a {needed}")
-        name = getattr(output, needed)
+        name = getattr(output_table, needed)
         self._require(name is not None, f"{place}.{needed}", None, f"is missing: {kind} is read of a {needed}")
-        known = {"part": parts, "tyre": tuple(self.tyres), "body": tuple(self.bodies)}[needed]
+        known = {"part": part_names, "tyre": tuple(self.tyres), "body": tuple(self.bodies)}[needed]
         self._known_name(f"{place}.{needed}", name, needed, known)
         if needed != "body":
             read_of: Any = PartOutput if needed == "part" else TyreOutput
-            return read_of(output.name, kind, name)
-        axis = self._unit(f"{place}.direction", output.direction)
+            return read_of(output_table.name, kind, name)
+        axis = self._unit(f"{place}.direction", output_table.direction)
         if kind.startswith("ang"):
-            return TurnOutput(output.name, kind, name, axis)  # type: ignore[arg-type]
-        point = self.bodies[name].position if output.point is None else _vector(output.point)
-        return PointOutput(output.name, kind, name, point, axis)  # type: ignore[arg-type]
+            return TurnOutput(output_table.name, kind, name, axis)  # type: ignore[arg-type]
+        point = self.bodies[name].position if output_table.point is None else _vector(output_table.point)
+        return PointOutput(output_table.name, kind, name, point, axis)  # type: ignore[arg-type]
 
 
-def _vector(values: Any) -> Vector:
-    x, y, z = map(float, values)
+def _vector(components: Any) -> Vector:
+    x, y, z = map(float, components)
     return x, y, z

@@ -232,7 +232,7 @@ def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
     period = span / steps
     for axes in (1, 3):
         noise = np.zeros((steps, noise_path_count, 3))
-        noise[:, :, :axes] = normal_samples(SEED, axes, steps * noise_path_count, axes, source=GYRO).reshape(
+        noise[:, :, :axes] = normal_samples(SEED, axes, steps * noise_path_count, axes, noise_source=GYRO).reshape(
             steps, noise_path_count, axes
         )
         q = euler_quaternions(EQUAL_ANGLE_WALK * period**0.5 * noise, START_ATTITUDE)

@@ -156,7 +156,7 @@ def _noise_gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
-            noise = normal_samples(SEED, i, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
+            noise = normal_samples(SEED, i, sample_count, 15, noise_source=ACCELEROMETERS).reshape(sample_count, 5, 3)
             alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((sample_count, 3)))
             axis = int(np.argmax(array.noise_gains()))
             law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
@@ -307,9 +307,9 @@ def _turning_body(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarra
 
 def _noise_samples(noise_path: int, sample_count: int) -> np.ndarray:
     """Noise (n, 5, 3) in m/s^2 on the readings of five sensors."""
-    return NOISE_DEVIATION * normal_samples(SEED + 1, noise_path, sample_count, 15, source=ACCELEROMETERS).reshape(
-        sample_count, 5, 3
-    )
+    return NOISE_DEVIATION * normal_samples(
+        SEED + 1, noise_path, sample_count, 15, noise_source=ACCELEROMETERS
+    ).reshape(sample_count, 5, 3)
 
 
 def _random_walk_rows(noise_path_count: int) -> tuple[list[Row], dict[str, list[float]]]:

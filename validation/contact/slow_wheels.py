@@ -57,7 +57,7 @@ def end_positions(speed: float, method: str, step_count: int, with_slopes: bool 
     (wheels, start), calls = wheel_and_start(speed), [0]
     forces = Forces(wheels)
     slopes = forces.slopes if with_slopes and method in METHODS else None
-    rolling = Rolling(wheels, counting_calls(forces.of, calls), slopes=slopes)
+    rolling = Rolling(wheels, counting_calls(forces.of, calls), force_slopes=slopes)
     return rolling.run(*start, step_count, DURATION / step_count, method)[: wheels.size], calls[0]
 
 

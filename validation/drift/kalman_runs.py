@@ -105,11 +105,11 @@ def filter_consistency(
         deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
     )
     clean = assembly_of_scene(force_driven_scene(folder, duration, {}))
-    turn = START_DEVIATION * float(normal_samples(seed, 1, 1, 1, source=PITCH_SENSOR)[0, 0])
+    turn = START_DEVIATION * float(normal_samples(seed, 1, 1, 1, noise_source=PITCH_SENSOR)[0, 0])
     p, start = clean.parameters, clean.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
     states = free_run(replace(clean, initial=start), duration, COARSE_PERIOD)
-    measured_pitch = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
+    measured_pitch = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, noise_source=PITCH_SENSOR)[:, 0]
     noisy = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
     figures = {}
     for name, (q, r) in scales.items():
@@ -207,7 +207,7 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     )
     count = round(duration / COARSE_PERIOD) + 1
     write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
-    measured_pitch = start[3] + angle * normal_samples(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    measured_pitch = start[3] + angle * normal_samples(seed, 0, count, 1, noise_source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, COARSE_PERIOD)
     effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
     noise = force_noise_settings(deviation, seed)
@@ -240,7 +240,7 @@ def scores_of_stabilised(
     artificial moment, and largest pitch error (rad)."""
     true = measured_drive(folder, duration, 1e-3)
     measured_pitch = (
-        true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
+        true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, noise_source=PITCH_SENSOR)[:, 0]
     )
     write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, 1e-3)
     force = force_deviation(true)
@@ -293,7 +293,7 @@ def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str,
     )
     assembly = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
     clean = true.states
-    measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
+    measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, noise_source=PITCH_SENSOR)[:, 0]
     estimated = estimate_pitch(
         assembly, PitchMeasurement(measured_rate[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force
     )
@@ -328,7 +328,7 @@ def run_with_missing_samples(
         PITCH_RATE: deviation_at_period(GYRO_DEVIATION, COARSE_PERIOD),
     }
     clean = free_run(assembly_of_scene(force_driven_scene(folder, duration, {})), duration, COARSE_PERIOD)
-    noise = normal_samples(seed, 0, len(clean), 3, source=PITCH_SENSOR)
+    noise = normal_samples(seed, 0, len(clean), 3, noise_source=PITCH_SENSOR)
     lost = np.abs(noise[:, 2]) < random_gaps
     if outage is not None:
         lost[round(outage[0] / COARSE_PERIOD) : round(outage[1] / COARSE_PERIOD)] = True

@@ -38,7 +38,7 @@ UNIT_FACTORS = {
 def _stream_correlation() -> float:
     """Largest correlation between the noise streams of two paths and two sources, in standard errors."""
     streams = [
-        noise.normal_samples(3, path, noise.SAMPLES_PER_BLOCK, 1, source=source)[:, 0]
+        noise.normal_samples(3, path, noise.SAMPLES_PER_BLOCK, 1, noise_source=source)[:, 0]
         for path in (0, 1)
         for source in (noise.FORCES, noise.GYRO)
     ]
@@ -56,7 +56,7 @@ def _variance_error() -> float:
 
 def _stream_difference() -> float:
     """Largest difference between a noise stream read in two pieces and read at once."""
-    parts = [noise.normal_samples(3, 0, 50, 1, first=first) for first in (0, 50)]
+    parts = [noise.normal_samples(3, 0, 50, 1, first_sample=first) for first in (0, 50)]
     return float(np.abs(np.concatenate(parts) - noise.normal_samples(3, 0, 100, 1)).max())
 
 

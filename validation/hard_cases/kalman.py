@@ -40,7 +40,7 @@ def _largest_pitch_error(
     base = vehicle()
     forces = static_forces(base, count, SAMPLE_PERIOD, is_held=False).values
     write_wheel_forces(folder, forces[:, 0], forces[:, 1], SAMPLE_PERIOD)
-    measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, noise_source=PITCH_SENSOR)[:, 0]
     measured_pitch[lost_samples] = np.nan
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, SAMPLE_PERIOD)
     p, start = base.parameters, base.initial.copy()
@@ -97,7 +97,7 @@ def certain_start_error(engine: str, folder: Path) -> float:
             update={"run": assembly.scene.run.model_copy(update={"duration": count * SAMPLE_PERIOD})}
         ),
     )
-    measured_pitch = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
+    measured_pitch = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, noise_source=PITCH_SENSOR)
     estimated = estimate_pitch(
         assembly, PitchMeasurement(measured_pitch, SAMPLE_PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0
     )

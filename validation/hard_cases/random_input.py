@@ -58,13 +58,13 @@ def stream_correlation(implementation: str, folder: Path) -> float:
     """Case: noise streams of several seeds, paths and sources. Error: largest correlation between two streams, divided
     by the size that chance allows among so many pairs."""
     paths = [
-        normal_samples(seed, path, SAMPLES_PER_BLOCK, 1, source=source)[:, 0]
+        normal_samples(seed, path, SAMPLES_PER_BLOCK, 1, noise_source=source)[:, 0]
         for seed in (0, 1)
         for path in (0, 1)
         for source in (FORCES, GYRO, ROAD)
     ]
     paths += [
-        normal_samples(0, 0, SAMPLES_PER_BLOCK, 1, first=SAMPLES_PER_BLOCK)[:, 0],
+        normal_samples(0, 0, SAMPLES_PER_BLOCK, 1, first_sample=SAMPLES_PER_BLOCK)[:, 0],
         *normal_samples(5, 0, SAMPLES_PER_BLOCK, 2).T,
     ]
     worst = max(
@@ -88,7 +88,7 @@ def stream_piece_error(implementation: str, folder: Path) -> float:
             3 * SAMPLES_PER_BLOCK,
         ],
     )
-    parts = [normal_samples(9, 4, end - start, 3, first=start) for start, end in reversed(list(pairwise(edges)))]
+    parts = [normal_samples(9, 4, end - start, 3, first_sample=start) for start, end in reversed(list(pairwise(edges)))]
     return float(np.abs(np.concatenate(parts[::-1]) - complete_stream).max())
 
 

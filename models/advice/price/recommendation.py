@@ -219,7 +219,7 @@ def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: i
     """Processor seconds of each setting in every one of ``round_count`` interleaved rounds."""
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
-    seconds_by_setting = interleave(jobs, round_count, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
+    seconds_by_setting = interleave(jobs, round_count, SHORTEST_TURN, warm_up_times=lasted, clock=time.process_time)
     return dict(zip((attempt.setting for attempt in rivals), seconds_by_setting, strict=True))
 
 

@@ -343,7 +343,7 @@ def _timed_points(
     round_intervals = [interval_of_slow if seconds > SLOW_RUN_SECONDS else 1 for seconds in lasted]
     jobs = [partial(run, p.setting) for p in points]
     timed = interleave(
-        jobs, round_count, minimum_seconds, lasted=lasted, round_interval=round_intervals, clock=PROCESSOR_CLOCK
+        jobs, round_count, minimum_seconds, warm_up_times=lasted, round_interval=round_intervals, clock=PROCESSOR_CLOCK
     )
     return {
         p.setting: replace(

@@ -39,18 +39,18 @@ class Net(NamedTuple):
 
 
 @cache
-def net(cells: int) -> Net:
-    """Grid of a contact patch with an even number of strips of equal width, at least ``cells``, and ``cells`` cells in
-    each."""
-    count = cells + cells % 2
+def net(cell_count: int) -> Net:
+    """Grid of a contact patch with an even number of strips of equal width, at least ``cell_count``, and ``cell_count``
+    cells in each."""
+    count = cell_count + cell_count % 2
     y = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    centre = 1.0 - (2.0 * np.arange(cells) + 1.0) / cells
-    middle = 1.0 - 2.0 * np.arange(cells) / cells
-    middle[0] = 1.0 - 0.5 / cells
+    centre = 1.0 - (2.0 * np.arange(cell_count) + 1.0) / cell_count
+    middle = 1.0 - 2.0 * np.arange(cell_count) / cell_count
+    middle[0] = 1.0 - 0.5 / cell_count
     bound, half = 1.0 - centre**2, np.sqrt(1.0 - y**2)
     share = (1.0 - y**2) * half
     carried = share.sum() * bound.sum()
-    return Net(y, half, share / carried, centre, middle, bound, 1.0 - middle**2, cells * count / (4.0 * carried))
+    return Net(y, half, share / carried, centre, middle, bound, 1.0 - middle**2, cell_count * count / (4.0 * carried))
 
 
 class Patch(NamedTuple):
@@ -64,39 +64,45 @@ class Patch(NamedTuple):
     stiffness: np.ndarray
 
 
-def tyre_forces(patch: Patch, sliding: np.ndarray, cells: int) -> np.ndarray:
+def tyre_forces(contact_patches: Patch, sliding_velocities: np.ndarray, cell_count: int) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m) on w tyres, (w, 3).
 
-    sliding (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
+    sliding_velocities (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
     """
-    tread = sliding[:, 3]
-    ahead = _forward_rolling_forces(patch, sliding[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cells)
+    tread = sliding_velocities[:, 3]
+    ahead = _forward_rolling_forces(
+        contact_patches, sliding_velocities[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cell_count
+    )
     if (tread >= FADING_SPEED).all():
         return ahead
-    mirrored = sliding[:, :3] * np.array([-1.0, 1.0, -1.0])
-    behind = _forward_rolling_forces(patch, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cells) * np.array(
-        [-1.0, 1.0, -1.0]
-    )
+    mirrored = sliding_velocities[:, :3] * np.array([-1.0, 1.0, -1.0])
+    behind = _forward_rolling_forces(
+        contact_patches, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cell_count
+    ) * np.array([-1.0, 1.0, -1.0])
     part = np.clip(0.5 + 0.5 * tread / FADING_SPEED, 0.0, 1.0)[:, None]
     mixed: np.ndarray = part * ahead + (1.0 - part) * behind
     return mixed
 
 
-def cornering_factor(cells: int) -> float:
+def cornering_factor(cell_count: int) -> float:
     """Ratio, near 8/3, of the cornering stiffness without sliding to a^2 b k (half length a, half width b, bristle
     stiffness k) on the grid of cells."""
     ones = np.ones(1)
-    return -float(tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cells)[0, 1])
+    return -float(
+        tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cell_count)[0, 1]
+    )
 
 
-def _forward_rolling_forces(patch: Patch, sliding: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
+def _forward_rolling_forces(
+    contact_patches: Patch, sliding_velocities: np.ndarray, rolling_speeds: np.ndarray, cell_count: int
+) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m), (w, 3), of tyres that roll forwards."""
-    of = net(cells)
-    a, b = patch.half_length[:, None], patch.half_width[:, None]
-    grip, area = patch.mu * patch.load, patch.half_length * patch.half_width
-    stretch = 2.0 / cells * patch.stiffness * patch.half_length * area
+    of = net(cell_count)
+    a, b = contact_patches.half_length[:, None], contact_patches.half_width[:, None]
+    grip, area = contact_patches.mu * contact_patches.load, contact_patches.half_length * contact_patches.half_width
+    stretch = 2.0 / cell_count * contact_patches.stiffness * contact_patches.half_length * area
     gain = np.divide(stretch, of.peak * grip, out=np.zeros(len(a)), where=grip > 0.0)  # of a slip per bound and cell
-    x, y, spin = (sliding / speed[:, None] * gain[:, None]).T[:, :, None]
+    x, y, spin = (sliding_velocities / rolling_speeds[:, None] * gain[:, None]).T[:, :, None]
     across = of.half / (1.0 - of.y**2)
     slip = (across * (x - spin * b * of.y) + 1j * across * y).ravel()
     turning = 1j * (across * spin * a * of.half).ravel()
@@ -106,53 +112,57 @@ def _forward_rolling_forces(patch: Patch, sliding: np.ndarray, speed: np.ndarray
     return np.column_stack([(force * pulled.real).sum(1), (force * pulled.imag).sum(1), moment.sum(1)])
 
 
-def _march(net: Net, slip: np.ndarray, slip_slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _march(patch_grid: Net, slip_per_cell: np.ndarray, slip_gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sums over the cells of each strip, from the leading edge on: of tractions (complex), and of position times
     lateral traction.
 
-    slip, slip_slope : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
-    """
-    traction, slides = _limited(-0.5 * (slip + slip_slope * net.middle[0]), net.bound[0])
-    pulled, twisted, turn = traction.copy(), net.centre[0] * traction.imag, -2.0 * slip_slope / len(net.centre)
-    for i in range(1, len(net.centre)):
-        w = slip + slip_slope * net.middle[i]
+    slip_per_cell, slip_gradient : rigid slip per cell in a strip's middle, along + i across, and its change by the
+    place."""
+    traction, slides = _limited(-0.5 * (slip_per_cell + slip_gradient * patch_grid.middle[0]), patch_grid.bound[0])
+    pulled, twisted, turn = (
+        traction.copy(),
+        patch_grid.centre[0] * traction.imag,
+        -2.0 * slip_gradient / len(patch_grid.centre),
+    )
+    for i in range(1, len(patch_grid.centre)):
+        w = slip_per_cell + slip_gradient * patch_grid.middle[i]
         traction, slides = _next_tractions(
-            traction, slides, w, turn, (net.bound[i], net.bound[i - 1], net.bound_between[i])
+            traction, slides, w, turn, (patch_grid.bound[i], patch_grid.bound[i - 1], patch_grid.bound_between[i])
         )
         pulled += traction
-        twisted += net.centre[i] * traction.imag
+        twisted += patch_grid.centre[i] * traction.imag
     return pulled, twisted
 
 
-def _limited(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+def _limited(tractions: np.ndarray, friction_bound: float) -> tuple[np.ndarray, np.ndarray]:
     """Tractions limited to the friction bound, and flags of those that exceeded it."""
-    size = np.abs(traction)
-    beyond = size > bound
-    return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond
+    size = np.abs(tractions)
+    beyond = size > friction_bound
+    return np.where(beyond, friction_bound * tractions / np.where(beyond, size, 1.0), tractions), beyond
 
 
 def _next_tractions(
     tractions_before: np.ndarray,
-    slides: np.ndarray,
-    slip: np.ndarray,
+    is_sliding: np.ndarray,
+    slip_per_cell: np.ndarray,
     slip_change: np.ndarray,
-    bounds: tuple[float, float, float],
+    friction_bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tractions in the next cell, and flags of the bristles that slide there. bounds: in that cell, in the one before,
     and between them."""
-    bound, last, between = bounds
-    stuck = tractions_before - slip
+    bound, last, between = friction_bounds
+    stuck = tractions_before - slip_per_cell
     after, beyond = _limited(stuck, bound)
-    if not (slides & beyond).any():
+    if not (is_sliding & beyond).any():
         return after, beyond
-    z = (np.abs(slip.real) + np.abs(slip.imag)) / (8.0 * between)
-    slip = slip + slip_change * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
-    size = np.abs(slip)
-    turns = slides & beyond & (size * size > NEGLIGIBLE_SLIP)
+    z = (np.abs(slip_per_cell.real) + np.abs(slip_per_cell.imag)) / (8.0 * between)
+    slip_per_cell = slip_per_cell + slip_change * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
+    size = np.abs(slip_per_cell)
+    turns = is_sliding & beyond & (size * size > NEGLIGIBLE_SLIP)
     size = np.where(turns, size, 1.0)
     h = np.minimum(size / (8.0 * between), LARGEST_EXPONENT)
     grown = (1.0 + h * (1.0 + h * (0.5 + h / 6.0))) ** 8
-    angle = tractions_before * np.conj(-slip)
+    angle = tractions_before * np.conj(-slip_per_cell)
     half = grown * (last * MARGIN * size + angle.real) + 1j * angle.imag
-    turned = bound * (-slip / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
+    turned = bound * (-slip_per_cell / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
     return np.where(turns, turned, after), beyond

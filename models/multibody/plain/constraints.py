@@ -41,8 +41,10 @@ class Gap(NamedTuple):
 class PlainConstraints:
     """Linear constraints rows q = offsets with rows (r, n) and offsets (r,), and joints between bodies."""
 
-    def __init__(self, bodies: Bodies, rows: np.ndarray, offsets: np.ndarray, joints: Sequence[Joint]) -> None:
-        self._bodies, self._rows, self._offsets = bodies, rows, offsets
+    def __init__(
+        self, bodies: Bodies, coupling_rows: np.ndarray, coupling_offsets: np.ndarray, joints: Sequence[Joint]
+    ) -> None:
+        self._bodies, self._rows, self._offsets = bodies, coupling_rows, coupling_offsets
         self._ends = bodies.points([end for ends, _ in joints for end in ends])
         turns = [(ends, axes) for ends, axes in joints if axes is not None]
         self._turns = [([bodies.row[name] if name else GROUND for name, _ in ends], axes) for ends, axes in turns]
@@ -62,18 +64,18 @@ class PlainConstraints:
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
         return Gap(size, np.vstack((self._rows, apart[FIRST_DERIVATIVE:].T, *(each.jacobian for each in turned))))
 
-    def _point_vectors(self, motion: PlainMotion) -> np.ndarray:
+    def _point_vectors(self, body_motion: PlainMotion) -> np.ndarray:
         """Vectors between the two points of each of p constraints, with their rates and derivatives, (3 + n, 3 p), rows
         as in a ``PlainMotion``."""
-        ends = motion.at(self._ends)
-        apart: np.ndarray = (ends[1::2] - ends[::2]).transpose(1, 0, 2).reshape(len(motion.matrices[0]), -1)
+        ends = body_motion.at(self._ends)
+        apart: np.ndarray = (ends[1::2] - ends[::2]).transpose(1, 0, 2).reshape(len(body_motion.matrices[0]), -1)
         return apart
 
-    def _joint_axes(self, motion: PlainMotion) -> Iterator[list[np.ndarray]]:
+    def _joint_axes(self, body_motion: PlainMotion) -> Iterator[list[np.ndarray]]:
         """Axes of both bodies of each joint as columns, with their rates and derivatives, (3 + n, 3, 3) for each
         body."""
         for rows, axes in self._turns:
-            yield [motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
+            yield [body_motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
 
 
 def _products(first_axes: np.ndarray, second_axes: np.ndarray) -> np.ndarray:
@@ -98,12 +100,12 @@ def rotation_gap(first_axes: np.ndarray, second_axes: np.ndarray) -> Gap:
     return Gap(Rotation.from_matrix(turn).as_rotvec(), _rotation_vectors(change @ turn.T))
 
 
-def turning_rows(axes: np.ndarray) -> np.ndarray:
-    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space; ``axes`` : the body's axes in
-    a ``PlainMotion``."""
-    return _rotation_vectors(axes[FIRST_DERIVATIVE:] @ axes[PLACE].T)
+def turning_rows(body_axes: np.ndarray) -> np.ndarray:
+    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space; ``body_axes`` : the body's
+    axes in a ``PlainMotion``."""
+    return _rotation_vectors(body_axes[FIRST_DERIVATIVE:] @ body_axes[PLACE].T)
 
 
-def _rotation_vectors(rates: np.ndarray) -> np.ndarray:
+def _rotation_vectors(skew_matrices: np.ndarray) -> np.ndarray:
     """Rotation vectors (3, n) of n skew-symmetric matrices (3, 3)."""
-    return np.array((rates[:, 2, 1], rates[:, 0, 2], rates[:, 1, 0]))
+    return np.array((skew_matrices[:, 2, 1], skew_matrices[:, 0, 2], skew_matrices[:, 1, 0]))

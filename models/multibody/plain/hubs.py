@@ -38,8 +38,10 @@ class PlainHubs:
     any_time : whether the hub inputs are read between its rows, too, for methods that pick their own steps.
     """
 
-    def __init__(self, vehicle: CutVehicle, hub_inputs: "HubInputs", step: float, any_time: bool = False) -> None:
-        self.vehicle, self.hub_inputs, self.step, self.any_time = vehicle, hub_inputs, step, any_time
+    def __init__(
+        self, vehicle: CutVehicle, hub_inputs: "HubInputs", time_step: float, reads_any_time: bool = False
+    ) -> None:
+        self.vehicle, self.hub_inputs, self.step, self.any_time = vehicle, hub_inputs, time_step, reads_any_time
         self.bodies = Bodies(vehicle.tree)
         self.parts = PlainParts(self.bodies, vehicle.uncut, vehicle.chassis)
         self.held, self.loads = preloads_at_rest(vehicle.uncut, vehicle.chassis)
@@ -79,9 +81,12 @@ class PlainHubs:
         first = min(2 * int(max(place, 0.0) // 2), last - 2)
         part = min(max(place - first, 0.0), 2.0)
 
-        def between(rows: np.ndarray) -> np.ndarray:
-            slope, bend = np.diff(rows[first : first + 2], axis=0)[0], np.diff(rows[first : first + 3], 2, axis=0)[0]
-            value: np.ndarray = rows[first] + part * slope + 0.5 * part * (part - 1.0) * bend
+        def between(input_rows: np.ndarray) -> np.ndarray:
+            slope, bend = (
+                np.diff(input_rows[first : first + 2], axis=0)[0],
+                np.diff(input_rows[first : first + 3], 2, axis=0)[0],
+            )
+            value: np.ndarray = input_rows[first] + part * slope + 0.5 * part * (part - 1.0) * bend
             return value
 
         return between(self.hub_inputs.hubs), None if self.hub_inputs.guide is None else between(self.hub_inputs.guide)
@@ -95,54 +100,77 @@ class PlainHubs:
         rows = [self.at(float(t), *np.split(state, 2)) for t, state in zip(times, states, strict=True)]
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
-    def _hub_forces(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _hub_forces(
+        self, body_motion: PlainMotion, hub_loads: np.ndarray, q: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of all hubs for one row of the hub inputs, and the hubs' wrenches (h, 6)."""
-        points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
+        points, total, wrenches = (
+            body_motion.at(self._hubs),
+            np.zeros(self.bodies.size),
+            np.empty((len(self.loads), WRENCH)),
+        )
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
-            axes = motion.axes(int(frame))[PLACE]
+            axes = body_motion.axes(int(frame))[PLACE]
             if self.hub_inputs.road:
-                force, moment = self._tyre_wrench(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
+                force, moment = self._tyre_wrench(i, point, body_motion, (hub_loads[i], hub_loads[len(points) + i]), q)
                 wrenches[i] = np.concatenate((force @ axes, moment @ axes))
             else:
-                wrenches[i] = hubs[WRENCH * i : WRENCH * (i + 1)]
+                wrenches[i] = hub_loads[WRENCH * i : WRENCH * (i + 1)]
                 force, moment = axes @ wrenches[i, :3], axes @ wrenches[i, 3:]
-            total += point[FIRST_DERIVATIVE:] @ force + motion.moment_forces(int(self._hubs.rows[i]), moment)
+            total += point[FIRST_DERIVATIVE:] @ force + body_motion.moment_forces(int(self._hubs.rows[i]), moment)
         return total, wrenches
 
     def _tyre_wrench(
-        self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
+        self,
+        hub_index: int,
+        hub_position: np.ndarray,
+        body_motion: PlainMotion,
+        road_height_and_rate: tuple[float, float],
+        q: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) and moment (N m), in space, on hub i from its tyre, on a road with height (m) and vertical velocity
         (m/s)."""
-        tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
-        height, rising = road
-        down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
-        spin = motion.axes(int(self._hubs.rows[i]))
-        sideways = (hub[RATE] + spin[RATE] @ (spin[PLACE].T @ down))[1]
-        elastic, grip = self.loads[i] + tyre.stiffness * (height - (hub[PLACE, 2] - tyre.point[2])), 1.0
-        load = elastic + tyre.damping * (rising - hub[RATE, 2])
+        tyre, (cornering, roll_steer), speed = (
+            self.vehicle.uncut.tyres[hub_index],
+            self._sides[hub_index],
+            self.hub_inputs.speed,
+        )
+        height, rising = road_height_and_rate
+        down = -tyre.point[2] * body_motion.axes(self._chassis)[PLACE][:, 2]
+        spin = body_motion.axes(int(self._hubs.rows[hub_index]))
+        sideways = (hub_position[RATE] + spin[RATE] @ (spin[PLACE].T @ down))[1]
+        elastic, grip = (
+            self.loads[hub_index] + tyre.stiffness * (height - (hub_position[PLACE, 2] - tyre.point[2])),
+            1.0,
+        )
+        load = elastic + tyre.damping * (rising - hub_position[RATE, 2])
         if tyre.pushes_only:
             load = max(min(load, 2.0 * elastic), 0.0)
-            grip = load / self.loads[i]
+            grip = load / self.loads[hub_index]
         side = grip * cornering * (roll_steer * q[ROLL] + q[HEADING] - sideways / speed)
         return np.array([-load * rising / speed, side, load]), side * np.array([-down[2], 0.0, down[0]])
 
     def _guide_accelerations(
-        self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
+        self,
+        mass_matrix: np.ndarray,
+        generalised_forces: np.ndarray,
+        wanted_roll_and_pitch: np.ndarray | None,
+        q: np.ndarray,
+        v: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its prescribed
         angles or enforce them."""
         hub_inputs, moments = self.hub_inputs, np.zeros(2)
-        if guide is None:
-            return np.linalg.solve(mass, force), moments
-        wanted, rates, accelerations = guide.reshape(3, 2)
+        if wanted_roll_and_pitch is None:
+            return np.linalg.solve(mass_matrix, generalised_forces), moments
+        wanted, rates, accelerations = wanted_roll_and_pitch.reshape(3, 2)
         off, late = wanted - q[ROLL_AND_PITCH], rates - v[ROLL_AND_PITCH]
         if hub_inputs.pull:
             moments = np.array(hub_inputs.pull[0::2]) * off + np.array(hub_inputs.pull[1::2]) * late
-            force[ROLL_AND_PITCH] += moments
-            return np.linalg.solve(mass, force), moments
+            generalised_forces[ROLL_AND_PITCH] += moments
+            return np.linalg.solve(mass_matrix, generalised_forces), moments
         wanted = accelerations + 2.0 * hub_inputs.enforcing_rate * late + hub_inputs.enforcing_rate**2 * off
-        picks = np.eye(len(force))[ROLL_AND_PITCH]
-        system = np.block([[mass, -picks.T], [picks, np.zeros((2, 2))]])
-        both = np.linalg.solve(system, np.concatenate((force, wanted)))
+        picks = np.eye(len(generalised_forces))[ROLL_AND_PITCH]
+        system = np.block([[mass_matrix, -picks.T], [picks, np.zeros((2, 2))]])
+        both = np.linalg.solve(system, np.concatenate((generalised_forces, wanted)))
         return both[:-2], both[-2:]

@@ -96,9 +96,9 @@ class PlainTree:
         force[self._rubbing] -= self._friction * np.clip(v[self._rubbing] / self._slides, -1.0, 1.0)
         return mass + self._rows.T * self._inertia @ self._rows, force
 
-    def _line_spring_forces(self, motion: PlainMotion) -> np.ndarray:
+    def _line_spring_forces(self, body_motion: PlainMotion) -> np.ndarray:
         """Generalised forces (n,) of springs between two points: -F dl/dq, with l the distance between the points."""
-        total, ends = np.zeros(self.size), motion.at(self._ends)
+        total, ends = np.zeros(self.size), body_motion.at(self._ends)
         for (_, stiffness, damping, length), first, second in zip(self._lines, ends[::2], ends[1::2], strict=True):
             apart = second - first
             distance = float(np.linalg.norm(apart[PLACE]))
@@ -107,12 +107,12 @@ class PlainTree:
             total -= (stiffness * (distance - length) + damping * rate) * gradient
         return total
 
-    def _turning_resistance(self, turn: TurningSpring, motion: PlainMotion, v: np.ndarray) -> np.ndarray:
+    def _turning_resistance(self, turning_spring: TurningSpring, body_motion: PlainMotion, v: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a rotational spring-damper between two bodies, positive against the direction in
         which they act."""
-        bodies, axes, stiffness, damping = turn
+        bodies, axes, stiffness, damping = turning_spring
         rows = [self.bodies.row[name] if name else GROUND for name in bodies]
-        first, second = (motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True))
+        first, second = (body_motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True))
         size, gains = rotation_gap(first, second)
         resistance: np.ndarray = gains.T @ (stiffness * size + damping * (gains @ v))
         return resistance

@@ -50,29 +50,31 @@ class PlainMotion:
 
     matrices: np.ndarray
 
-    def at(self, points: Points) -> np.ndarray:
+    def at(self, body_points: Points) -> np.ndarray:
         """Motion (p, 3 + n, 3) of points in space: position (m), velocity, acceleration without the q'' terms, then
         derivatives by q."""
-        rows = self.matrices[points.rows]
+        rows = self.matrices[body_points.rows]
         count = rows.shape[1]
-        return np.matmul(rows.reshape(len(rows), 3 * count, 4), points.arms[:, :, None]).reshape(len(rows), count, 3)
+        return np.matmul(rows.reshape(len(rows), 3 * count, 4), body_points.arms[:, :, None]).reshape(
+            len(rows), count, 3
+        )
 
-    def axes(self, row: int) -> np.ndarray:
+    def axes(self, body_index: int) -> np.ndarray:
         """Axes of a body as columns, their rates, second derivatives without the q'' terms, and derivatives by q: (3 +
         n, 3, 3), in this order."""
-        axes: np.ndarray = self.matrices[row, :, :, :3]
+        axes: np.ndarray = self.matrices[body_index, :, :, :3]
         return axes
 
-    def angular_velocity(self, row: int) -> np.ndarray:
+    def angular_velocity(self, body_index: int) -> np.ndarray:
         """Angular velocity (3,) in rad/s of a body in space: half the sum of the products axis x rate of axis."""
-        axes = self.axes(row)
+        axes = self.axes(body_index)
         spin = axes[RATE] @ axes[PLACE].T
         return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2.0
 
-    def moment_forces(self, row: int, moment: np.ndarray) -> np.ndarray:
+    def moment_forces(self, body_index: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a moment M (N m, in space) on a body, applied as couples of forces M x axis / 2 at
         the body's axes."""
-        axes = self.axes(row)
+        axes = self.axes(body_index)
         x, y, z = moment.tolist()
         couples = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ axes[PLACE] / 2.0
         return axes[FIRST_DERIVATIVE:].reshape(-1, 9) @ couples.ravel()
@@ -96,22 +98,24 @@ class Bodies:
         self._turns = np.array([freedom.startswith("r") for _, freedom in self.places])
         self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])
 
-    def _arm(self, vehicle: SpatialVehicle, name: str) -> np.ndarray:
+    def _arm(self, vehicle: SpatialVehicle, body_name: str) -> np.ndarray:
         """Translation (4, 4) from the centre of the parent body, or from the origin, to the centre of a body."""
-        parent, arm = vehicle.body(name).parent, np.eye(4)
-        arm[:3, 3] = self.position[name] - (self.position[parent] if parent else 0.0)
+        parent, arm = vehicle.body(body_name).parent, np.eye(4)
+        arm[:3, 3] = self.position[body_name] - (self.position[parent] if parent else 0.0)
         return arm
 
-    def index(self, body: str, freedom: str) -> int:
+    def index(self, body_name: str, freedom: str) -> int:
         """Index of a body's coordinate; -1 if the body does not have this freedom."""
-        place = (body, freedom)
+        place = (body_name, freedom)
         return self.places.index(place) if place in self.places else -1
 
-    def points(self, places: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
+    def points(self, bodies_and_positions: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
         """``Points`` of this vehicle, from pairs of a body (None for space) and a position in the design position
         (m)."""
-        rows = [self.row[body] if body else GROUND for body, _ in places]
-        arms = [[*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in places]
+        rows = [self.row[body] if body else GROUND for body, _ in bodies_and_positions]
+        arms = [
+            [*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in bodies_and_positions
+        ]
         return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
 
     def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
@@ -127,25 +131,29 @@ class Bodies:
             matrices[i + 1] = rows
         return PlainMotion(matrices)
 
-    def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
+    def _joint(
+        self, parent_matrices: np.ndarray, joint_index: int, joint_transform: np.ndarray, joint_rate: float
+    ) -> np.ndarray:
         """Rows of the matrices of the body behind joint j, from those before the joint, by the product rule."""
-        rows = (below.reshape(-1, 4) @ step).reshape(-1, 3, 4)
-        turned = (rows[:BIAS].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
-        rows[FIRST_DERIVATIVE + j] = turned[PLACE]
-        rows[RATE] += rate * turned[PLACE]
-        rows[BIAS] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
+        rows = (parent_matrices.reshape(-1, 4) @ joint_transform).reshape(-1, 3, 4)
+        turned = (rows[:BIAS].reshape(-1, 4) @ self._generators[joint_index]).reshape(-1, 3, 4)
+        rows[FIRST_DERIVATIVE + joint_index] = turned[PLACE]
+        rows[RATE] += joint_rate * turned[PLACE]
+        rows[BIAS] += 2.0 * joint_rate * turned[RATE] + joint_rate * joint_rate * (
+            rows[PLACE] @ self._squares[joint_index]
+        )
         return rows
 
-    def inertia(self, motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def inertia(self, body_motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mass matrix (n, n), and forces (n,): weights by gravity (3,) in m/s^2, less inertia forces without the q''
         terms."""
-        columns = motion.matrices[1:, FIRST_DERIVATIVE:]
+        columns = body_motion.matrices[1:, FIRST_DERIVATIVE:]
         count = self.size
         weighted = (columns.reshape(len(columns), -1, 4) @ self._inertia).reshape(columns.shape)
         flat = weighted.transpose(1, 0, 2, 3).reshape(count, -1)
         mass = flat @ columns.transpose(1, 0, 2, 3).reshape(count, -1).T
         weights = np.tensordot(self._mass, columns[:, :, :, 3], 1) @ gravity
-        return mass, weights - flat @ motion.matrices[1:, BIAS].ravel()
+        return mass, weights - flat @ body_motion.matrices[1:, BIAS].ravel()
 
 
 def _pseudo_inertia(mass: float, inertia: np.ndarray) -> np.ndarray:

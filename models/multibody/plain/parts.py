@@ -13,10 +13,10 @@ from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies,
 from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDamper
 
 
-def frame_of(element: SpringDamper | AntiRollBar, default: str | None) -> str | None:
+def frame_of(spring_or_bar: SpringDamper | AntiRollBar, default_frame: str | None) -> str | None:
     """Body in which the axis of a spring or bar is fixed (None for space): the ``frame`` that it names, or
-    ``default``."""
-    return getattr(element, "frame", None) or default
+    ``default_frame``."""
+    return getattr(spring_or_bar, "frame", None) or default_frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Travels:
 class PlainParts:
     """The springs, then the bars, of a vehicle; ``default`` is the frame of those that name no frame."""
 
-    def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default: str | None) -> None:
+    def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default_frame: str | None) -> None:
         springs, bars = vehicle.springs, vehicle.bars
         both: tuple[SpringDamper | AntiRollBar, ...] = (*springs, *bars)
         self.names = tuple(part.name for part in both)
@@ -46,7 +46,7 @@ class PlainParts:
             [*((s.second_body, s.second_point) for s in springs), *((b.right, b.point_right) for b in bars)]
         )
         axes = [s.axis for s in springs] + [(0.0, 0.0, 1.0 / bar.track) for bar in bars]
-        frames = [frame_of(part, default) for part in both]
+        frames = [frame_of(part, default_frame) for part in both]
         rows = [bodies.row[frame] if frame else 0 for frame in frames]
         self._axes = Points(np.array(rows, int), np.array([[*axis, 0.0] for axis in axes]).reshape(-1, 4))
         self._rolls = np.zeros((len(both), bodies.size))
@@ -58,10 +58,13 @@ class PlainParts:
         self._design = np.zeros(len(both))
         self._design = self.travels(bodies.move(still, still), still, still).travel
 
-    def travels(self, motion: PlainMotion, q: np.ndarray, v: np.ndarray) -> Travels:
-        """Travels of all springs and bars at coordinates and rates (n,); ``motion`` is the motion of the bodies
+    def travels(self, body_motion: PlainMotion, q: np.ndarray, v: np.ndarray) -> Travels:
+        """Travels of all springs and bars at coordinates and rates (n,); ``body_motion`` is the motion of the bodies
         there."""
-        axes, apart = motion.at(self._axes), motion.at(self._second_points) - motion.at(self._first_points)
+        axes, apart = (
+            body_motion.at(self._axes),
+            body_motion.at(self._second_points) - body_motion.at(self._first_points),
+        )
         axis, way = axes[:, PLACE, :, None], apart[:, PLACE, :, None]
         all_ways = ((apart @ axis) + (axes @ way))[:, :, 0]
         travel = 0.5 * all_ways[:, PLACE] + self._rolls @ q - self._design
@@ -77,5 +80,5 @@ class PlainParts:
         return preloads + self.stiffness * travels.travel, other
 
 
-def _curves(i: int, spring: SpringDamper) -> tuple[int, Curve | None, Curve | None]:
-    return i, spring.travel_force, spring.rate_force
+def _curves(spring_index: int, spring: SpringDamper) -> tuple[int, Curve | None, Curve | None]:
+    return spring_index, spring.travel_force, spring.rate_force

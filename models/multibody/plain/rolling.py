@@ -84,19 +84,19 @@ class TyreContact(NamedTuple):
 class PlainRolling:
     """Equations of motion of a car on brush tyres, with steering, brake and drive over time."""
 
-    def __init__(self, handling: "Handling") -> None:
-        self.handling, vehicle = handling, handling.vehicle
+    def __init__(self, vehicle_on_tyres: "Handling") -> None:
+        self.handling, vehicle = vehicle_on_tyres, vehicle_on_tyres.vehicle
         self.bodies = Bodies(vehicle)
         self.parts = PlainParts(self.bodies, vehicle, CARRIER)
         held, self.loads = preloads_at_rest(vehicle, CARRIER)
         self.held, self._joint_held = np.split(held, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, vehicle)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(vehicle)
-        chassis = chassis_of(handling.given)
+        chassis = chassis_of(vehicle_on_tyres.given)
         self._carrier = self.bodies.row[CARRIER]
         self._middle = self.bodies.points([(chassis.name, chassis.position)])
-        self._drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
-        self._pushed = self.bodies.points([(push.body, push.point) for push in handling.pushes])
+        self._drag = vehicle_on_tyres.given.drags[0].coefficient / 2.0 if vehicle_on_tyres.given.drags else 0.0
+        self._pushed = self.bodies.points([(push.body, push.point) for push in vehicle_on_tyres.pushes])
         tyres = vehicle.tyres
         towed = [vehicle.towed_under(tyre.body) for tyre in tyres]
         self._towed = np.array([name is not None for name in towed])
@@ -109,9 +109,9 @@ class PlainRolling:
         )
         sunk = self.loads / self._stiffness
         self._radius = self._height + sunk
-        sides = {force.name: force.stiffness for force in handling.given.side_forces}
+        sides = {force.name: force.stiffness for force in vehicle_on_tyres.given.side_forces}
         cornering = np.array([sides[tyre.name] for tyre in tyres])
-        of = handling.tyres
+        of = vehicle_on_tyres.tyres
         self._bristles = cornering / (cornering_factor(of.cells) * self._radius * sunk * of.half_width)
         self._leans = np.where(self._towed, 0.0, of.inclination * np.sign([tyre.point[1] for tyre in tyres]))
         self._shares_of_tyres(tyres)
@@ -157,17 +157,17 @@ class PlainRolling:
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _wheel_forces(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+    def _wheel_forces(self, t: float, body_motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
         """Generalised forces (n,) of tyres, brakes and drive; the tyres' report; and the energy ledger of these
         forces."""
         steer, steering = control_value(self.handling.controls.steer, t)
-        points, angle = motion.at(self._points), self._steered * steer
-        contact = self._loads_and_points(motion, points, angle)
-        slides, beside = self._sliding_velocities(motion, points, contact, self._steered * steering, v)
+        points, angle = body_motion.at(self._points), self._steered * steer
+        contact = self._loads_and_points(body_motion, points, angle)
+        slides, beside = self._sliding_velocities(body_motion, points, contact, self._steered * steering, v)
         creep = self._creep_forces(contact, slides)
-        force, moments = self._tyre_forces(motion, points, contact, creep)
+        force, moments = self._tyre_forces(body_motion, points, contact, creep)
         torques = self._torques(t, beside)
-        force += self._turn_wheels(motion, contact.axle, torques)
+        force += self._turn_wheels(body_motion, contact.axle, torques)
         power = (creep * slides[:, :3]).sum(1)
         slip = dict(zip(("slip_x", "slip_y", "turn", "tread"), slides.T, strict=True))
         by_creep = dict(zip(("fx", "fy", "mz"), creep.T, strict=True))
@@ -188,15 +188,17 @@ class PlainRolling:
         )
         return force, report, ledger
 
-    def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
+    def _loads_and_points(
+        self, body_motion: PlainMotion, wheel_centres: np.ndarray, steer_angles: np.ndarray
+    ) -> TyreContact:
         """Loads, contact points and axes of all tyres on the road; steer (w,), rad."""
-        place, speed = points[:, PLACE], points[:, RATE]
+        place, speed = wheel_centres[:, PLACE], wheel_centres[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
         elastic = np.maximum(self.loads + self._stiffness * (height - (place[:, 2] - self._height)), 0.0)
         rising = (speed * upwards).sum(1)
         load = np.where(elastic > 0.0, np.maximum(elastic - self._damping * rising, 0.0), 0.0)
-        axle, long = self._axles(motion, steer), _length(upwards)
+        axle, long = self._axles(body_motion, steer_angles), _length(upwards)
         normal = upwards / long[:, None]
         along = _cross(axle, normal)
         flat = _length(along)
@@ -208,104 +210,118 @@ class PlainRolling:
         return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
     def _sliding_velocities(
-        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steer_rates: np.ndarray, v: np.ndarray
+        self,
+        body_motion: PlainMotion,
+        wheel_centres: np.ndarray,
+        tyre_contact: TyreContact,
+        steer_rates: np.ndarray,
+        v: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Sliding velocities (w, 4), as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
         bodies that carry them, rad/s.
 
         steer_rates (w,) : rates of steering, rad/s.
         """
-        axle, angular_velocity = contact.axle, np.array([motion.angular_velocity(row) for row in self._points.rows])
-        locked = ((np.array([motion.angular_velocity(row) for row in self._carrying]) - angular_velocity) * axle).sum(1)
+        axle, angular_velocity = (
+            tyre_contact.axle,
+            np.array([body_motion.angular_velocity(row) for row in self._points.rows]),
+        )
+        locked = (
+            (np.array([body_motion.angular_velocity(row) for row in self._carrying]) - angular_velocity) * axle
+        ).sum(1)
         spin = np.where(self._rotors >= 0, v[self._rotors], locked)
         whole = angular_velocity + axle * spin[:, None] + np.multiply.outer(steer_rates, UP)
-        sliding = points[:, RATE] + _cross(whole, contact.down)
-        tread = -spin * (_cross(axle, contact.down) * contact.along).sum(1)
-        on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
-        return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
+        sliding = wheel_centres[:, RATE] + _cross(whole, tyre_contact.down)
+        tread = -spin * (_cross(axle, tyre_contact.down) * tyre_contact.along).sum(1)
+        on_road = (sliding * tyre_contact.along).sum(1), (sliding * tyre_contact.across).sum(1)
+        return np.column_stack([*on_road, (whole * tyre_contact.normal).sum(1), tread]), spin - locked
 
-    def _axles(self, motion: PlainMotion, steer: np.ndarray) -> np.ndarray:
+    def _axles(self, body_motion: PlainMotion, steer_angles: np.ndarray) -> np.ndarray:
         """Unit vectors (w, 3) along the axles, to the left: steered and inclined relative to the heading of the
         carrier, or of a towed body's x axis in the road's plane."""
-        ahead = np.array([motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
+        ahead = np.array([body_motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
         ahead /= _length(ahead)[:, None]
         left, level = _cross(np.tile(UP, (len(ahead), 1)), ahead), np.cos(self._leans)[:, None]
-        sideways = np.cos(steer)[:, None] * left - np.sin(steer)[:, None] * ahead
+        sideways = np.cos(steer_angles)[:, None] * left - np.sin(steer_angles)[:, None] * ahead
         axles: np.ndarray = level * sideways + np.multiply.outer(np.sin(self._leans), UP)
         return axles
 
-    def _creep_forces(self, contact: TyreContact, sliding: np.ndarray) -> np.ndarray:
-        """Creep forces along and across (N) and moments (N m), (w, 3), of all tyres from sliding velocities ``sliding``
-        (w, 4)."""
-        of, ones = self.handling.tyres, np.ones(len(sliding))
-        half = np.sqrt(self._radius * contact.load / self._stiffness)
-        patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
-        return tyre_forces(patch, sliding, of.cells)
+    def _creep_forces(self, tyre_contact: TyreContact, sliding_velocities: np.ndarray) -> np.ndarray:
+        """Creep forces along and across (N) and moments (N m), (w, 3), of all tyres from sliding velocities
+        ``sliding_velocities`` (w, 4)."""
+        of, ones = self.handling.tyres, np.ones(len(sliding_velocities))
+        half = np.sqrt(self._radius * tyre_contact.load / self._stiffness)
+        patch = Patch(half, of.half_width * ones, tyre_contact.load, of.friction * ones, self._bristles)
+        return tyre_forces(patch, sliding_velocities, of.cells)
 
     def _tyre_forces(
-        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
+        self, body_motion: PlainMotion, wheel_centres: np.ndarray, tyre_contact: TyreContact, creep_forces: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of the creep forces about the
         wheels' centres."""
-        force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
-        moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
-        total = np.tensordot(points[:, FIRST_DERIVATIVE:], force + contact.loading, ((0, 2), (0, 1)))
+        force = tyre_contact.along * creep_forces[:, [0]] + tyre_contact.across * creep_forces[:, [1]]
+        moments = _cross(tyre_contact.down, force) + tyre_contact.normal * creep_forces[:, [2]]
+        total = np.tensordot(wheel_centres[:, FIRST_DERIVATIVE:], force + tyre_contact.loading, ((0, 2), (0, 1)))
         for row, moment in zip(self._points.rows, moments, strict=True):
-            total += motion.moment_forces(int(row), moment)
-        about = (moments * contact.axle).sum(1)
+            total += body_motion.moment_forces(int(row), moment)
+        about = (moments * tyre_contact.axle).sum(1)
         fixed = self._rotors < 0
         np.add.at(total, self._rotors[~fixed], about[~fixed])
         for i in np.flatnonzero(fixed).tolist():
-            total += self._transferred_moment(motion, i, about[i] * contact.axle[i])
+            total += self._transferred_moment(body_motion, i, about[i] * tyre_contact.axle[i])
         return total, moments
 
-    def _transferred_moment(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
+    def _transferred_moment(self, body_motion: PlainMotion, wheel_index: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) when the body that carries wheel i takes over a moment (N m) from the wheel's own
         body."""
-        return motion.moment_forces(self._carrying[i], moment) - motion.moment_forces(int(self._points.rows[i]), moment)
+        return body_motion.moment_forces(self._carrying[wheel_index], moment) - body_motion.moment_forces(
+            int(self._points.rows[wheel_index]), moment
+        )
 
-    def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
+    def _torques(self, t: float, spin_rates: np.ndarray) -> np.ndarray:
         """Torques (w,) of brake and drive on wheels (N m).
 
-        relative_spin (w,) : beside what carries each wheel, rad/s.
+        spin_rates (w,) : beside what carries each wheel, rad/s.
         """
         controls, of = self.handling.controls, self.handling.tyres
         braking, driving = control_value(controls.brake, t)[0], control_value(controls.drive, t)[0]
-        torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
+        torque = self._driven * driving - self._braked * braking * np.tanh(spin_rates / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
-    def _turn_wheels(self, motion: PlainMotion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
+    def _turn_wheels(self, body_motion: PlainMotion, axles: np.ndarray, wheel_torques: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of torques on the wheels, and of the opposite torques on the bodies that carry
         them."""
         total = np.zeros(self.bodies.size)
-        for i in np.flatnonzero(torques).tolist():
-            total[self._rotors[i]] += torques[i]
-            total -= self._transferred_moment(motion, i, torques[i] * axles[i])
+        for i in np.flatnonzero(wheel_torques).tolist():
+            total[self._rotors[i]] += wheel_torques[i]
+            total -= self._transferred_moment(body_motion, i, wheel_torques[i] * axles[i])
         return total
 
-    def _drag_and_pushes(self, t: float, motion: PlainMotion) -> tuple[np.ndarray, float]:
+    def _drag_and_pushes(self, t: float, body_motion: PlainMotion) -> tuple[np.ndarray, float]:
         """Generalised forces (n,) of aerodynamic drag and external pushes, and their power (W)."""
-        heading = motion.axes(self._carrier)[PLACE]
+        heading = body_motion.axes(self._carrier)[PLACE]
         total, power = np.zeros(self.bodies.size), 0.0
         if self._drag:
-            (middle,) = motion.at(self._middle)
+            (middle,) = body_motion.at(self._middle)
             ahead = float(middle[RATE] @ heading[:, 0])
             force = -self._drag * abs(ahead) * ahead
             total += middle[FIRST_DERIVATIVE:] @ (force * heading[:, 0])
             power += force * ahead
-        for push, point in zip(self.handling.pushes, motion.at(self._pushed), strict=True):
+        for push, point in zip(self.handling.pushes, body_motion.at(self._pushed), strict=True):
             pushed = heading @ (control_value(push.size, t)[0] * np.array(push.axis))
             total += point[FIRST_DERIVATIVE:] @ pushed
             power += float(point[RATE] @ pushed)
         return total, power
 
 
-def _length(rows: np.ndarray) -> np.ndarray:
+def _length(vectors: np.ndarray) -> np.ndarray:
     """Lengths (w,) of rows (w, 3)."""
-    return np.sqrt((rows * rows).sum(1))
+    return np.sqrt((vectors * vectors).sum(1))
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _cross(first_vectors: np.ndarray, second_vectors: np.ndarray) -> np.ndarray:
     """Vector products of rows (w, 3)."""
-    product: np.ndarray = a[:, NEXT] * b[:, LAST] - a[:, LAST] * b[:, NEXT]
+    product: np.ndarray = (
+        first_vectors[:, NEXT] * second_vectors[:, LAST] - first_vectors[:, LAST] * second_vectors[:, NEXT]
+    )
     return product

@@ -13,12 +13,12 @@ from models.multibody.plain.parts import PlainParts
 from models.vehicles.spatial import SpatialVehicle, SpringDamper
 
 
-def preloads_at_rest(vehicle: SpatialVehicle, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
+def preloads_at_rest(vehicle: SpatialVehicle, frame_body: str | None) -> tuple[np.ndarray, np.ndarray]:
     """Preloads (p,) of springs, then bars, then joint elements (N, N m; positive in compression), and static loads (w,)
     of tyres (N)."""
     bodies = Bodies(vehicle)
     still = np.zeros(bodies.size)
-    motion, parts = bodies.move(still, still), PlainParts(bodies, vehicle, frame)
+    motion, parts = bodies.move(still, still), PlainParts(bodies, vehicle, frame_body)
     risen = motion.at(bodies.points([(tyre.body, tyre.point) for tyre in vehicle.tyres]))[:, FIRST_DERIVATIVE:, 2]
     rows = np.vstack([parts.travels(motion, still, still).gradient, joint_rows(bodies, vehicle), risen])
     springs = [_stiffness_at_rest(spring) for spring in vehicle.springs]

@@ -69,7 +69,7 @@ def read_pressures(csv_path: str | Path, wheel_count: int, sample_period: float 
     measured = "speed" in header
     if measured:
         columns |= {f"speed_{name}": FACTOR_TO_METRES_PER_SECOND for name in names}
-    table = read_table(csv_path, columns, increasing="time", least_rows=2)
+    table = read_table(csv_path, columns, increasing_column="time", least_row_count=2)
     if table["time"][0] != 0.0:
         raise InputError(csv_path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
     pressures = _columns_of_wheels(csv_path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")

@@ -63,7 +63,7 @@ class StopEnsemble:
 
     def _quantities_of_stop(self, scene: BrakingScene, stop_number: int) -> dict[str, float]:
         procedure = scene.procedures[self.procedure]
-        drawn = float(normal_samples(self.seed, stop_number, 1, 1, source=SPEED)[0, 0])
+        drawn = float(normal_samples(self.seed, stop_number, 1, 1, noise_source=SPEED)[0, 0])
         changed = procedure.model_copy(update={"speed": procedure.speed * (1.0 + self.spread * drawn)})
         scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
         try:

@@ -37,7 +37,7 @@ class HubForces:
 
     def with_noise(self, noise_deviation: np.ndarray, noise_seed: int, noise_path: int = 0) -> "HubForces":
         """Returns the hub forces with white noise on every sample, of standard deviations (6 h,) in N and N m."""
-        noise = normal_samples(noise_seed, noise_path, len(self.samples), self.samples.shape[1], source=FORCES)
+        noise = normal_samples(noise_seed, noise_path, len(self.samples), self.samples.shape[1], noise_source=FORCES)
         return replace(self, samples=self.samples + noise * noise_deviation)
 
 
@@ -56,7 +56,7 @@ class MeasuredAngles:
         """Returns the angles with white noise on every sample; noise_deviations : of angles (rad) and of rates
         (rad/s).
         """
-        noise = normal_samples(noise_seed, noise_path, len(self.samples), 4, source=PITCH_SENSOR)
+        noise = normal_samples(noise_seed, noise_path, len(self.samples), 4, noise_source=PITCH_SENSOR)
         return replace(self, samples=self.samples + noise * np.repeat(noise_deviations, 2))
 
 

@@ -125,7 +125,7 @@ def _with_error(
         longer,
         method.order,
         solver_settings.step,
-        growth=_pitch_error_growth(vehicle_assembly),
+        error_growth=_pitch_error_growth(vehicle_assembly),
         channel_sizes=sizes,
     )
 

@@ -88,9 +88,9 @@ def noisy_reading(
     number = instant_numbers(row_times, sensor_parameters.sampling_rate)
     noise = (
         sensor_parameters.deviation
-        * normal_samples(sensor_parameters.seed, sensor_parameters.path, int(number[-1]) + 1, 1, source=noise_stream)[
-            :, 0
-        ]
+        * normal_samples(
+            sensor_parameters.seed, sensor_parameters.path, int(number[-1]) + 1, 1, noise_source=noise_stream
+        )[:, 0]
     )
     return sample_and_hold(row_times, exact_values, sensor_parameters.sampling_rate, scene, key_path) + noise[number]
 

@@ -174,7 +174,7 @@ class StabiliserBench:
         steps.
         """
         heave, pitch = self.truth["z3"][::steps_per_sample], self.truth["pitch"][::steps_per_sample]
-        noise = normal_samples(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
+        noise = normal_samples(self.options.seed, 0, len(pitch), 1, noise_source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
         write_time_series(self.folder / "measured_pitch.csv", noisy, sample_period)
         exact_columns = {"z3": ("m", heave), "pitch": ("rad", pitch)}

@@ -64,7 +64,7 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 def _built_vehicle(scene: RideScene) -> Built:
     file, reduced = scene.vehicle.file, scene.study == CLOSED_FORM_STUDY
     return extended_by_effects(
-        Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", allows_reduced=reduced)), scene
+        Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", allows_reduced_vehicle=reduced)), scene
     )
 
 

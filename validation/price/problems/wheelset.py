@@ -251,7 +251,7 @@ class RollingWheels:
             if setting.method.endswith(JACOBIAN_SUFFIX)
             else None
         )
-        rolling = Rolling(self.wheels, counting_calls(law.of, calls), slopes=slopes)
+        rolling = Rolling(self.wheels, counting_calls(law.of, calls), force_slopes=slopes)
         steps = round(DURATION / (LARGEST_STEP if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
 

@@ -125,7 +125,7 @@ class Accelerometers:
                 values[:, i] = reading_on_bracket(
                     values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
                 )
-        noise = normal_samples(p.seed, p.path, len(values), 3 * len(sensor_positions), source=ACCELEROMETERS)
+        noise = normal_samples(p.seed, p.path, len(values), 3 * len(sensor_positions), noise_source=ACCELEROMETERS)
         return values + p.deviation * noise.reshape(values.shape)
 
 

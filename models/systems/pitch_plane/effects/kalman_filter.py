@@ -214,7 +214,9 @@ def _measurement(vehicle_assembly: Assembly, filter_parameters: Parameters) -> "
             scene.file, key_path, None, "needs pitch_deviation, rate_deviation or both: the columns to read"
         )
     path = scene.path(filter_parameters.file, f"{key_path}.file")
-    values, period = read_time_series(path, {name: fields[0] for name, fields in read_columns.items()}, gaps=True)
+    values, period = read_time_series(
+        path, {name: fields[0] for name, fields in read_columns.items()}, gaps_allowed=True
+    )
     for name, column in zip(read_columns, values.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
