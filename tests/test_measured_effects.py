@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from models.advice.choice.choose import Chooser
+from models.advice.choice.choose import EffectChooser
 from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
@@ -111,7 +111,7 @@ def test_auto_leaves_out_what_the_question_does_not_see():
         tolerance=0.02,
         virtual={"duration": 0.18, "format": "csv", "faults": faults},
     )
-    choice = Chooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
+    choice = EffectChooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
     assert choice.left_out == ("sensor_noise",) and choice.within_tolerance
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from models.advice.price.meshed import MeshedScene, first_part
+from models.advice.price.meshed import MeshedScene, duration_of_first_part
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, priced_scene, recommend
 from models.advice.price.text import recommendation_lines
@@ -73,7 +73,7 @@ def test_more_cells_come_nearer_and_are_counted():
 
 def test_steps_divide_what_is_searched():
     scene = own(PATHS)
-    assert isinstance(scene, MeshedScene) and first_part(3.0, 0.25) == 0.25
+    assert isinstance(scene, MeshedScene) and duration_of_first_part(3.0, 0.25) == 0.25
     assert all(
         abs(scene.searched_duration / step - round(scene.searched_duration / step)) < 1e-9
         for step in scene.steps.values()

@@ -6,13 +6,13 @@ from functools import partial
 import numpy as np
 import pytest
 
-from models.advice.choice.choose import Choice, Chooser
+from models.advice.choice.choose import EffectChoice, EffectChooser
 from models.advice.choice.variants import Variants
 from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import SettingChoice, _valid_over_run, recommend
-from models.advice.price.search import Search, TriedSetting
-from models.advice.price.truth import ReferenceTruth, reference_truth
+from models.advice.price.search import SettingSearch, TriedSetting
+from models.advice.price.truth import ReferenceSolution, refined_reference
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 from models.ensemble.workers import process_pool
@@ -122,7 +122,7 @@ def half_car():
     return build(table, "t")
 
 
-def told(choice: Choice):
+def told(choice: EffectChoice):
     """All of a choice but its seconds."""
     return {name: str(value) for name, value in asdict(replace(choice, seconds=())).items()}
 
@@ -130,7 +130,8 @@ def told(choice: Choice):
 def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_not_count():
     with process_pool(2) as pool:
         choosers = [
-            Chooser(half_car(), "reference", ["pitch", "rms f1"], 0.02, executor=executor) for executor in (None, pool)
+            EffectChooser(half_car(), "reference", ["pitch", "rms f1"], 0.02, executor=executor)
+            for executor in (None, pool)
         ]
         alone, shared = (chooser.choose() for chooser in choosers)
         assert told(alone) == told(shared) and alone.left_out and alone.calls_of_search > 0
@@ -181,7 +182,7 @@ class Planted:
         return [setting.label()]
 
 
-def same(alone: ReferenceTruth, shared: ReferenceTruth):
+def same(alone: ReferenceSolution, shared: ReferenceSolution):
     keys = ("uncertainty", "origin", "rung", "broken_assumptions")
     equal = np.array_equal(alone.run.values, shared.run.values)
     return equal and all(getattr(alone, key) == getattr(shared, key) for key in keys)
@@ -189,9 +190,9 @@ def same(alone: ReferenceTruth, shared: ReferenceTruth):
 
 @CREWS
 def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
-    alone, shared = (reference_truth(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
+    alone, shared = (refined_reference(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
     assert same(alone, shared) and alone.rung > 0
-    over, blocks = Search(Planted(), alone, 1e-2, 2.0), []
+    over, blocks = SettingSearch(Planted(), alone, 1e-2, 2.0), []
     for ladder, i in zip(Planted().ladders(), (2, 4), strict=True):
         tried = TriedSetting(ladder.setting(i), "ok", seconds=0.5, calls=10)
         blocks.append((ladder, SettingChoice(tried, 0.0, 10, 0.5, False, (0.4, 0.5, 0.6))))

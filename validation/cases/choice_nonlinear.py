@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.advice.choice.choose import Chooser
+from models.advice.choice.choose import EffectChooser
 from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
@@ -50,7 +50,9 @@ def judge_ride(bent_ride: NonlinearRide) -> ChoiceCheckedByRuns:
     """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
     that the choice did not use."""
     engine = ENGINES["ride"][0]
-    choice = Chooser(bent_ride.prepared_in_time(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
+    choice = EffectChooser(
+        bent_ride.prepared_in_time(), engine, list(bent_ride.quantities), bent_ride.tolerance
+    ).choose()
     fresh = Variants(bent_ride.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.quantities_of_run(), fresh.quantities_of_run(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
@@ -113,7 +115,7 @@ def _refusal_row() -> Row:
     tolerance."""
     asked, outcome = random_nonlinear_ride(UNDERSAMPLED_SEED), "a choice"
     try:
-        Chooser(
+        EffectChooser(
             asked.prepared_in_time(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE
         ).choose()
     except InputError as error:

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from models.advice.price import runner
-from models.advice.price.problem import Problem, Setting
+from models.advice.price.problem import Setting, WorkPrecisionProblem
 from models.engines.assembly import Assembly
 from models.ensemble.workers import process_pool
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -34,7 +34,7 @@ from validation.price.tables import tables as cost_tables
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
-MakeProblem = Callable[[bool], Problem]
+MakeProblem = Callable[[bool], WorkPrecisionProblem]
 PROBLEMS: tuple[MakeProblem, ...] = (
     road_excited.problem,
     force_excited.problem,
@@ -124,7 +124,7 @@ def _cases_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]
 
 def _road_rows(saved_rows: Saved) -> list[Row]:
     """Rows: work-precision curves that must coincide on the road, and methods that Exudyn names but does not have."""
-    road = runner.of_saved(saved_rows)
+    road = runner.points_from_saved(saved_rows)
     groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
         behaviour_row(
@@ -222,18 +222,18 @@ def tables(case_data: Saved) -> list[Table]:
     tables = [
         table
         for saved in case_data["problems"]
-        for table in (*cost_tables(runner.of_saved(saved)), *split.table(case_data["split"], saved["key"]))
+        for table in (*cost_tables(runner.points_from_saved(saved)), *split.table(case_data["split"], saved["key"]))
     ]
     return [*tables, ride.table(case_data["ride"])]
 
 
 def draw(case_data: Saved) -> Drawn:
     """Plot error over work for every problem, and for the methods of ride."""
-    problems = map(runner.of_saved, case_data["problems"])
+    problems = map(runner.points_from_saved, case_data["problems"])
     return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(case_data["ride"])]
 
 
-def _caption(measured_points: runner.MeasuredPoints) -> str:
+def _caption(measured_points: runner.WorkPrecisionPoints) -> str:
     return (
         f"{measured_points.title}: error over work and over seconds. Reference: {measured_points.reference}. "
         "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "

@@ -17,7 +17,7 @@ import numpy as np
 from models.advice.price import PricedRun, SettingLadder, recommendation, search, truth
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, SettingChoice
-from models.advice.price.truth import ReferenceTruth, values_at
+from models.advice.price.truth import ReferenceSolution, values_at
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
@@ -188,7 +188,7 @@ CHECKS = {
     "seconds": Check(
         "the same of the setting recommended by seconds, where a call costs the same in all",
         "",
-        recommendation.SLOWER_RATIO - 1.0,
+        recommendation.SLOWER_SECONDS_RATIO - 1.0,
         lambda: _largest_over_recommended(_excess_calls, "seconds"),
     ),
 }
@@ -216,12 +216,12 @@ def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: 
     return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
-def _mean_error(self: ReferenceTruth, other_run: PricedRun) -> float:
+def _mean_error(self: ReferenceSolution, other_run: PricedRun) -> float:
     exact = values_at(self.run, other_run.times, self.kink_period)
     return float(np.abs(other_run.values - exact).mean()) if np.isfinite(other_run.values).all() else np.inf
 
 
-def _error_without_nan(self: ReferenceTruth, other_run: PricedRun) -> float:
+def _error_without_nan(self: ReferenceSolution, other_run: PricedRun) -> float:
     exact = values_at(self.run, other_run.times, self.kink_period)
     return float(np.nanmax(np.abs(other_run.values - exact)))
 
@@ -236,7 +236,7 @@ FAULTS = (
     CampaignFault(
         "predicted error a tenth of what was measured",
         "recommendation",
-        _advice_patch("_with_finer_truth", _tenfold_smaller_errors),
+        _advice_patch("_with_finer_reference", _tenfold_smaller_errors),
     ),
     CampaignFault(
         "the most accurate setting wins, not the cheapest",
@@ -262,18 +262,18 @@ FAULTS = (
         "recommendation",
         _advice_patch(
             "_confirmed_over_whole_run",
-            lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners),
+            lambda _: lambda search, timed, winners, _executor: (search.reference_solution, timed, winners),
         ),
     ),
     CampaignFault(
         "mean difference for the largest",
         "truth",
-        _advice_patch("ReferenceTruth.error", lambda _: _mean_error, "truth"),
+        _advice_patch("ReferenceSolution.error", lambda _: _mean_error, "truth"),
     ),
     CampaignFault(
         "what is no number left out of the error",
         "truth",
-        _advice_patch("ReferenceTruth.error", lambda _: _error_without_nan, "truth"),
+        _advice_patch("ReferenceSolution.error", lambda _: _error_without_nan, "truth"),
     ),
     CampaignFault(
         "the reference's first step taken for the truth",
@@ -283,7 +283,9 @@ FAULTS = (
     CampaignFault(
         "a tolerance three times too wide",
         "search",
-        _advice_patch("Search.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
+        _advice_patch(
+            "SettingSearch.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"
+        ),
     ),
 )
 

@@ -33,10 +33,10 @@ class SettingLadder:
     confirmation_divisor: float = 20.0
     change_text: str = ""
 
-    def setting(self, i: int) -> Setting:
-        """The solver setting on rung ``i`` of the ladder, counted from the coarsest."""
+    def setting(self, rung_index: int) -> Setting:
+        """The solver setting on rung ``rung_index`` of the ladder, counted from the coarsest."""
         owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
-        return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
+        return kind(self.engine, self.method, self.values[rung_index], self.order, self.adaptive, default=owner)
 
     def work(self, old_value: float, new_value: float) -> float:
         """Ratio of the work with the new value of a setting (step, or cell share) to the work with the old one. Cells

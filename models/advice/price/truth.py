@@ -28,7 +28,7 @@ MOST_ROWS = 4_000_000
 
 
 @dataclass(frozen=True)
-class ReferenceTruth:
+class ReferenceSolution:
     """The quantity along the reference run, taken as the truth. uncertainty : in the unit of the quantity; origin :
     text on its origin; rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there
     are none; seconds : of the processor that it took, a guide to how long to wait and no price; broken_assumptions :
@@ -83,14 +83,14 @@ def values_at(priced_run: PricedRun, times: np.ndarray, kink_period: float = 0.0
     return sum((w[:, None] * priced_run.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
-def reference_truth(
+def refined_reference(
     scene: PricedScene,
     tolerance: float,
     duration: float,
     first_rung: int = 0,
     second_method: bool = True,
     executor: Executor | None = None,
-) -> ReferenceTruth:
+) -> ReferenceSolution:
     """The truth of a scene's quantity over ``duration`` (s), as exact as the ladder's divisor of ``tolerance`` asks;
     ``second_method`` : whether another family of methods must confirm it.
 
@@ -107,7 +107,7 @@ def reference_truth(
     second_setting = scene.second_setting(ladder.setting(first_rung)) if second_method else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
     finer = ladder.change_text or finer
-    truth_of_halving = ReferenceTruth(
+    truth_of_halving = ReferenceSolution(
         settled, change, f"{change_text}; {finer}", first_rung, scene.kink_period, seconds, tuple(broken.values())
     )
     if second_setting is None:
@@ -121,12 +121,12 @@ def reference_truth(
     return replace(truth_of_halving, uncertainty=max(change, differs), origin=f"{both_settings}, which differ by")
 
 
-def _change_by_halving(scene: PricedScene, coarse_run: PricedRun, fine_run: PricedRun) -> float:
+def _change_by_halving(scene: PricedScene, coarser_run: PricedRun, finer_run: PricedRun) -> float:
     """Largest difference between two runs, the second with half the step, at the output rows of both; the coarser run
     is interpolated between its rows.
     """
-    run_pairs = ((fine_run, coarse_run), (coarse_run, fine_run))
-    return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other_run) for run, other_run in run_pairs)
+    run_pairs = ((finer_run, coarser_run), (coarser_run, finer_run))
+    return max(ReferenceSolution(run, 0.0, "", 0, scene.kink_period).error(other_run) for run, other_run in run_pairs)
 
 
 def _setting_text(setting: Setting) -> str:

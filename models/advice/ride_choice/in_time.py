@@ -95,7 +95,7 @@ class CopiesInTime:
         return {effect.name: effect.says for effect in self.effects}
 
     @property
-    def absent_names(self) -> tuple[str, ...]:
+    def absent_effect_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene could have but does not name."""
         return absent_effects(self.scene.ride)
 

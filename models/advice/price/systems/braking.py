@@ -34,10 +34,12 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
 
 @dataclass(frozen=True)
 class PricedBraking:
-    """A braking procedure as a priced scene, see ``models.advice.price.PricedScene``. name : of the procedure."""
+    """A braking procedure as a priced scene, see ``models.advice.price.PricedScene``. procedure_name : name of the
+    procedure.
+    """
 
     scene: BrakingScene
-    name: str
+    procedure_name: str
     quantity: str
     engines: tuple[str, ...]
     note: str
@@ -93,7 +95,7 @@ class PricedBraking:
         """
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
-        path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.name).detail
+        path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.procedure_name).detail
         if not path.ended_at_rest:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path

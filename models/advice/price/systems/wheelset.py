@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import SECOND_SOLVER_TOLERANCE, MeshedScene, checked_quantity, first_part
+from models.advice.price.meshed import SECOND_SOLVER_TOLERANCE, MeshedScene, checked_quantity, duration_of_first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
@@ -27,24 +27,24 @@ class PricedWheelset(MeshedScene):
     scene: WheelsetScene
     speeds: tuple[float, ...]
 
-    def _scene(self, cells: int, step: float, duration: float) -> WheelsetScene:
+    def _changed_scene(self, cell_count: int, step: float, duration: float) -> WheelsetScene:
         """The wheelset scene with another number of contact cells, step (s) and duration (s)."""
-        contact = self.scene.contact.model_copy(update={"cells": cells or 3})
+        contact = self.scene.contact.model_copy(update={"cells": cell_count or 3})
         run = self.scene.run.model_copy(update={"step": step, "duration": duration})
         return self.scene.model_copy(update={"contact": contact, "run": run})
 
-    def run(self, engine: str, cells: int, step: float, duration: float) -> list[WheelsetPath]:
+    def run(self, engine: str, cell_count: int, step: float, duration: float) -> list[WheelsetPath]:
         """Compute the wheelset's path at every speed in an engine, with this number of contact cells and this step
         (s).
         """
-        return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
+        return [path(self._changed_scene(cell_count, step, duration), engine, speed) for speed in self.speeds]
 
-    def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
+    def exact_run(self, cell_count: int, step: float, duration: float) -> list[WheelsetPath]:
         """The wheelset's path at every speed by the solver DOP853, as an accurate reference."""
-        scene = self._scene(cells, step, duration)
+        scene = self._changed_scene(cell_count, step, duration)
         return [_exact_path(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
 
-    def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
+    def quantity_along_run(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
         """Times (n,) in s and values (n, k) of the quantity along the paths at all speeds, and the number of force
         calls; the assumptions of each path are judged.
         """
@@ -102,7 +102,7 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
         QUANTITIES[quantity_name][1],
         note,
         run.duration,
-        first_part(run.duration, SEARCHED_DURATION),
+        duration_of_first_part(run.duration, SEARCHED_DURATION),
         engines,
         "reference",
         run.step,
