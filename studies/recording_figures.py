@@ -23,8 +23,8 @@ from models.drawing.figures import (
 )
 from models.fatigue.counting import CountedLoad
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
-from models.measured.checks.evidence import Evidence
-from models.measured.signal import UNIT_OF_QUANTITY, Signal
+from models.measured.checks.evidence import CheckedRecording
+from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal
 from models.systems.measured.holds import FREE_RUN
 from models.systems.measured.run import Examination
 from models.systems.measured.section_run import SectionOutcome
@@ -54,7 +54,7 @@ CHECKS_OF_FAULT = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swap
 """Names of the checks that detect each kind of measurement fault."""
 
 
-def figure_of_finding(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
+def figure_of_finding(finding: Finding, evidence: CheckedRecording, path: Path) -> Path | None:
     """Save the figure that illustrates a finding; returns its path, or None if there is nothing to draw."""
     telling = (f for f in evidence.faults if finding.check in CHECKS_OF_FAULT.get(f.kind, ()))
     fault = next((f for f in telling if set(f.names) == set(finding.signals)), None)
@@ -85,7 +85,9 @@ def _save_titled(
     return save(figure, path)
 
 
-def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
+def _plot_signals(
+    finding: Finding, evidence: CheckedRecording, signals: tuple[MeasuredSignal, ...], path: Path
+) -> Path:
     """Save a figure of the signals of a finding over time, with the time span of the finding marked."""
     recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
@@ -115,7 +117,7 @@ def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, .
     )
 
 
-def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
+def _plot_mean_forces(evidence: CheckedRecording, path: Path) -> Path:
     """Save a bar chart of each hub's mean measured vertical force beside its static load by the vehicle file."""
     assert evidence.vehicle is not None
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
@@ -136,16 +138,18 @@ def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
     return _save_titled(drawn, "Mean vertical forces", path, axis)
 
 
-def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
+def _plot_ratio(evidence: CheckedRecording, fault: MeasurementFault, path: Path) -> Path:
     """Save a figure of the ratio of a channel's reading to its expected value over frequency; a delay shows as a slope
     of the phase, a wrong factor as a constant magnitude."""
     agreement = evidence.agreement
     assert agreement is not None
     for earlier_fault in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
-        agreement = agreement.without(earlier_fault)
-    group_channels = agreement.inputs if fault.signals[0] in agreement.inputs else agreement.outputs
+        agreement = agreement.corrected_for(earlier_fault)
+    group_channels = (
+        agreement.force_signals if fault.signals[0] in agreement.force_signals else agreement.reading_signals
+    )
     group = SignalGroup(
-        fault.name, group_channels is agreement.inputs, tuple(group_channels.index(s) for s in fault.signals)
+        fault.name, group_channels is agreement.force_signals, tuple(group_channels.index(s) for s in fault.signals)
     )
     line, size = ((agreement.weights * part_of_weights).sum(axis=1) for part_of_weights in agreement.share(group))
     f, ratio, sure = agreement.frequencies, size / line if group.forces else line / size, size / size.max()
@@ -169,18 +173,18 @@ def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path
     return _save_titled(drawn, title, path, axes[0], "outside lower center")
 
 
-def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
+def _plot_exchange(evidence: CheckedRecording, fault: MeasurementFault, path: Path) -> Path:
     """Save a bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
     with two of them exchanged."""
     agreement = evidence.agreement
     assert agreement is not None
-    names = [s.name for s in agreement.outputs]
+    names = [s.name for s in agreement.reading_signals]
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 1.4 + 0.24 * len(names)))
     bar_positions = np.arange(len(names))
-    axis.barh(bar_positions - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD_COLOUR, label="as mapped")
+    axis.barh(bar_positions - 0.2, 100 * agreement.unexplained_shares, 0.38, color=LOUD_COLOUR, label="as mapped")
     axis.barh(
         bar_positions + 0.2,
-        100 * agreement.without(fault).unexplained,
+        100 * agreement.corrected_for(fault).unexplained_shares,
         0.38,
         color=QUIET_COLOUR,
         label=f"{fault.name} exchanged",
@@ -191,7 +195,7 @@ def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> P
     return _save_titled(drawn, "Exchanged hubs", path, axis)
 
 
-def _plot_spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
+def _plot_spectrum(evidence: CheckedRecording, signals: tuple[MeasuredSignal, ...], path: Path) -> Path:
     """Save a figure of the spectral density of signals, and of the noise density that is stated for them."""
     from scipy.signal import welch
 

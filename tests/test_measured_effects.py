@@ -12,7 +12,7 @@ from models.core.errors import InputError
 from models.core.result import load as load_result
 from models.core.scene_effects import absent_effects, named_effects, scene_without, with_effects
 from models.core.systems import load
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.systems import run
 from models.systems.measured.scene import build
 from studies.command.asked import SCENES_FOLDER
@@ -68,7 +68,7 @@ def test_a_recording_is_run_as_every_scene_is_and_its_result_says_where_its_samp
     assert np.array_equal(saved["left seat F"].values, result["left seat F"]) and saved["left seat F"].units == "N"
     assert json.loads(saved.scene_table) == scene.table() and "commit" in json.loads(saved.provenance)
     names = tuple(json.loads(saved.columns_of))
-    columns = Columns(tmp_path / saved.attrs["columns"], names, len(result.times))
+    columns = SampleFile(tmp_path / saved.attrs["columns"], names, len(result.times))
     assert np.array_equal(columns.read("left seat F"), result["left seat F"])
     assert result.counts()["force calls"] == 4 * result.counts()["steps"] == 720
 

@@ -14,7 +14,7 @@ from models.core.signals import Sampled
 from models.fatigue.counting import counted_load
 from models.fatigue.damage import turning_points
 from models.fatigue.rainflow_cycles import rainflow_cycles
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.hand_on import hand_on
@@ -52,7 +52,7 @@ def whole(tmp_path_factory):
 def changed(own: SectionRun, folder, change) -> SectionRun:
     """The run of a recording whose samples (n, signals) are changed."""
     values = own.recording.columns.block(own.recording.columns.names, 0, own.recording.count)
-    columns = Columns(folder / "changed.f64", own.recording.columns.names, own.recording.count)
+    columns = SampleFile(folder / "changed.f64", own.recording.columns.names, own.recording.count)
     columns.write(0, change(values))
     return replace(own, recording=replace(own.recording, columns=columns))
 
@@ -65,7 +65,7 @@ class Killed(BaseException):
 @pytest.mark.parametrize("time", [1, 3])
 def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monkeypatch, moment, time):
     own, _, bits = whole
-    calls, save, write = [0], Checkpoint.save, Columns.write
+    calls, save, write = [0], Checkpoint.save, SampleFile.write
 
     def now(at):
         calls[0] += at == moment
@@ -87,7 +87,7 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
 
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "save", saved)
-        patch.setattr(Columns, "write", written)
+        patch.setattr(SampleFile, "write", written)
         with pytest.raises(Killed):
             run(own, tmp_path / "run", block=0.04)
     told = list[float]()
@@ -214,7 +214,7 @@ def test_a_check_channel_with_a_wrong_gain_shows_it(whole):
     signal, answer = next(pair for pair in channels_to_compare(own) if pair[0].name == "front left_force")
     true = outcome.samples(answer)
     names = own.recording.columns.names
-    columns = Columns(outcome.columns.path.with_name("gain.f64"), names, own.recording.count)
+    columns = SampleFile(outcome.columns.path.with_name("gain.f64"), names, own.recording.count)
     values = own.recording.columns.block(names, 0, own.recording.count)
     values[:, names.index(signal.name)] = true / 1.1
     columns.write(0, values)

@@ -237,7 +237,9 @@ def test_an_interval_needs_rounds():
     one = with_points(points).loss_by_default(1e-3, "seconds", "exudyn first")
     assert one.cost_ratio > 1 and math.isnan(one.lower_limit) and math.isnan(one.upper_limit)
     five = [replace(p, seconds=p.seconds * cost.FEWEST_TIMING_ROUNDS) for p in points]
-    assert with_points(five).loss_by_default(1e-3, "seconds", "exudyn first").lower_limit == pytest.approx(one.cost_ratio)
+    assert with_points(five).loss_by_default(1e-3, "seconds", "exudyn first").lower_limit == pytest.approx(
+        one.cost_ratio
+    )
 
 
 def timed(factor=1.0, once=()):

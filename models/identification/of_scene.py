@@ -15,7 +15,7 @@ from models.core.scene_file import set_key
 from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS, of_table
 from models.identification.problem import ChannelOnClock, Curve, FitClock, Parameter, Problem, measured_channel
-from models.measured.channel import Source
+from models.measured.channel import MeasurementSource
 from models.measured.curve import channel_curve
 from models.measured.formats import open_source
 
@@ -158,7 +158,7 @@ def _check_channel_names(scene: Any, measurement: str | Path, engine: str) -> No
     _channels_with_names(source, measurement, tuple(names))
 
 
-def _channels_with_names(measurement_source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
+def _channels_with_names(measurement_source: MeasurementSource, path: str | Path, names: tuple[str, ...]) -> list[str]:
     """Names of the channels of a measurement that are among ``names``; InputError if there are none."""
     named = [channel.name for channel in measurement_source.channels if channel.name in names]
     if not named:

@@ -128,7 +128,7 @@ UNREADABLE_KINDS = (
 WORKBOOK_KIND, ARRAYS_KIND = UNREADABLE_KINDS[0], next(kind for kind in UNREADABLE_KINDS if ".npz" in kind.extensions)
 
 
-def format_of(path: Path, first_bytes: bytes) -> str:
+def format_of(measurement_path: Path, first_bytes: bytes) -> str:
     """Format of a file, from its first bytes; raises InputError with the kind of an unreadable file and advice."""
     form = next((form for magic, form in FORMAT_OF_FIRST_BYTES.items() if first_bytes.startswith(magic)), "")
     if form:
@@ -145,12 +145,12 @@ def format_of(path: Path, first_bytes: bytes) -> str:
     )
     if kind is not None:
         if kind.extensions == (".zip",):
-            kind = _archive_kind(path) or kind
-        raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
+            kind = _archive_kind(measurement_path) or kind
+        raise InputError(measurement_path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
     if is_text(first_bytes):
         return "CSV"
-    allowed = f"this is the beginning of no known format{extension_phrase(path)}; {KNOWN_FORMATS}"
-    raise InputError(path, "byte 0", first_bytes[:8].hex(" "), allowed)
+    allowed = f"this is the beginning of no known format{extension_phrase(measurement_path)}; {KNOWN_FORMATS}"
+    raise InputError(measurement_path, "byte 0", first_bytes[:8].hex(" "), allowed)
 
 
 def is_text(first_bytes: bytes) -> bool:
@@ -166,35 +166,40 @@ def usual_kind_of_extension(extension: str, format_name: str) -> str:
     return next((kind.name for kind in UNREADABLE_KINDS if extension in kind.extensions), format_name)
 
 
-def extension_phrase(path: Path) -> str:
+def extension_phrase(measurement_path: Path) -> str:
     """Phrase on the usual kind of files with this file's extension; empty if the extension is unknown."""
-    suffix = path.suffix.lower()
+    suffix = measurement_path.suffix.lower()
     kind = next((kind for kind in UNREADABLE_KINDS if suffix in kind.extensions), None)
     if kind is not None:
-        return f", and its extension {path.suffix} is that of {kind.name}: {kind.remedy}"
+        return f", and its extension {measurement_path.suffix} is that of {kind.name}: {kind.remedy}"
     usual = DESCRIPTION_OF_FORMAT.get(FORMAT_OF_EXTENSION.get(suffix, ""), "")
     return (
-        usual and f", and its extension {path.suffix} is that of {usual}: it is damaged or something else; {WRITE_ANEW}"
+        usual
+        and f", and its extension {measurement_path.suffix} is that of {usual}: it is damaged or something else; "
+        f"{WRITE_ANEW}"
     )
 
 
-def is_measurement(path: Path) -> bool:
+def is_measurement(measurement_path: Path) -> bool:
     """Whether a file may be a measurement: it has an extension of measurement files, or is no text."""
-    if path.suffix.lower() in (*FORMAT_OF_EXTENSION, *(each for kind in UNREADABLE_KINDS for each in kind.extensions)):
+    if measurement_path.suffix.lower() in (
+        *FORMAT_OF_EXTENSION,
+        *(each for kind in UNREADABLE_KINDS for each in kind.extensions),
+    ):
         return True
-    if path.suffix.lower() in ("", ".toml") or not path.is_file():
+    if measurement_path.suffix.lower() in ("", ".toml") or not measurement_path.is_file():
         return False
-    with path.open("rb") as file:
+    with measurement_path.open("rb") as file:
         return not is_text(file.read(256))
 
 
-def _archive_kind(path: Path) -> UnreadableKind | None:
+def _archive_kind(measurement_path: Path) -> UnreadableKind | None:
     """Kind of data in a zip archive: a spreadsheet workbook or numpy arrays; None for other contents."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(measurement_path) as archive:
             names = archive.namelist()
     except (zipfile.BadZipFile, OSError, ValueError):
-        return WORKBOOK_KIND if path.suffix.lower() in WORKBOOK_KIND.extensions else None
+        return WORKBOOK_KIND if measurement_path.suffix.lower() in WORKBOOK_KIND.extensions else None
     if any(name.startswith("xl/") or name == "content.xml" for name in names):
         return WORKBOOK_KIND
     return ARRAYS_KIND if names and all(name.endswith(".npy") for name in names) else None

@@ -13,7 +13,7 @@ from models.core.strict import read
 from models.core.systems import load
 from models.engines.cut_vehicle import ENGINES
 from models.measured.checks import check as check_recording
-from models.measured.faults_of_measurement import Faults
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.formats import write
 from models.measured.recording import Recording
 from models.systems.hub_forces.measurement import HubForces, hub_model
@@ -108,7 +108,7 @@ def measurement_of_test(chain_test: ChainTest, folder: Path, duration: float) ->
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
-def planted_faults(bits: int) -> Faults:
+def planted_faults(bits: int) -> SimulatedFaults:
     """All faults that are planted in the measurement."""
     table = {
         "noise": NOISE_LEVELS,
@@ -116,7 +116,7 @@ def planted_faults(bits: int) -> Faults:
         "quantisation": {"bits": bits},
         "dropouts": {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]},
     }
-    return read(Faults, table, "")
+    return read(SimulatedFaults, table, "")
 
 
 def recording_from_files(
@@ -374,7 +374,7 @@ def _quick_rows(folder: Path) -> list[Row]:
     drift."""
     proof = CHAIN_TESTS[0]
     true = measurement_of_test(proof, folder, 0.6)
-    samples = true.samples(read(Faults, {"noise": NOISE_LEVELS}, ""), SEED)
+    samples = true.samples(read(SimulatedFaults, {"noise": NOISE_LEVELS}, ""), SEED)
     recording = recording_from_files(true, samples, proof.vehicle, "csv", folder / "quick")
     run = march(stabilised_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
     wrong = errors_of_run(run, true)

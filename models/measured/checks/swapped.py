@@ -2,7 +2,7 @@
 
 from models.core.finding import Finding
 from models.measured.checks.agreement import MeasurementFault
-from models.measured.checks.evidence import Evidence
+from models.measured.checks.evidence import CheckedRecording
 from models.measured.checks.spectra import SEGMENT_LENGTH
 
 NAME, PAIR_NAME = "swapped", "exchanged"
@@ -13,16 +13,21 @@ correspondingly more unexplained: typically a half of correct recordings of 1.5 
 s."""
 
 
-def check(evidence: Evidence) -> list[Finding]:
+def check(checked_recording: CheckedRecording) -> list[Finding]:
     """Findings on exchanged hubs or channels. Sizes are the share of the inertial readings, in %, that the forces do
     not explain with the given channel map."""
-    if evidence.agreement_and_faults is None:
+    if checked_recording.agreement_and_faults is None:
         return [
-            Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.missing_data_text}.")
+            Finding(
+                NAME,
+                "note",
+                "",
+                f"Exchanged hubs were not looked for: this needs {checked_recording.missing_data_text}.",
+            )
         ]
-    findings = [_hub_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
-    findings += [_channel_pair_finding(fault) for fault in evidence.faults if fault.kind == "crossed"]
-    return [*findings, _remaining_disagreement(evidence), _indistinguishable_hubs(evidence)]
+    findings = [_hub_finding(fault) for fault in checked_recording.faults if fault.kind == "swapped"]
+    findings += [_channel_pair_finding(fault) for fault in checked_recording.faults if fault.kind == "crossed"]
+    return [*findings, _remaining_disagreement(checked_recording), _indistinguishable_hubs(checked_recording)]
 
 
 def _hub_finding(fault: MeasurementFault) -> Finding:
@@ -44,10 +49,13 @@ def _channel_pair_finding(fault: MeasurementFault) -> Finding:
     return Finding(PAIR_NAME, "doubt", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
-def _indistinguishable_hubs(evidence: Evidence) -> Finding:
+def _indistinguishable_hubs(checked_recording: CheckedRecording) -> Finding:
     """Finding on pairs of hubs whose forces move the vehicle so similarly that an exchange could not be seen."""
-    assert evidence.agreement_and_faults is not None
-    pairs = [" with ".join(s.name for s in pair) for pair in evidence.agreement_and_faults[0].undetectable_exchanges()]
+    assert checked_recording.agreement_and_faults is not None
+    pairs = [
+        " with ".join(s.name for s in pair)
+        for pair in checked_recording.agreement_and_faults[0].undetectable_exchanges()
+    ]
     if not pairs:
         return Finding(PAIR_NAME, "note", "", "Any two channels of hub forces that were exchanged would be seen.")
     text = (
@@ -57,13 +65,13 @@ def _indistinguishable_hubs(evidence: Evidence) -> Finding:
     return Finding(PAIR_NAME, "note", "", text, float(len(pairs)), "pairs")
 
 
-def _remaining_disagreement(evidence: Evidence) -> Finding:
+def _remaining_disagreement(checked_recording: CheckedRecording) -> Finding:
     """Finding on the disagreement of forces and motion that remains after all faults are corrected."""
-    assert evidence.agreement_and_faults is not None
-    agreement = evidence.agreement_and_faults[0]
-    share = agreement.unexplained
+    assert checked_recording.agreement_and_faults is not None
+    agreement = checked_recording.agreement_and_faults[0]
+    share = agreement.unexplained_shares
     low, high = int(share.argmin()), int(share.argmax())
-    best, worst = (f"{100 * share[i]:.2g} % ({agreement.outputs[i].name})" for i in (low, high))
+    best, worst = (f"{100 * share[i]:.2g} % ({agreement.reading_signals[i].name})" for i in (low, high))
     text = (
         f"Through the vehicle file the hub forces explain the inertial channels but for {best} to {worst} of their "
         f"size between {agreement.frequencies[0]:.3g} and {agreement.frequencies[-1]:.3g} Hz"
@@ -79,4 +87,4 @@ def _remaining_disagreement(evidence: Evidence) -> Finding:
         "so that delays and factors are not to be relied upon, and true ones may be hidden. Check frame, clocks, "
         "places of the sensors and the vehicle file."
     )
-    return Finding(NAME, "doubt", "", text, 100 * median_share, "%", tuple(s.name for s in agreement.outputs))
+    return Finding(NAME, "doubt", "", text, 100 * median_share, "%", tuple(s.name for s in agreement.reading_signals))

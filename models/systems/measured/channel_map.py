@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from models.core.errors import InputError, suggestion_phrase
-from models.measured.channel import Channel, Source
-from models.measured.signal import Frame, Places, Quantity, Signal
+from models.measured.channel import FileChannel, MeasurementSource
+from models.measured.signal import Frame, MeasuredSignal, MeasurementPlaces, Quantity
 from models.measured.units import factor_to_si
 from models.systems.measured.scene import MappedChannel, MeasuredScene
 
@@ -18,7 +18,9 @@ COMPONENTS_OF_QUANTITY: dict[Quantity, tuple[str, ...]] = {
 """Components that each quantity can have; none for quantities along a connector, which has a direction itself."""
 
 
-def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
+def mapped_signals(
+    scene: MeasuredScene, sources: Sequence[MeasurementSource], places: MeasurementPlaces
+) -> tuple[MeasuredSignal, ...]:
     """Returns the signals of all mapped channels, in the order of the scene; ``sources`` : the scene's opened files.
 
     Measurements at connectors, and strains, are only compared with the run. Raises InputError at the first channel that
@@ -29,7 +31,7 @@ def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Plac
         for file, source in zip(scene.files, sources, strict=True)
         for row in file.channels
     ]
-    names, mapped = [row.channel for _, row, _ in rows], list[Signal]()
+    names, mapped = [row.channel for _, row, _ in rows], list[MeasuredSignal]()
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
         signal = _signal_of_entry(scene.file, place, row, source, places, name)
@@ -52,7 +54,9 @@ def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Plac
     return tuple(mapped)
 
 
-def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
+def _signal_of_entry(
+    file: str, place: str, row: MappedChannel, source: MeasurementSource, places: MeasurementPlaces, name: str
+) -> MeasuredSignal:
     channel, at_hub = find(source, row.channel, file, place), row.at in places.hubs
     unit, unit_place = row.unit, (file, f"{place}, unit")
     if unit is None:
@@ -68,7 +72,7 @@ def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, 
         raise InputError(file, f"{place}, frame", frame, f"is no frame of {row.quantity} at {row.at!r}", frames)
     check = row.check or row.quantity == "strain" or row.at in places.connectors
     location = row.channel, row.quantity, row.at, row.component
-    return Signal(
+    return MeasuredSignal(
         name,
         source.path.name,
         *location,
@@ -82,7 +86,7 @@ def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, 
     )
 
 
-def find(source: Source, name: str, file: str, place: str) -> Channel:
+def find(source: MeasurementSource, name: str, file: str, place: str) -> FileChannel:
     """Returns the channel of a file by its name. Raises InputError, with the most similar names, if there is not
     exactly one.
     """
@@ -97,7 +101,7 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
     raise InputError(file, place, name, f"no such channel in {source.path.name}{_similar_channels(name, source)}")
 
 
-def _similar_channels(name: str, source: Source) -> str:
+def _similar_channels(name: str, source: MeasurementSource) -> str:
     """Text with the channels of a file whose names are most similar to ``name``, or else with the first channels."""
     plain = {channel.name.casefold(): channel.name for channel in source.channels}
     close = [plain[each] for each in get_close_matches(name.casefold(), plain, n=3, cutoff=0.6)]
@@ -107,7 +111,7 @@ def _similar_channels(name: str, source: Source) -> str:
     return f", which has {len(source.channels)}: {first}{', ...' if len(source.channels) > 8 else ''}"
 
 
-def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> None:
+def _check_place(file: str, place: str, row: MappedChannel, places: MeasurementPlaces) -> None:
     """Raise InputError for a place where the mapped quantity cannot be measured, and for a component that it does not
     have there.
     """

@@ -19,13 +19,13 @@ from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 from models.core.scene_effects import extended_by_effects
 from models.core.whole_files import write_whole
-from models.measured.channel import SAMPLES_PER_BLOCK, Source
-from models.measured.columns import Columns
+from models.measured.channel import SAMPLES_PER_BLOCK, MeasurementSource
+from models.measured.columns import SampleFile
 from models.measured.gaps import without_impossible_values
-from models.measured.recording import Progress, Recording, no_progress
-from models.measured.resampling import EQUAL_RATES, resample_to
-from models.measured.signal import Signal
-from models.measured.timing import EVEN_CLOCK_SHARE, Timing, sample_timing
+from models.measured.recording import Progress, Recording, report_no_progress
+from models.measured.resampling import EQUAL_RATE_RATIO, resample_to
+from models.measured.signal import MeasuredSignal
+from models.measured.timing import EVEN_CLOCK_SHARE, SampleTiming, sample_timing
 from models.systems.measured.scene import MeasuredScene
 
 COLUMNS_FILE, RAW_COLUMNS_FILE, SOURCES_FILE, ABSURD_VALUES_FILE = (
@@ -49,9 +49,9 @@ class ClockGroup:
     The times are corrected for the drift of the file's clock, and shifted.
     """
 
-    source: Source
-    signals: tuple[Signal, ...]
-    timing: Timing
+    source: MeasurementSource
+    signals: tuple[MeasuredSignal, ...]
+    timing: SampleTiming
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -84,11 +84,11 @@ class ClockGrid:
 
 def record_on_clock(
     scene: MeasuredScene,
-    sources: Sequence[Source],
-    signals: Sequence[Signal],
+    sources: Sequence[MeasurementSource],
+    signals: Sequence[MeasuredSignal],
     hubs: Sequence[str],
     folder: Path,
-    progress: Progress = no_progress,
+    progress: Progress = report_no_progress,
 ) -> Recording:
     """Resample the mapped signals of opened files to common sample times, store them as columns in ``folder``, and
     apply the scene's effects.
@@ -126,7 +126,7 @@ def record_on_clock(
     return extended_by_effects(Recording(tuple(signals), columns, grid.period, began, comment, tuple(findings)), scene)
 
 
-def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
+def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[MeasuredSignal], columns: SampleFile) -> None:
     """Convert moments measured about points above or below hubs to moments about the hubs: (Mx - r Fy, My + r Fx) for a
     point r (m) above the hub.
     """
@@ -143,7 +143,7 @@ def _clock_finding(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGr
     """Returns a finding on how all channels were resampled to the common sample times."""
     groups_by_method: dict[str, list[str]] = {}
     for group in groups:
-        faster = group.timing.period < grid.period * (1 - EQUAL_RATES)
+        faster = group.timing.period < grid.period * (1 - EQUAL_RATE_RATIO)
         method = (
             "as it is" if _is_on_clock(group, grid) else "filtered without phase" if faster else "interpolated linearly"
         )
@@ -154,7 +154,9 @@ def _clock_finding(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGr
     return Finding("clock", "note", "recording", text, rate, "Hz")
 
 
-def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
+def file_shifts(
+    scene: MeasuredScene, sources: Sequence[MeasurementSource]
+) -> tuple[list[float], datetime | None, list[Finding]]:
     """Returns the shift (s) of each file's times, the date at which the common time is 0, and findings on missing start
     times.
     """
@@ -170,12 +172,14 @@ def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[f
     return offsets, None, [Finding("start", "doubt" if several else "note", unsaid, f"{text}.")]
 
 
-def _mapped_groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
+def _mapped_groups(
+    source: MeasurementSource, signals: Sequence[MeasuredSignal], shift: float, drift: float
+) -> Iterator[ClockGroup]:
     """Yields the channel groups of a file that have mapped channels, with their times in the common time. shift : s;
     drift : relative error of the file's clock.
     """
     group_of_channel = {channel.name: channel.group for channel in source.channels}
-    mapped = dict[int, list[Signal]]()
+    mapped = dict[int, list[MeasuredSignal]]()
     for signal in (signal for signal in signals if signal.file == source.path.name):
         mapped.setdefault(group_of_channel[signal.channel], []).append(signal)
     for first, *other_signals in mapped.values():
@@ -214,7 +218,7 @@ def _clock_grid(scene: MeasuredScene, wheel_force_groups: list[ClockGroup]) -> C
     settings, file, timings = scene.clock, scene.file, [group.timing for group in wheel_force_groups]
     fastest = min(timings, key=lambda timing: timing.period)
     period = 1.0 / settings.rate if settings.rate else fastest.period
-    if period < fastest.period * (1 - EQUAL_RATES):
+    if period < fastest.period * (1 - EQUAL_RATE_RATIO):
         slower = f"is faster than the wheel forces, {fastest.rate:g} Hz, which adds nothing"
         raise InputError(file, "clock.rate", settings.rate, slower)
     first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
@@ -257,8 +261,12 @@ def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> It
 
 
 def _recording_columns(
-    folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: ClockGrid
-) -> Columns:
+    folder: Path,
+    scene: MeasuredScene,
+    signals: Sequence[MeasuredSignal],
+    sources: Sequence[MeasurementSource],
+    grid: ClockGrid,
+) -> SampleFile:
     """Opens the columns of a recording, new or begun earlier from the same files. Raises InputError where the folder
     has columns of other files.
     """
@@ -269,7 +277,7 @@ def _recording_columns(
     if path.is_file() and json.loads(path.read_text()) != described:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
     write_whole(path, json.dumps(described))
-    return Columns(folder / COLUMNS_FILE, tuple(signal.name for signal in signals), grid.count)
+    return SampleFile(folder / COLUMNS_FILE, tuple(signal.name for signal in signals), grid.count)
 
 
 def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
@@ -285,7 +293,7 @@ def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
     )
 
 
-def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
+def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: SampleFile, folder: Path) -> list[Finding]:
     """Write a group that was sampled at the recording's sample times into the columns, block by block, NaN in gaps.
     Returns findings on absurd values.
     """
@@ -315,13 +323,13 @@ def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folde
     return absurd
 
 
-def _write_resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
+def _write_resampled(group: ClockGroup, grid: ClockGrid, columns: SampleFile, folder: Path) -> list[Finding]:
     """Resample a group with other sample times into the columns, by a temporary file, signal by signal. Returns
     findings on absurd values.
     """
     clock, absurd = group.timing, list[Finding]()
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
-    raw = Columns(folder / RAW_COLUMNS_FILE, group.names, count)
+    raw = SampleFile(folder / RAW_COLUMNS_FILE, group.names, count)
     for block in group.source.blocks(group.names):
         raw.put(group.names, block.first, group.si(block.values))
     for signal in group.signals:

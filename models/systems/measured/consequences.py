@@ -19,10 +19,10 @@ from models.core.finding import LISTED_FINDINGS, Finding
 from models.drift.score import Verdict, root_mean_square
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.measured.checks.spikes import spike_positions
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.measured.gaps import LONGEST_BRIDGED_GAP, filled_samples
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
@@ -36,7 +36,7 @@ NEGLIGIBLE_FORCE_SHARE = 0.02
 """Rms of a section force divided by the largest rms in the same unit, below which the force is not compared."""
 SETTLING_DURATION = 1.0
 """Time (s) at the beginning of a run that is not compared, in which the run settles."""
-Samples = dict[Signal, np.ndarray]
+Samples = dict[MeasuredSignal, np.ndarray]
 Run = Callable[[Recording, Path], SectionOutcome]
 
 
@@ -149,7 +149,7 @@ def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -
     """Write samples of signals into columns in ``folder``, and return them as a recording."""
     folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples.values())))
-    columns = Columns(folder / "samples.columns", tuple(s.name for s in recording.signals), count)
+    columns = SampleFile(folder / "samples.columns", tuple(s.name for s in recording.signals), count)
     columns.write(0, np.column_stack([samples[s] for s in recording.signals]))
     return Recording(recording.signals, columns, recording.period)
 
@@ -175,7 +175,7 @@ def _consequence_of_most_changed_force(
     return max(every, key=lambda computed: (computed.grade, abs(computed.force)), default=Consequence(finding))
 
 
-def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _read_later(finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float) -> Samples:
     """Samples of signals corrected for a constant delay, or for a clock's drift, which grows from the start on."""
     size, count = finding.size or 0.0, len(next(iter(samples.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
@@ -195,17 +195,17 @@ def _read_at(values: np.ndarray, samples_later: np.ndarray) -> np.ndarray:
     return np.where(lost, np.nan, spline(np.clip(at, *places[known][[0, -1]])))
 
 
-def _divided_by_factor(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _divided_by_factor(finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float) -> Samples:
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
     return {s: samples[s] / factor for s in signals}
 
 
-def _offset_removed(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _offset_removed(finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float) -> Samples:
     return {s: samples[s] - (finding.size or 0.0) for s in signals}
 
 
-def _moments_corrected(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _moments_corrected(finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float) -> Samples:
     force = {(s.at, s.component): s for s in samples if s.quantity == "force" and not s.check}
     across = {"x": ("y", -1.0), "y": ("x", 1.0)}
     return {
@@ -215,14 +215,16 @@ def _moments_corrected(finding: Finding, signals: Sequence[Signal], samples: Sam
     }
 
 
-def _channels_exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _channels_exchanged(
+    finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float
+) -> Samples:
     first, second = signals
     return {first: samples[second], second: samples[first]}
 
 
-def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _without_spikes(finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float) -> Samples:
     """Samples of signals with spikes of one or two samples replaced by interpolation."""
-    out = dict[Signal, np.ndarray]()
+    out = dict[MeasuredSignal, np.ndarray]()
     for s in signals:
         at, values = spike_positions(samples[s])[0], samples[s].copy()
         values[np.minimum(np.concatenate((at, at + 1)), len(values) - 1)] = np.nan
@@ -230,11 +232,11 @@ def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Sample
     return out
 
 
-def _bridge_varied(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _bridge_varied(finding: Finding, signals: Sequence[MeasuredSignal], samples: Samples, period: float) -> Samples:
     """Samples of signals with gaps bridged as for the run, plus or minus the bridge's standard deviation, with the sign
     alternating from gap to gap.
     """
-    out = dict[Signal, np.ndarray]()
+    out = dict[MeasuredSignal, np.ndarray]()
     for s in signals:
         if s.quantity in ("force", "moment"):
             values, gaps = filled_samples(samples[s], period, LONGEST_BRIDGED_GAP)
@@ -244,7 +246,7 @@ def _bridge_varied(finding: Finding, signals: Sequence[Signal], samples: Samples
     return out
 
 
-CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
+CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[MeasuredSignal], Samples, float], Samples]] = {
     "shift": _read_later,
     "drift": _read_later,
     "gain": _divided_by_factor,

@@ -21,11 +21,11 @@ from models.core.time_series import write_time_series
 from models.drift import score
 from models.drift.score import Limits, Verdict, section_forces
 from models.measured import axle_forces
-from models.measured.axle_balance import FORCE_PLACES, axle_forces_of, axle_signals
-from models.measured.columns import Columns
+from models.measured.axle_balance import LOCATIONS_OF_AXLE_FORCES, axle_forces_of, axle_signals
+from models.measured.columns import SampleFile
 from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import MeasuredSignal, Quantity
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome
 from models.systems.measured.sections import SectionChannel
 from models.systems.pitch_plane import trust as drift_trust
@@ -120,7 +120,7 @@ def _verdict_with_measured_pitch(job: PlaneJob, result: Result, limits: Limits, 
 
 def _force_frames(job: PlaneJob) -> set[str]:
     """Frames ("inertial", "body" or "hub") of the vertical forces at both axles."""
-    return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(job.recording, axle)}
+    return {signal.frame for axle in LOCATIONS_OF_AXLE_FORCES for signal in axle_signals(job.recording, axle)}
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
@@ -128,7 +128,7 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     gaps.
     """
     period, said, frames = job.recording.period, list[Finding](), _force_frames(job)
-    forces = {axle: ("N", _axle_force(job, axle, said)) for axle in FORCE_PLACES}
+    forces = {axle: ("N", _axle_force(job, axle, said)) for axle in LOCATIONS_OF_AXLE_FORCES}
     write_time_series(folder / "wheel_forces.csv", forces, period)
     if "inertial" in frames and len(frames) > 1:
         text = "vertical forces must all keep their direction in space, or all turn with the vehicle"
@@ -173,13 +173,13 @@ def _axle_force(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray
     """
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
-        axle_place, left, right = map(repr, FORCE_PLACES[axle])
+        axle_place, left, right = map(repr, LOCATIONS_OF_AXLE_FORCES[axle])
         text = f"the vertical force is needed at {axle_place}, or at both {left} and {right}"
         raise InputError(job.file, "files.channels", None, text)
     return np.asarray(sum(_samples_without_gaps(job, signal, findings) for signal in signals))
 
 
-def _samples_without_gaps(job: PlaneJob, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
+def _samples_without_gaps(job: PlaneJob, signal: MeasuredSignal, all_findings: list[Finding]) -> np.ndarray:
     values, _, findings = bridged_signals(job.recording, signal)
     all_findings += findings
     return values
@@ -204,7 +204,7 @@ def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> d
     write_time_series(folder / "pitch.csv", columns, job.recording.period)
     if not filtered:
         return {"file": "pitch.csv", "bandwidth": hold.smoothing}
-    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in FORCE_PLACES))
+    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in LOCATIONS_OF_AXLE_FORCES))
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
@@ -229,7 +229,7 @@ def _section_outcome(result: Result, findings: tuple[Finding, ...], folder: Path
             f"{CHASSIS_NAME} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS_NAME, "pitch"
         )
         channels[answer] = -result[name]
-    columns = Columns(folder / "run.f64", tuple(answer.name for answer in channels), len(result.times))
+    columns = SampleFile(folder / "run.f64", tuple(answer.name for answer in channels), len(result.times))
     columns.write(0, np.column_stack(list(channels.values())))
     surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan
     period, count = float(result.times[1]), len(result.times)

@@ -24,11 +24,11 @@ from models.core.systems import load
 from models.drift.score import Verdict
 from models.fatigue.counting import CountedLoad, counted_load
 from models.measured.checks import findings_of_all_checks
-from models.measured.checks.evidence import Evidence
+from models.measured.checks.evidence import CheckedRecording
 from models.measured.checks.spectra import white_noise
 from models.measured.checks.weight import mean_hub_moments
-from models.measured.recording import Progress, Recording, no_progress
-from models.measured.signal import Signal
+from models.measured.recording import Progress, Recording, report_no_progress
+from models.measured.signal import MeasuredSignal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.clock import record_on_clock
@@ -85,11 +85,11 @@ class Examination:
     temporary_folder: "TemporaryDirectory[str] | None" = None
 
     @cached_property
-    def evidence(self) -> Evidence:
+    def evidence(self) -> CheckedRecording:
         """Recording, vehicle and stated noise in the form that the checks of recordings take."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in QUANTITY_OF_NOISE_KEY.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
-        return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
+        return CheckedRecording(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
 
     @property
     def has_error_findings(self) -> bool:
@@ -106,7 +106,7 @@ class Examination:
         """The outcome of the chosen run; None where no run was made."""
         return self.runs.get(self.chosen_run)
 
-    def is_input(self, signal: Signal) -> bool:
+    def is_input(self, signal: MeasuredSignal) -> bool:
         """Whether a signal is an input of the chosen run; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
         return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN))
@@ -130,7 +130,11 @@ class Examination:
         return SectionRun(vehicle, recording, sections, *settings)
 
     def march(
-        self, name: str, folder: Path, progress: Callable[[float, float], None] = no_progress, error: bool = False
+        self,
+        name: str,
+        folder: Path,
+        progress: Callable[[float, float], None] = report_no_progress,
+        error: bool = False,
     ) -> SectionOutcome:
         """Make a run by its name, or complete the run in a folder. error : whether the error of a run in the pitch
         plane is estimated.
@@ -155,7 +159,7 @@ def run(
     scene: MeasuredScene,
     engine: str = "",
     folder: Path | None = None,
-    progress: Progress = no_progress,
+    progress: Progress = report_no_progress,
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
@@ -236,7 +240,7 @@ def _start_examination(scene: MeasuredScene, engine: str, folder: Path, progress
     return exam
 
 
-def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
+def read_files(scene: MeasuredScene, folder: Path, progress: Progress = report_no_progress) -> Recording:
     """Reads the files of a scene as a recording with common sample times, stored in a folder. Raises InputError for
     unusable files.
     """

@@ -22,8 +22,8 @@ from models.core.whole_files import write_whole
 from models.engines.cut_vehicle import TUMBLED_PITCH, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
-from models.measured.columns import Columns
-from models.measured.recording import Recording, no_progress
+from models.measured.columns import SampleFile
+from models.measured.recording import Recording, report_no_progress
 from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import Inputs, PrescribedAngles, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
@@ -93,7 +93,7 @@ class SectionOutcome:
     counts : of steps, force calls and states.
     """
 
-    columns: Columns
+    columns: SampleFile
     answers: tuple[SectionChannel, ...]
     period: float
     done: int
@@ -174,7 +174,7 @@ def check(job: SectionRun) -> None:
 
 
 def run(
-    job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = CHECKPOINT_INTERVAL
+    job: SectionRun, folder: Path, progress: Progress = report_no_progress, block: float = CHECKPOINT_INTERVAL
 ) -> SectionOutcome:
     """Run a recording, or complete its run in ``folder``; ``progress`` is called with the simulated and the total time
     (s).
@@ -211,7 +211,7 @@ class _March:
         elif self.filter is not None:
             known = self.filter.state
             self.filter.state = replace(known, **{name: saved[name] for name in vars(known)})
-        self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
+        self.columns = SampleFile(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
 
     def outcome(self) -> SectionOutcome:
         """Returns the outcome of the run up to now."""

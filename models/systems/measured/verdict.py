@@ -28,7 +28,7 @@ from models.drift.score import (
 )
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
@@ -88,7 +88,7 @@ class ChannelComparison:
     ``STRETCH_ERROR_LIMIT`` of the channel's rms, infinite if never.
     """
 
-    signal: Signal
+    signal: MeasuredSignal
     answer: SectionChannel
     offset: float
     bands: tuple[FrequencyBand, ...]
@@ -97,7 +97,7 @@ class ChannelComparison:
     trusted_time: float
 
 
-def channels_to_compare(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
+def channels_to_compare(job: SectionRun) -> tuple[tuple[MeasuredSignal, SectionChannel], ...]:
     """Returns pairs of a measured signal and the run's channel of the same quantity, for check signals and
     accelerations.
 
@@ -107,7 +107,7 @@ def channels_to_compare(job: SectionRun) -> tuple[tuple[Signal, SectionChannel],
     return tuple((s, a) for s in outside if _same_axes(job, s) for a in job.sections.answers if a.measures(s))
 
 
-def _same_axes(job: SectionRun, signal: Signal) -> bool:
+def _same_axes(job: SectionRun, signal: MeasuredSignal) -> bool:
     """Whether the run computes a signal's quantity in the axes of the signal."""
     if signal.at in job.vehicle.hubs and signal.quantity in ("force", "moment"):
         return signal.frame == job.sections.frame
@@ -115,7 +115,7 @@ def _same_axes(job: SectionRun, signal: Signal) -> bool:
 
 
 def paired_channels(
-    recording: Recording, run: SectionOutcome, signal: Signal, answer: SectionChannel
+    recording: Recording, run: SectionOutcome, signal: MeasuredSignal, answer: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns times (n,) in s of a run, and measured and computed values (n,) of a channel."""
     computed, skip = run.samples(answer), round(run.period / recording.period)
@@ -126,7 +126,7 @@ def paired_channels(
 def compare(
     recording: Recording,
     run: SectionOutcome,
-    signal: Signal,
+    signal: MeasuredSignal,
     answer: SectionChannel,
     slopes: tuple[float, ...] = (3.0, 5.0, 8.0),
 ) -> ChannelComparison:
