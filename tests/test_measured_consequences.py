@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.core.finding import Finding
-from models.drift.score import Verdict, root_mean_square
+from models.drift.score import StabilisedRunVerdict, root_mean_square
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.recording import Recording
@@ -92,7 +92,7 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
 
 
 def test_words_follow_the_bounds():
-    finding, good = Finding("shift", "doubt", "fl", ""), Verdict("accepted", "held")
+    finding, good = Finding("shift", "doubt", "fl", ""), StabilisedRunVerdict("accepted", "held")
     one = Consequence(finding, "a", FORCE_LIMITS[0], 1.0 + 0.9 * DAMAGE_LIMITS[0])
     several = (
         one,
@@ -105,5 +105,5 @@ def test_words_follow_the_bounds():
     assert words == ["accepted", "accepted with doubt", "rejected", "rejected", "accepted with doubt"]
     assert (
         verdict_with_consequences(good, []) is good
-        and verdict_with_consequences(Verdict("stabilise", ""), [one]).word == "stabilise"
+        and verdict_with_consequences(StabilisedRunVerdict("stabilise", ""), [one]).word == "stabilise"
     )

@@ -17,7 +17,13 @@ from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 from models.ensemble.workers import process_pool
 from models.identification.fit import fit
-from models.identification.problem import FAILED_RESIDUAL, FitClock, Parameter, Problem, measured_channel
+from models.identification.problem import (
+    FAILED_RESIDUAL,
+    FitClock,
+    IdentificationProblem,
+    IdentifiedParameter,
+    measured_channel,
+)
 from models.identification.uncertainty import uncertainty
 from models.rail.equations import Equations
 from models.rail.limit_cycle import branch_of_orbits, orbit_of_small_amplitude, refined_orbit
@@ -66,8 +72,12 @@ def bent_problem():
     times, random = np.linspace(0.0, 1.0, 200), np.random.default_rng(5)
     clock = FitClock(times)
     values = np.exp(-2.0 * times) + 0.3 * times + 0.02 * random.standard_normal(200)
-    parameters = [Parameter("a", 0.7), Parameter("b", -1.0, high=-0.1), Parameter("c", 0.1)]
-    return Problem(bent, parameters, [measured_channel("y", "-", (times, values), clock)], clock)
+    parameters = [
+        IdentifiedParameter("a", 0.7),
+        IdentifiedParameter("b", -1.0, upper_bound=-0.1),
+        IdentifiedParameter("c", 0.1),
+    ]
+    return IdentificationProblem(bent, parameters, [measured_channel("y", "-", (times, values), clock)], clock)
 
 
 @CREWS

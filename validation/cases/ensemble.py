@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.statistics import deviation_with_error, percentiles, quantile_with_interval
-from models.ensemble.store import Arrays
+from models.ensemble.store import ArraysByName
 from models.ensemble.workers import process_pool
 from models.systems.pitch_plane.noise_paths import NoisePaths, largest_difference, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
@@ -83,7 +83,7 @@ def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.nda
     """Rows of a quick run: a few paths of one second, computed in threads because these start at once."""
     paths = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
-        two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
+        two = run_paths(job, 12, executor=pool, blocks=PathBlocks(3))
     engines, _ = _engine_rows_and_times(scene, job.truth, times, paths, 2, None)
     return [
         _single_run_row(force_folder, 1.0, paths),
@@ -93,7 +93,7 @@ def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.nda
     ]
 
 
-def _single_run_row(force_folder: Path, duration: float, paths: Arrays) -> Row:
+def _single_run_row(force_folder: Path, duration: float, paths: ArraysByName) -> Row:
     """Row: path 7 of the ensemble equals a single run of the scene with ``path = 7``."""
     alone = simulate(_noisy_scene(force_folder, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
@@ -106,7 +106,7 @@ def _single_run_row(force_folder: Path, duration: float, paths: Arrays) -> Row:
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _equal_bits_row(row_name: str, title: str, paths: Arrays, other_paths: Arrays) -> Row:
+def _equal_bits_row(row_name: str, title: str, paths: ArraysByName, other_paths: ArraysByName) -> Row:
     """Row: two ensembles are equal to the last bit."""
     count = len(other_paths["drift_off"])
     equal = all(np.array_equal(paths[name][:count], other_paths[name], equal_nan=True) for name in paths)
@@ -121,22 +121,22 @@ def _equal_bits_row(row_name: str, title: str, paths: Arrays, other_paths: Array
     )
 
 
-def _interrupted_row(job: NoisePaths, paths: Arrays, block_folder: Path) -> Row:
+def _interrupted_row(job: NoisePaths, paths: ArraysByName, block_folder: Path) -> Row:
     def stop(state: Any) -> None:
         if state.done >= 6:
             raise KeyboardInterrupt
 
     try:
-        run_paths(job, 12, block_folder, blocks=Blocks(3), progress=stop)
+        run_paths(job, 12, block_folder, blocks=PathBlocks(3), report_progress=stop)
     except KeyboardInterrupt:
-        again = run_paths(job, 12, block_folder, blocks=Blocks(3))
+        again = run_paths(job, 12, block_folder, blocks=PathBlocks(3))
         return _equal_bits_row(
             "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", paths, again
         )
     raise AssertionError("the interrupt was lost")
 
 
-def _killed_row(job: NoisePaths, paths: Arrays, block_folder: Path) -> Row:
+def _killed_row(job: NoisePaths, paths: ArraysByName, block_folder: Path) -> Row:
     """Row: a run is killed after two of its blocks, then resumed, and must give the same ensemble."""
     child = get_context("spawn").Process(target=_run_slow_job, args=(job, block_folder))
     child.start()
@@ -145,7 +145,7 @@ def _killed_row(job: NoisePaths, paths: Arrays, block_folder: Path) -> Row:
     child.kill()
     child.join()
     modification_times = {path: path.stat().st_mtime_ns for path in block_folder.glob("block*.npz")}
-    again = run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=Blocks(20))
+    again = run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=PathBlocks(20))
     if (
         not modification_times
         or len(modification_times) == RECOMPUTED_PATHS // 20
@@ -162,7 +162,7 @@ def _killed_row(job: NoisePaths, paths: Arrays, block_folder: Path) -> Row:
 
 
 def _run_slow_job(job: NoisePaths, block_folder: Path) -> None:
-    run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
+    run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=PathBlocks(20), report_progress=lambda state: time.sleep(0.1))
 
 
 def _in_separate_process(function: Callable[..., Any], *args: Any) -> Any:
@@ -261,17 +261,17 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
 
 
 def _engine_rows_and_times(
-    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, path_count: int, pool: Executor | None
+    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: ArraysByName, path_count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
     """Rows on the agreement of the first paths between engines, and the wall time (s) per path and step of each
     engine."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
-    jobs_by_method: dict[str, Callable[[], Arrays]] = {
+    jobs_by_method: dict[str, Callable[[], ArraysByName]] = {
         "mujoco, 1 thread": lambda: run_paths(single, path_count),
         "mujoco, 2 threads": lambda: run_paths(two, path_count),
         "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(
-            exudyn, path_count, executor=pool, blocks=Blocks(1)
+            exudyn, path_count, executor=pool, blocks=PathBlocks(1)
         ),
     }
     rows, prices = [], {}
@@ -330,7 +330,7 @@ def _half_step_row(force_folder: Path) -> Row:
 
 
 def _saved_data(
-    truth: np.ndarray, times: np.ndarray, paths: Arrays, large_ensemble: Saved, prices: dict[str, float]
+    truth: np.ndarray, times: np.ndarray, paths: ArraysByName, large_ensemble: Saved, prices: dict[str, float]
 ) -> Saved:
     """Saved numbers for the tables and the figure."""
     errors = paths["states"] - truth[:: round(1.0 / STEP)]

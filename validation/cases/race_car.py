@@ -11,8 +11,8 @@ from models.core.tables import write_table
 from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
 from models.identification.held_out import IdentifiedVehicle, ParameterSearch, identified_vehicle
-from models.identification.of_scene import problem_of
-from models.identification.problem import FitClock, Problem
+from models.identification.of_scene import identification_problem_of
+from models.identification.problem import FitClock, IdentificationProblem
 from models.identification.uncertainty import Uncertainty, uncertainty
 from models.measured.drive import read_drive
 from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
@@ -89,7 +89,7 @@ def _write_drive(folder: Path) -> None:
     write_table(folder / "known.csv", columns)
 
 
-def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
+def _noisy_problem(scene: SingleTrackScene, seed: int) -> IdentificationProblem:
     """Identification problem: the car's parameters are to be found from its noisy channels, starting from other
     values."""
     driven, random = run(scene), np.random.default_rng(seed)
@@ -99,7 +99,9 @@ def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
     }
     path = Path(scene.folder) / f"known measured {seed}.csv"
     write_table(path, {"time": ("s", DRIVE_TIMES), **columns})
-    return problem_of(_car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass=5.0)
+    return identification_problem_of(
+        _car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass_edge=5.0
+    )
 
 
 def _known_car_rows(folder: Path) -> list[Row]:
@@ -163,7 +165,9 @@ def _identified_race_car(file: Path, folder: Path) -> IdentifiedVehicle:
 
 def _race_car_rows(identified: IdentifiedVehicle) -> list[Row]:
     answer, rows = identified.bands, []
-    figures = zip(ERROR_AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
+    figures = zip(
+        ERROR_AIMS.items(), answer.relative_error(), answer.share_inside(), answer.relative_width(), strict=True
+    )
     for (name, aim), error, inside, width in figures:
         id = f"race_car.{name.replace(' ', '_')}"
         rows += [

@@ -42,8 +42,8 @@ SMOOTHED_LINE_COUNT = 9
 
 @dataclass(frozen=True)
 class SignalGroup:
-    """Signals that share a fault. forces : whether they are hub forces rather than readings; members : their indices
-    among the forces or the readings."""
+    """Signals that share a fault. forces : whether they are hub forces rather than readings; member_indices : their
+    indices among the forces or the readings."""
 
     name: str
     forces: bool
@@ -80,9 +80,9 @@ class MotionAgreement:
     """Measured cross spectra of hub forces and inertial readings, compared with the vehicle's response, at frequencies
     (f,) in Hz.
 
-    cross_spectra (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
+    cross_spectra (f, k, c) : mean of reading times conj(force); forces (f, c, c); reading_powers (f, k). response
     (f, k, c) : of the vehicle, with every correction so far. independent_averages : independent ones in each mean.
-    noise (k,) : power of the readings' white noise in every line.
+    noise_powers (k,) : power of the readings' white noise in every line.
     """
 
     frequencies: np.ndarray

@@ -29,7 +29,8 @@ class CheckedRecording:
     """Data on which the checks of a recording work. places : of accelerometers and gyros by name; stated_noise : stated
     white noise (SI), by name of signal.
 
-    plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
+    pitch_plane_parameters : those of the pitch-plane vehicle, if the recording drives one instead of a vehicle in
+    space.
     """
 
     recording: Recording

@@ -67,9 +67,9 @@ def _body_finding(
         text = f"A rigid body explains {body_name} but for {share_text}."
         return Finding(CHECK_NAME, "note", body_name, text, size, "%", names)
     cause = (
-        f"without {rigidity.suspect} it is rigid: check its mount, place, axes and factor"
-        if rigidity.suspect
+        f"without {rigidity.suspect_sensor} it is rigid: check its mount, place, axes and factor"
+        if rigidity.suspect_sensor
         else "no single sensor explains it: check places and axes of all"
     )
     text = f"No rigid body explains {share_text} on {body_name}; {cause}."
-    return Finding(CHECK_NAME, "doubt", rigidity.suspect or body_name, text, size, "%", names)
+    return Finding(CHECK_NAME, "doubt", rigidity.suspect_sensor or body_name, text, size, "%", names)

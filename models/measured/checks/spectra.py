@@ -32,8 +32,8 @@ SIDE_LINES = range(2, 5)
 
 @dataclass(frozen=True)
 class CrossSpectra:
-    """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz, for n
-    signals.
+    """Cross spectra averaged over segments: cross_spectra (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz,
+    for n signals.
 
     independent_averages : how many independent ones; segments with a sample that is missing are left out.
     white_noise_power : power in every line of white noise of variance 1.

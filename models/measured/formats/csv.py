@@ -49,8 +49,8 @@ class CsvFile(OpenFile):
     """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, and its last element is the end of the
     used rows.
 
-    clock : column of time among those of numbers, None where times are those of the clock. factor : to s. columns :
-    of the channels, among those of numbers.
+    time_column : column of time among those of numbers, None where times are those of the clock. factor : to s. columns
+    : of the channels, among those of numbers.
     """
 
     layout: CsvLayout

@@ -38,10 +38,10 @@ _THOUSANDS_PATTERN = re.compile(r"\s*[+-]?\d{1,3}([., '’\u00a0\u202f]\d{3})+([
 class CsvLayout:
     """Layout of the rows of a CSV file: separators, columns, clock.
 
-    separator, decimal : signs. begin : byte where the rows begin. line : number of the line before them. names :
-    headings of all columns. width : cells of a row, which may have empty ones beyond the last heading. text_columns :
-    columns that hold no numbers. clock : the column of time; time_stamps : how it is written, None for numbers. unit :
-    bytes of a character, as numpy reads it.
+    separator, decimal_sign : characters. first_byte : byte where the rows begin. line : number of the line before them.
+    names : headings of all columns. width : cells of a row, which may have empty ones beyond the last heading.
+    text_columns : columns that hold no numbers. time_column : the column of time; time_stamps : how it is written, None
+    for numbers. unit : bytes of a character, as numpy reads it.
     """
 
     separator: str

@@ -56,7 +56,7 @@ LINEAR_CONVERSION = {3: 0, 4: 1}
 
 @dataclass(frozen=True)
 class MdfFile(OpenFile):
-    """Reader of an MDF file; ``places`` holds the group and the index of every channel in the file."""
+    """Reader of an MDF file; ``channel_places`` holds the group and the index of every channel in the file."""
 
     channel_places: tuple[tuple[int, int], ...]
 

@@ -31,7 +31,7 @@ from models.core.errors import InputError
 from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, table_blocks
 from models.core.whole_files import whole_file
 from models.ensemble.runner import values_in_order
-from models.ensemble.store import Arrays, Store
+from models.ensemble.store import ArraysByName, BlockStore
 from models.systems.contact.scene import Method
 
 MOTION_COLUMNS = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
@@ -74,7 +74,7 @@ def solve_table(
     *,
     errors: bool = True,
     executor: Executor | None = None,
-    store: Store | None = None,
+    store: BlockStore | None = None,
 ) -> dict[str, int]:
     """Compute the creep forces of all contacts in the CSV file ``path`` and write them to ``output_path``. Returns the
     numbers of all rows and of refused rows.
@@ -113,7 +113,7 @@ def compile_kernels(build: Build, method: Method) -> None:
     _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION_COLUMNS, unit)}, build, method)
 
 
-def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> Arrays:
+def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> ArraysByName:
     """Solve a block of rows. Returns ``forces`` (rows, columns), the indices ``wrong`` (m,) of refused rows, and the
     reasons ``why`` (m,).
     """

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.finding import LISTED_FINDINGS, Finding
-from models.drift.score import Verdict, root_mean_square
+from models.drift.score import StabilisedRunVerdict, root_mean_square
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.measured.checks.spikes import spike_positions
 from models.measured.columns import SampleFile
@@ -103,7 +103,9 @@ def consequences(
     return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
 
-def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
+def verdict_with_consequences(
+    verdict: StabilisedRunVerdict, consequences: Sequence[Consequence]
+) -> StabilisedRunVerdict:
     """Returns the verdict on a run, lowered from "accepted" if findings change the section forces too much."""
     worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
@@ -113,7 +115,7 @@ def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequen
         f"accepted up to {FORCE_LIMITS[0]:.0%} and {DAMAGE_LIMITS[0]:.0%}, rejected beyond "
         f"{FORCE_LIMITS[1]:.0%} and {DAMAGE_LIMITS[1]:.0%}"
     )
-    return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
+    return StabilisedRunVerdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
 
 
 def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:

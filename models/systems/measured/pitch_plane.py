@@ -19,7 +19,7 @@ from models.core.finding import Finding
 from models.core.result import Result
 from models.core.time_series import write_time_series
 from models.drift import score
-from models.drift.score import Limits, Verdict, section_forces
+from models.drift.score import AcceptanceLimits, StabilisedRunVerdict, section_forces
 from models.measured import axle_forces
 from models.measured.axle_balance import LOCATIONS_OF_AXLE_FORCES, axle_forces_of, axle_signals
 from models.measured.columns import SampleFile
@@ -71,11 +71,11 @@ class PlaneRun:
 
     result: Result
     trust: Trust | None
-    verdict: Verdict
+    verdict: StabilisedRunVerdict
     outcome: SectionOutcome
 
 
-def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool = False) -> PlaneRun:
+def run(job: PlaneJob, folder: Path, limits: AcceptanceLimits | None = None, error: bool = False) -> PlaneRun:
     """Run a recording on the pitch-plane vehicle; files of its scene are written into a new folder. Raises InputError,
     Refused or RunFailed.
 
@@ -91,15 +91,22 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
-    verdict = score.blind_verdict(
-        figures, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
+    verdict = score.verdict_without_true_run(
+        figures,
+        effects,
+        result.times[-1],
+        limits or AcceptanceLimits(),
+        until,
+        pitch_uncertainty=score.stated_pitch_uncertainty(result),
     )
     if job.effect is None and verdict.word == "accepted":
-        verdict = _verdict_with_measured_pitch(job, result, limits or Limits(), verdict)
+        verdict = _verdict_with_measured_pitch(job, result, limits or AcceptanceLimits(), verdict)
     return PlaneRun(result, limited, verdict, _section_outcome(result, said, folder))
 
 
-def _verdict_with_measured_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
+def _verdict_with_measured_pitch(
+    job: PlaneJob, result: Result, limits: AcceptanceLimits, verdict: StabilisedRunVerdict
+) -> StabilisedRunVerdict:
     """Returns the verdict on an accepted free run after its pitch is compared with the measured pitch.
 
     Where forces turn with the vehicle no error grows, but offsets and forces in another frame still make it drift, and
@@ -107,7 +114,7 @@ def _verdict_with_measured_pitch(job: PlaneJob, result: Result, limits: Limits, 
     """
     angles = job.recording.find("angle", CHASSIS_NAME, "pitch")
     if not angles:
-        return Verdict("stabilise", UNCHECKED_TEXT) if _force_frames(job) != {"inertial"} else verdict
+        return StabilisedRunVerdict("stabilise", UNCHECKED_TEXT) if _force_frames(job) != {"inertial"} else verdict
     measured = job.recording.samples(angles[0])
     known = np.flatnonzero(np.isfinite(measured))
     beside = np.interp(result.times, job.recording.period * known, measured[known])
@@ -115,7 +122,7 @@ def _verdict_with_measured_pitch(job: PlaneJob, result: Result, limits: Limits, 
     if off <= limits.pitch_error:
         return verdict
     limit = f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets"
-    return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
+    return StabilisedRunVerdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
 
 
 def _force_frames(job: PlaneJob) -> set[str]:

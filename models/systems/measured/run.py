@@ -21,7 +21,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
 from models.core.result import Result
 from models.core.systems import load
-from models.drift.score import Verdict
+from models.drift.score import StabilisedRunVerdict
 from models.fatigue.counting import CountedLoad, counted_load
 from models.measured.checks import findings_of_all_checks
 from models.measured.checks.evidence import CheckedRecording
@@ -74,7 +74,7 @@ class Examination:
     drift: Drift | None = None
     trust: tuple[tuple[str, Trust], ...] = ()
     runs: dict[str, SectionOutcome] = field(default_factory=dict)
-    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    verdicts: dict[str, StabilisedRunVerdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
     channel_comparisons: tuple[ChannelComparison, ...] = ()
     plane: Result | None = None
@@ -187,7 +187,7 @@ def run(
         if not whole_run:
             raise
         exam.failed[exam.chosen_run] = str(failure)
-        exam.verdicts[exam.chosen_run] = Verdict("rejected", failure.reason)
+        exam.verdicts[exam.chosen_run] = StabilisedRunVerdict("rejected", failure.reason)
         labelled.data.attrs |= _endings_of_runs(exam)
         return labelled
 

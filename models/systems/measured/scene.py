@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
-from models.drift.score import Limits
+from models.drift.score import AcceptanceLimits
 from models.measured.axle_balance import LOCATIONS_OF_AXLE_FORCES
 from models.measured.signal import Frame, MeasurementPlaces, Quantity, TransducerPlace
 from models.own_model.scene_vehicle import scene_vehicle
@@ -149,7 +149,7 @@ class MeasuredScene(SceneFile):
     noise: Deviations = Deviations()
     stabilise: Stabiliser = Stabiliser()
     run: Run = Run()
-    limits: Limits = Field(default=RUN_LIMITS, description="of the verdict")
+    limits: AcceptanceLimits = Field(default=RUN_LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 

@@ -19,10 +19,10 @@ from models.core.finding import Finding
 from models.drift import score
 from models.drift.score import (
     DOUBTFUL_INNOVATION_LIMIT,
-    Limits,
+    AcceptanceLimits,
     RunErrors,
     RunFigures,
-    Verdict,
+    StabilisedRunVerdict,
     low_pass,
     root_mean_square,
 )
@@ -34,7 +34,7 @@ from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
 
-RUN_LIMITS = Limits(artificial_share=0.1)
+RUN_LIMITS = AcceptanceLimits(artificial_share=0.1)
 """Default limits of the verdict. A stabilising moment of 5 Hz, which is 12 % of the inertia term, takes 5 %
 off the damage of engine mounts on a rough road; a moment of 0.7 Hz is 2 % of that term and takes 1 % off.
 """
@@ -188,11 +188,11 @@ def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
 def judge(
     job: SectionRun,
     run: SectionOutcome,
-    limits: Limits = RUN_LIMITS,
+    limits: AcceptanceLimits = RUN_LIMITS,
     trusted: float | None = None,
     compared: Sequence[ChannelComparison] = (),
     noise: Mapping[str, float] | None = None,
-) -> Verdict:
+) -> StabilisedRunVerdict:
     """Judge a recording's run without knowledge of the true run.
 
     trusted : predicted time (s) for which a free run can be trusted, None if not known; compared : comparisons of check
@@ -204,16 +204,16 @@ def judge(
     off = {name: share for name, share in shares.items() if not share <= LARGEST_DISAGREEMENT}
     if off:
         told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
-        return Verdict(
+        return StabilisedRunVerdict(
             "rejected", f"channels that were not put in disagree (at most {LARGEST_DISAGREEMENT:.0%}): {told}"
         )
-    verdict = score.blind_verdict(
+    verdict = score.verdict_without_true_run(
         figures_of_run(run, job.vehicle),
         EFFECTS_OF_HOLD[job.hold.method],
         run.period * (run.done - 1),
         limits,
         trusted,
-        uncertainty=uncertainty(job.vehicle, job.hold, job.recording.period),
+        pitch_uncertainty=uncertainty(job.vehicle, job.hold, job.recording.period),
     )
     return _worded_for_spatial_vehicle(verdict)
 
@@ -237,20 +237,20 @@ def judge_beside_truth(
     run: SectionOutcome,
     true: VirtualMeasurement,
     hold: AttitudeHold,
-    limits: Limits = RUN_LIMITS,
+    limits: AcceptanceLimits = RUN_LIMITS,
     slope: float = WOEHLER_SLOPE,
-) -> Verdict:
+) -> StabilisedRunVerdict:
     """Judge a run on a virtual measurement by comparison with the true run; slope : Woehler exponent."""
     figures = figures_of_run(run, true.vehicle), errors_of_run(run, true, slope)
     return _worded_for_spatial_vehicle(score.verdict_on_run(*figures, EFFECTS_OF_HOLD[hold.method], limits))
 
 
-def _worded_for_spatial_vehicle(verdict: Verdict) -> Verdict:
+def _worded_for_spatial_vehicle(verdict: StabilisedRunVerdict) -> StabilisedRunVerdict:
     """Returns the verdict with words for the pitch plane replaced by words for a spatial vehicle."""
     reason = verdict.reason
     for plane, space in WORDS_OF_SCORE.items():
         reason = reason.replace(plane, space)
-    return Verdict(verdict.word, reason)
+    return StabilisedRunVerdict(verdict.word, reason)
 
 
 def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:

@@ -25,7 +25,7 @@ from models.core.steps import divides
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS, RADIANS_PER_SECOND
 from models.drift.growth import pitch_spring, rigid_pitch
-from models.drift.innovations import Consistency, consistency
+from models.drift.innovations import FilterConsistency, consistency
 from models.engines.assembly import Assembly, Channels
 from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
@@ -134,7 +134,7 @@ class GuidingEstimate:
     used_values: np.ndarray
     missed_values: np.ndarray
     innovation_sum: np.ndarray
-    consistency: Consistency
+    consistency: FilterConsistency
 
 
 _LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
@@ -273,7 +273,7 @@ def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
     )
 
 
-def _positions_in_intervals(consistency: Consistency, run: Result) -> Watched:
+def _positions_in_intervals(consistency: FilterConsistency, run: Result) -> Watched:
     """Position of each statistic of the innovations in its interval, from -1 at the lower end to 1 at the upper end."""
     return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
 
