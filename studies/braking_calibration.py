@@ -136,7 +136,7 @@ def _means_of_stops(
         options.speed_spread,
         options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, blocks=PathBlocks(STOPS_PER_BLOCK))
+    stops = run_paths(job, runs, executor=pool, path_blocks=PathBlocks(STOPS_PER_BLOCK))
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 

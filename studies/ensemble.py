@@ -108,7 +108,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                 repeated = run_paths(mujoco_threads(*path_arguments, crew.workers), options.engine_paths)
             else:
                 repeated = run_paths(
-                    noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, blocks=PathBlocks(1)
+                    noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, path_blocks=PathBlocks(1)
                 )
             gaps[engine] = largest_difference(statistics.first, repeated, row_times)
     write_measurement(measured, folder, period)

@@ -98,18 +98,18 @@ def test_drift_off_is_the_first_time_beyond_the_threshold(folder, expected):
 
 @pytest.mark.parametrize("block", [1, BLOCK, 50])
 def test_the_size_of_the_blocks_changes_nothing(folder, expected, block):
-    assert same(run_paths(job(folder), PATHS, blocks=PathBlocks(block)), expected)
+    assert same(run_paths(job(folder), PATHS, path_blocks=PathBlocks(block)), expected)
 
 
 @pytest.mark.parametrize("make", [lambda: ThreadPoolExecutor(2), Reversed], ids=["threads", "reversed"])
 def test_threads_and_order_change_nothing(folder, expected, make):
     with make() as executor:
-        assert same(run_paths(job(folder), PATHS, executor=executor, blocks=PathBlocks(BLOCK)), expected)
+        assert same(run_paths(job(folder), PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 def test_processes_change_nothing(folder, expected):
     with process_pool(2) as executor:
-        assert same(run_paths(job(folder), PATHS, executor=executor, blocks=PathBlocks(BLOCK)), expected)
+        assert same(run_paths(job(folder), PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 def test_a_dask_cluster_changes_nothing(folder, expected):
@@ -117,7 +117,7 @@ def test_a_dask_cluster_changes_nothing(folder, expected):
 
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local:  # noqa: SIM117
         with dask_workers(local.scheduler_address) as executor:
-            assert same(run_paths(job(folder), PATHS, executor=executor, blocks=PathBlocks(BLOCK)), expected)
+            assert same(run_paths(job(folder), PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 @pytest.mark.parametrize(
@@ -146,15 +146,15 @@ class ByOrder(NoisePaths):
 
 def test_noise_drawn_by_the_order_of_work_is_seen(folder):
     faulty = ByOrder(**vars(job(folder)))
-    one = run_paths(faulty, PATHS, blocks=PathBlocks(BLOCK))
+    one = run_paths(faulty, PATHS, path_blocks=PathBlocks(BLOCK))
     ByOrder.drawn = 0
     with Reversed() as executor:
-        assert not same(run_paths(faulty, PATHS, executor=executor, blocks=PathBlocks(BLOCK)), one)
+        assert not same(run_paths(faulty, PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), one)
 
 
 def test_progress_counts_paths_and_tells_the_time_left(folder):
     told = []
-    run_paths(job(folder), PATHS, blocks=PathBlocks(BLOCK), report_progress=told.append)
+    run_paths(job(folder), PATHS, path_blocks=PathBlocks(BLOCK), report_progress=told.append)
     assert [state.done for state in told] == [0, 3, 6, 9, 10]
     assert all(state.seconds_left == pytest.approx((10 - state.done) / state.rate) for state in told[1:])
     assert str(told[-1]).startswith("10 of 10 paths")
@@ -182,7 +182,7 @@ def test_a_killed_run_resumes_without_losing_a_block(folder, expected, tmp_path)
     assert 2 <= len(kept) < 4
     told = []
     assert same(
-        run_paths(job(folder), PATHS, tmp_path, blocks=PathBlocks(BLOCK), report_progress=told.append), expected
+        run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(BLOCK), report_progress=told.append), expected
     )
     assert told[0].done == BLOCK * len(kept)
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
@@ -207,7 +207,7 @@ def test_an_interrupt_leaves_the_finished_blocks_and_begins_no_others(folder, ex
     with pytest.raises(KeyboardInterrupt), ThreadPoolExecutor(1) as executor:
         run_paths(Counted(**vars(job(folder))), PATHS, tmp_path, executor, PathBlocks(1), stop)
     assert len(list(tmp_path.glob("block*.npz"))) == 2 and Counted.calls < PATHS / 2
-    assert same(run_paths(job(folder), PATHS, tmp_path, blocks=PathBlocks(1)), expected)
+    assert same(run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(1)), expected)
 
 
 def test_an_interrupt_while_workers_start_reaches_none_of_them():
@@ -223,11 +223,11 @@ def test_a_full_disk_ends_the_run_at_once_and_keeps_what_is_finished(folder, exp
     """What was half written is not there; with room again, the run goes on."""
     monkeypatch.setattr(whole_files.os, "fsync", _full_after(3))  # the note and two blocks
     with pytest.raises(RunFailed, match=r"the disk is full.*finished blocks are kept.*make room and resume"):
-        run_paths(job(folder), PATHS, tmp_path, blocks=PathBlocks(BLOCK))
+        run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(BLOCK))
     monkeypatch.undo()
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     assert {*kept} == {"job.json", ".lock", "block 000000.npz", "block 000001.npz"}
-    assert same(run_paths(job(folder), PATHS, tmp_path, blocks=PathBlocks(BLOCK)), expected)
+    assert same(run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(BLOCK)), expected)
     assert all((tmp_path / name).stat().st_mtime_ns == when for name, when in kept.items() if name != ".lock")
 
 
@@ -291,13 +291,13 @@ def test_other_forces_other_equations_and_other_counts_are_refused(folder, tmp_p
 
 
 def test_a_damaged_block_is_named(folder, tmp_path):
-    run_paths(job(folder), 4, tmp_path, blocks=PathBlocks(2))
+    run_paths(job(folder), 4, tmp_path, path_blocks=PathBlocks(2))
     damaged = store.BlockStore(tmp_path).path(1)
     content = bytearray(damaged.read_bytes())
     content[200] ^= 1
     damaged.write_bytes(content)
     with pytest.raises(InputError, match=r"block 000001\.npz: is damaged"):
-        run_paths(job(folder), 4, tmp_path, blocks=PathBlocks(2))
+        run_paths(job(folder), 4, tmp_path, path_blocks=PathBlocks(2))
 
 
 class Broken(NoisePaths):
@@ -318,7 +318,7 @@ def test_a_failure_names_path_and_block_and_loses_no_other(folder, expected, tmp
     assert "block 1 (paths 3 to 5): path 4: ZeroDivisionError: a fault" in str(caught.value)
     assert len(list(tmp_path.glob("block*.npz"))) == 3
     Broken.broken = False
-    assert same(run_paths(faulty, PATHS, tmp_path, blocks=PathBlocks(BLOCK)), expected)
+    assert same(run_paths(faulty, PATHS, tmp_path, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 def test_path_failures_survive_the_way_between_processes():

@@ -55,13 +55,13 @@ def test_a_stop_is_held_to_its_tolerance_with_as_few_steps_as_that_takes():
 def test_a_path_with_linear_creep_is_held_by_steps_alone():
     scene = own(PATHS)
     found = recommend(scene, 1e-9)
-    assert found.winners["", "calls"].error <= 1e-9 and scene.counted == "force calls"
+    assert found.winners["", "calls"].error <= 1e-9 and scene.work_count_name == "force calls"
     assert "DOP853" in found.search_truth.origin  # another family has said the same
 
 
 def test_more_cells_come_nearer_and_are_counted():
     scene = own({**PATHS, "contact": {"law": "fastsim"}}, "fy")
-    ladder = next(one for one in scene.ladders() if one.default)
+    ladder = next(one for one in scene.setting_ladders() if one.default)
     coarse, fine, exact = (
         scene.priced_run(scene.solve(ladder.setting(ladder.values.index(1.0 / n)), 0.05)) for n in (5, 11, 45)
     )

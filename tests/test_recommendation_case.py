@@ -31,8 +31,8 @@ class Whole(Swing):
 class Torn(Whole):
     """One engine gives no answer at all."""
 
-    def ladders(self):
-        return [*super().ladders(), SettingLadder("exudyn", "RK4", (0.1, 0.05), 4, default=0.1)]
+    def setting_ladders(self):
+        return [*super().setting_ladders(), SettingLadder("exudyn", "RK4", (0.1, 0.05), 4, default=0.1)]
 
     def solve(self, setting, duration):
         if setting.engine == "exudyn":
@@ -120,7 +120,7 @@ def test_a_run_of_minutes_is_not_made_where_the_tolerance_is_met_in_less():
         own, refined_reference(own, LOOSE_TOLERANCE, own.full_duration), LOOSE_TOLERANCE, own.full_duration, [quick]
     )
     rough = TriedSetting(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
-    ladder = own.ladders()[2]
+    ladder = own.setting_ladders()[2]
     assert not search._is_too_long(ladder, 0, rough)  # 8 s
     assert search._is_too_long(ladder, 2, rough)  # 24 s
     assert search.tried[-1].reason == "not run: it would take about 24 s, and the tolerance is met in 0.1 s"

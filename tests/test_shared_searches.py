@@ -163,14 +163,14 @@ STEPS = tuple(0.1 / 2**k for k in range(10))
 class Planted:
     """y = t^2 sin 5t with an error of 40 h^2, more of it in the second half; the reference errs as its steps say."""
 
-    title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, work_count_name = "planted", "y", "N", 0.0, "", "force calls"
     full_duration: float = 2.0
     searched_duration: float = 1.0
 
-    def ladders(self):
+    def setting_ladders(self):
         return [SettingLadder("exudyn", "second", STEPS, 2), SettingLadder("exudyn", "first", STEPS, 1, default=0.05)]
 
-    def reference(self):
+    def reference_ladder(self):
         return SettingLadder("reference", "fine", tuple(2e-2 / 2**k for k in range(9)), 4)
 
     def second_setting(self, last):
@@ -188,7 +188,7 @@ class Planted:
         values = times**2 * np.sin(5 * times) + size * setting.value**setting.order * (1.0 + 5.0 * (times > 1.5))
         return PricedRun(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
 
-    def lines(self, setting):
+    def scene_file_lines(self, setting):
         return [setting.label()]
 
 
@@ -203,7 +203,7 @@ def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
     alone, shared = (refined_reference(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
     assert same(alone, shared) and alone.rung > 0
     over, blocks = SettingSearch(Planted(), alone, 1e-2, 2.0), []
-    for ladder, i in zip(Planted().ladders(), (2, 4), strict=True):
+    for ladder, i in zip(Planted().setting_ladders(), (2, 4), strict=True):
         tried = TriedSetting(ladder.setting(i), "ok", seconds=0.5, calls=10)
         blocks.append((ladder, SettingChoice(tried, 0.0, 10, 0.5, False, (0.4, 0.5, 0.6))))
     here, there = (block_results(partial(_valid_over_run, over), blocks, executor) for executor in (None, pool))

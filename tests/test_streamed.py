@@ -83,7 +83,7 @@ class Paths:
 def peak(paths, folder):
     tracemalloc.start()
     moments = StreamedMoments()
-    for block in arrays_by_block(Paths(), paths, folder, blocks=PathBlocks(10)):
+    for block in arrays_by_block(Paths(), paths, folder, path_blocks=PathBlocks(10)):
         moments.add(block["states"])
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

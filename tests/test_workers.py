@@ -40,8 +40,8 @@ def pool():
 
 @pytest.mark.parametrize(("make", "paths"), [(stops, 4), (copies, 3)])
 def test_two_workers_give_the_bits_of_this_process(make, paths, pool):
-    alone = run_paths(make(), paths, blocks=PathBlocks(1))
-    shared = run_paths(make(), paths, executor=pool, blocks=PathBlocks(1))
+    alone = run_paths(make(), paths, path_blocks=PathBlocks(1))
+    shared = run_paths(make(), paths, executor=pool, path_blocks=PathBlocks(1))
     assert set(alone) == set(shared) and all(np.array_equal(alone[name], shared[name]) for name in alone)
     scattered = alone["distance" if "distance" in alone else "moments"]
     assert len({values.tobytes() for values in scattered}) == paths  # paths that were mixed up would be seen
@@ -77,11 +77,11 @@ def test_an_interrupt_between_blocks_and_a_resume_give_the_same_bits(tmp_path):
         if state.done >= 2:
             raise KeyboardInterrupt
 
-    alone = run_paths(stops(), 4, blocks=PathBlocks(1))
+    alone = run_paths(stops(), 4, path_blocks=PathBlocks(1))
     with pytest.raises(KeyboardInterrupt):
-        run_paths(stops(), 4, tmp_path, blocks=PathBlocks(1), report_progress=stop)
+        run_paths(stops(), 4, tmp_path, path_blocks=PathBlocks(1), report_progress=stop)
     assert len(list(tmp_path.glob("block*.npz"))) == 2
-    resumed = run_paths(stops(), 4, tmp_path, blocks=PathBlocks(1))
+    resumed = run_paths(stops(), 4, tmp_path, path_blocks=PathBlocks(1))
     assert all(np.array_equal(alone[name], resumed[name]) for name in alone)
 
 
@@ -120,5 +120,7 @@ def test_workers_killed_at_random_moments_change_nothing(workers, kills, tmp_pat
                 return
 
     with process_pool(workers) as executor:
-        found = run_paths(Mortal(tmp_path), 200, executor=executor, blocks=PathBlocks(1), report_progress=kill)["x"]
+        found = run_paths(Mortal(tmp_path), 200, executor=executor, path_blocks=PathBlocks(1), report_progress=kill)[
+            "x"
+        ]
     assert 2 * len(killed) >= kills and np.array_equal(found, np.sqrt(np.arange(200)))

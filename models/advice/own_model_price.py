@@ -52,7 +52,7 @@ class PricedModel:
     where = "in the engine"
     full_duration = searched_duration = PATH_DURATION
     kink_period = 0.0
-    counted = "force calls"
+    work_count_name = "force calls"
 
     @property
     def title(self) -> str:
@@ -76,7 +76,7 @@ class PricedModel:
         """Text on the start state of the run, and on the model that each engine integrates."""
         return "from the random state of the paths; MuJoCo marches the file's own model, Exudyn the description"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Series of step sizes for every integration method; MuJoCo's default step is the one of the model's file."""
         return [
             SettingLadder(
@@ -94,7 +94,7 @@ class PricedModel:
         wanted = defaults.get((engine, method), 0.0)
         return min(TRIED_STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Series of halved steps of MuJoCo's RK4, the fastest method, with which the reference is computed."""
         return SettingLadder("mujoco", "RK4", tuple(0.01 / 2**k for k in range(14)), 4)
 
@@ -158,7 +158,7 @@ class PricedModel:
         times, values, calls = solution
         return PricedRun(times, values, {"force calls": calls})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """The solver setting in the syntax of the engine."""
         if setting.engine == "mujoco":
             return [f'<option integrator="{setting.method}" timestep="{setting.value:g}"/>']

@@ -177,10 +177,10 @@ def heave_variance(
     return 2 * force_deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
 
 
-def holding_stiffness(parameters: Parameters, rate: float) -> float:
+def holding_stiffness(parameters: Parameters, error_growth_rate: float) -> float:
     """Smallest rotational stiffness to the ground (N m/rad) that keeps the pitch from growing: total pitch inertia
     times the squared growth rate (1/s)."""
-    return rigid_pitch(parameters).total_inertia * rate**2
+    return rigid_pitch(parameters).total_inertia * error_growth_rate**2
 
 
 def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
@@ -190,7 +190,7 @@ def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float)
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
-def drift_off_time(rate: float, noise_intensity: float, pitch_limit: float) -> float:
+def drift_off_time(error_growth_rate: float, noise_intensity: float, pitch_limit: float) -> float:
     """Time (s) after which half of all runs deviate in pitch by more than ``pitch_limit`` (rad), for a constant growth
     rate (1/s) and noise intensity (rad^2/s^3).
 
@@ -199,7 +199,7 @@ def drift_off_time(rate: float, noise_intensity: float, pitch_limit: float) -> f
     from scipy.optimize import brentq
 
     for name, value, smallest_value in (
-        ("rate", rate, 0.0),
+        ("rate", error_growth_rate, 0.0),
         ("intensity", noise_intensity, SMALLEST_POSITIVE),
         ("angle", pitch_limit, SMALLEST_POSITIVE),
     ):
@@ -208,11 +208,13 @@ def drift_off_time(rate: float, noise_intensity: float, pitch_limit: float) -> f
     longest = (
         math.log(3.0) + 2.0 * math.log(pitch_limit / MEDIAN_OF_NORMAL) - math.log(noise_intensity)
     ) / 3.0  # without growth
-    if rate == 0.0:
+    if error_growth_rate == 0.0:
         return math.exp(longest)
-    longest_log_time = math.log(2.0) + math.log(rate) + longest
+    longest_log_time = math.log(2.0) + math.log(error_growth_rate) + longest
     ends = min(longest_log_time, 0.0) - 1.0, min(longest_log_time, math.log(3.0 * max(longest_log_time, 0.0) + 3.0))
-    return math.exp(brentq(lambda x: 3.0 * (x - longest_log_time) + _log_gain(x), *ends, xtol=1e-14)) / (2.0 * rate)
+    return math.exp(brentq(lambda x: 3.0 * (x - longest_log_time) + _log_gain(x), *ends, xtol=1e-14)) / (
+        2.0 * error_growth_rate
+    )
 
 
 def _log_gain(log_x: float) -> float:

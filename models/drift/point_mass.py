@@ -81,49 +81,57 @@ def _damping_times_step(damping_step: float) -> float:
     return damping_step
 
 
-def _geometric_sum(damping_step: float, n: int) -> float:
+def _geometric_sum(damping_step: float, step_count: int) -> float:
     """Sum of (1 - h)^i over i < n, that is (1 - (1 - h)^n) / h, with h = ``damping_step``."""
-    if damping_step == 0 or n <= 0:
-        return float(max(n, 0))
+    if damping_step == 0 or step_count <= 0:
+        return float(max(step_count, 0))
     return (
-        -math.expm1(n * math.log1p(-damping_step)) / damping_step
+        -math.expm1(step_count * math.log1p(-damping_step)) / damping_step
         if damping_step < 0.5
-        else (1 - (1 - damping_step) ** n) / damping_step
+        else (1 - (1 - damping_step) ** step_count) / damping_step
     )
 
 
-def _sum_of_squares(damping_step: float, n: int) -> float:
+def _sum_of_squares(damping_step: float, step_count: int) -> float:
     """Sum over i < n of ((1 - (1 - h)^i) / h)^2, that is (n - 2 S1 + S2) / h^2, with h = ``damping_step`` and the sums
     S1, S2 of (1 - h)^i and (1 - h)^(2i).
 
     For small h the binomial expansion of (2 - h) (n - 2 S1 + S2): its terms up to h^1 vanish, and the exact
     integers of the others are divided by powers of n before they become floating-point numbers.
     """
-    if n == 0:
+    if step_count == 0:
         return 0.0
-    if n * damping_step > SERIES_ARGUMENT_LIMIT:
+    if step_count * damping_step > SERIES_ARGUMENT_LIMIT:
         return (
-            n - 2 * _geometric_sum(damping_step, n) + _geometric_sum(damping_step * (2 - damping_step), n)
+            step_count
+            - 2 * _geometric_sum(damping_step, step_count)
+            + _geometric_sum(damping_step * (2 - damping_step), step_count)
         ) / damping_step**2
     terms = range(2, 40)
     coefficients = (
-        (math.comb(2 * n, k + 1) - 4 * math.comb(n, k + 1) - 2 * math.comb(n, k), n ** (k + 1)) for k in terms
+        (
+            math.comb(2 * step_count, k + 1) - 4 * math.comb(step_count, k + 1) - 2 * math.comb(step_count, k),
+            step_count ** (k + 1),
+        )
+        for k in terms
     )
     return (
-        n**3
+        step_count**3
         / (2 - damping_step)
-        * math.fsum(c / d * (-n * damping_step) ** (k - 2) for k, (c, d) in zip(terms, coefficients, strict=True))
+        * math.fsum(
+            c / d * (-step_count * damping_step) ** (k - 2) for k, (c, d) in zip(terms, coefficients, strict=True)
+        )
     )
 
 
-def _check_inputs(force_deviation: float, time_step: float, mass: float, damping_rate: float, length: float) -> None:
+def _check_inputs(force_deviation: float, time_step: float, mass: float, damping_rate: float, duration: float) -> None:
     """Raise InputError unless deviation, damping and length are zero or more, step and mass above zero, and all
     finite."""
-    finite = all(map(math.isfinite, (force_deviation, time_step, mass, damping_rate, length)))
-    if not finite or min(force_deviation, damping_rate, length) < 0 or min(time_step, mass) <= 0:
+    finite = all(map(math.isfinite, (force_deviation, time_step, mass, damping_rate, duration)))
+    if not finite or min(force_deviation, damping_rate, duration) < 0 or min(time_step, mass) <= 0:
         numbers = (
             f"deviation {force_deviation:g}, step {time_step:g}, mass {mass:g}, damping {damping_rate:g} over "
-            f"{length:g} s or steps"
+            f"{duration:g} s or steps"
         )
         raise InputError("", "point mass", None, f"none has {numbers}")
 

@@ -186,7 +186,7 @@ def verdict_on_run(
     return StabilisedRunVerdict("rejected" if stabilised else "stabilise", "; ".join(wrong))
 
 
-def innovations_are_consistent(run: Result) -> bool | None:
+def innovations_are_consistent(filtered_run: Result) -> bool | None:
     """Whether the innovations of a run's Kalman filter are as large as the filter states; None without a filter.
 
     The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
@@ -194,17 +194,17 @@ def innovations_are_consistent(run: Result) -> bool | None:
     """
     from scipy.stats import chi2
 
-    if "kalman_surprise" not in run.data:
+    if "kalman_surprise" not in filtered_run.data:
         return None
-    count = float(run["kalman_used"][-1])
+    count = float(filtered_run["kalman_used"][-1])
     low, high = chi2.ppf([0.5 - INNOVATION_CONFIDENCE / 2, 0.5 + INNOVATION_CONFIDENCE / 2], count)
-    return bool(low <= run["kalman_surprise"][-1] <= high)
+    return bool(low <= filtered_run["kalman_surprise"][-1] <= high)
 
 
-def stated_pitch_uncertainty(run: Result) -> float:
+def stated_pitch_uncertainty(filtered_run: Result) -> float:
     """Uncertainty (rad) that a Kalman filter states for the pitch: twice its largest standard deviation; 0 without a
     filter."""
-    return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
+    return 2.0 * float(filtered_run["pitch_deviation"].max()) if "pitch_deviation" in filtered_run.data else 0.0
 
 
 def verdict_without_true_run(

@@ -149,7 +149,7 @@ def run_paths(
     path_count: int,
     store_folder: Path | None = None,
     executor: Executor | None = None,
-    blocks: PathBlocks = DEFAULT_BLOCKS,
+    path_blocks: PathBlocks = DEFAULT_BLOCKS,
     report_progress: Callable[[EnsembleProgress], None] = lambda state: None,
     replacement_of_failed: Callable[[range, str], ArraysByName] | None = None,
 ) -> ArraysByName:
@@ -158,7 +158,9 @@ def run_paths(
     The arguments are those of ``arrays_by_block``.
     """
     arrays = list(
-        arrays_by_block(path_job, path_count, store_folder, executor, blocks, report_progress, replacement_of_failed)
+        arrays_by_block(
+            path_job, path_count, store_folder, executor, path_blocks, report_progress, replacement_of_failed
+        )
     )
     return {name: np.concatenate([block[name] for block in arrays]) for name in arrays[0]}
 
@@ -168,7 +170,7 @@ def arrays_by_block(
     path_count: int,
     store_folder: Path | None = None,
     executor: Executor | None = None,
-    blocks: PathBlocks = DEFAULT_BLOCKS,
+    path_blocks: PathBlocks = DEFAULT_BLOCKS,
     report_progress: Callable[[EnsembleProgress], None] = lambda state: None,
     replacement_of_failed: Callable[[range, str], ArraysByName] | None = None,
 ) -> Generator[ArraysByName]:
@@ -178,17 +180,17 @@ def arrays_by_block(
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
     (``process_pool``), a Dask cluster (``dask_workers``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
-    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement : (paths,
-    reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.
+    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement_of_failed :
+    (paths, reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.
     """
-    facts = {"paths": path_count, "paths per block": blocks.size, **path_job.facts()}
-    count, block = blocks.count(path_count), partial(blocks.block, path_count=path_count)
+    facts = {"paths": path_count, "paths per block": path_blocks.size, **path_job.facts()}
+    count, block = path_blocks.count(path_count), partial(path_blocks.block, path_count=path_count)
     store = _MemoryStore() if store_folder is None else BlockStore(store_folder)
     with nullcontext() if isinstance(store, _MemoryStore) else store.reserved_folder(facts):
         failed = dict[int, str]()
         counted = _PathCounter(path_count, sum(len(block(i)) for i in range(count) if store.has(i)), report_progress)
         missing = ((i, block(i)) for i in range(count) if not store.has(i))
-        answers = _answers_of_blocks(path_job, missing, executor, blocks.ahead)
+        answers = _answers_of_blocks(path_job, missing, executor, path_blocks.ahead)
         with closing(answers):  # an interrupt drops at once what waits
             blocks_given = 0
             while blocks_given < count:
@@ -217,7 +219,7 @@ def values_in_order(
 ) -> Generator[tuple[T, Any]]:
     """Generator of pairs of a block and the function's value, in the order of the blocks and as early as possible.
 
-    The blocks are read as they are needed, ``blocks_ahead`` of them at most. store : keeps what is finished, of a
+    The blocks are read as they are needed, ``blocks_ahead`` of them at most. block_store : keeps what is finished, of a
     folder that the caller has claimed, and takes named arrays alone; what it has is not computed. Raises RunFailed for
     the first block that fails.
     """
@@ -357,9 +359,9 @@ def _future_error(future: Future) -> BaseException | None:
         return error
 
 
-def _worker_died(error: BaseException | None) -> bool:
+def _worker_died(block_error: BaseException | None) -> bool:
     """Whether an error means that the block's worker died; Dask has its own exception for that."""
-    return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
+    return isinstance(block_error, BrokenExecutor) or type(block_error).__name__ == "KilledWorker"
 
 
 def _save_block(block_store: BlockStore | _MemoryStore, block_number: int, arrays: ArraysByName) -> None:
@@ -392,25 +394,25 @@ def _lost_workers_error(reason: str, block_store: BlockStore | _MemoryStore) -> 
     return RunFailed("ensemble", f"{reason}{folder_hint}")
 
 
-def _submitted_block(executor: Executor, block_function: Callable[[T], ArraysByName], block: T) -> Future:
+def _submitted_block(executor: Executor, block_function: Callable[[T], ArraysByName], block_input: T) -> Future:
     """Future of a block on an executor; a failed future if the pool has lost its workers."""
     try:
-        return executor.submit(_compute_block, block_function, block)
+        return executor.submit(_compute_block, block_function, block_input)
     except BrokenExecutor as error:
         lost: Future = Future()
         lost.set_exception(error)
         return lost
 
 
-def _compute_block(block_function: Callable[[T], ArraysByName], block: T) -> ArraysByName | _Failure:
+def _compute_block(block_function: Callable[[T], ArraysByName], block_input: T) -> ArraysByName | _Failure:
     """Arrays of one block, computed in the worker; a failure is returned instead of raised."""
     try:
-        arrays = block_function(block)
+        arrays = block_function(block_input)
     except Exception as error:
         return _failure_of(error)
-    if not isinstance(block, range):
+    if not isinstance(block_input, range):
         return arrays
-    short = [name for name, values in arrays.items() if len(values) != len(block)]
+    short = [name for name, values in arrays.items() if len(values) != len(block_input)]
     return _Failure(f"{short[0]!r} has not one row per path") if short else arrays
 
 

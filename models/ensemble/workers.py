@@ -229,9 +229,9 @@ class ClusterExecutor(Executor):
         return self._executor.submit(function, *args, **options)
 
 
-def _identity(job: Any) -> Any:
+def _identity(cluster_job: Any) -> Any:
     """The job itself: the task by which a cluster stores it."""
-    return job
+    return cluster_job
 
 
 class _WorkerState(NamedTuple):

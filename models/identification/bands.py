@@ -79,14 +79,18 @@ class ErrorBands:
         )
 
 
-def error_bands(problem: IdentificationProblem, uncertainty: Uncertainty, error_models: list[ErrorModel]) -> ErrorBands:
-    """Error bands for a stretch of measurement; ``problem`` is the fit's problem with the inputs and the measurement of
-    that stretch."""
+def error_bands(
+    identification_problem: IdentificationProblem, uncertainty: Uncertainty, error_models: list[ErrorModel]
+) -> ErrorBands:
+    """Error bands for a stretch of measurement; ``identification_problem`` is the fit's problem with the inputs and the
+    measurement of that stretch."""
     values = uncertainty.fit.values
-    predicted = problem.predicted(values)
-    slopes = problem.jacobian(values, problem.predicted)
+    predicted = identification_problem.predicted(values)
+    slopes = identification_problem.jacobian(values, identification_problem.predicted)
     variance = np.einsum("cnp,pq,cnq->cn", slopes, uncertainty.covariance, slopes)
     model_half_widths = np.array([model.half_width(row) for model, row in zip(error_models, predicted, strict=True)])
     return ErrorBands(
-        problem, predicted, np.sqrt(model_half_widths**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None))
+        identification_problem,
+        predicted,
+        np.sqrt(model_half_widths**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None)),
     )

@@ -83,22 +83,27 @@ def _completed_share(stage_number: int, previous_cost: float, cost: float) -> fl
 
 
 def _one_stage(
-    problem: IdentificationProblem, start_values: np.ndarray, executor: Executor | None
+    identification_problem: IdentificationProblem, start_values: np.ndarray, executor: Executor | None
 ) -> dict[str, np.ndarray]:
     """Values and cost after one stage of the fit: a few iterations that start from ``start_values`` (p,)."""
     from scipy.optimize import least_squares
 
-    scale, (low, high), residuals = problem.scale, problem.bounds, problem.residuals
+    scale, (low, high), residuals = (
+        identification_problem.scale,
+        identification_problem.bounds,
+        identification_problem.residuals,
+    )
     begin = np.clip(start_values / scale, low / scale + STEP_INSIDE_BOUNDS, high / scale - STEP_INSIDE_BOUNDS)
     if np.abs(residuals(begin * scale)).max() >= FAILED_RESIDUAL:
         names = ", ".join(
-            f"{parameter.name} = {value:.4g}" for parameter, value in zip(problem.parameters, start_values, strict=True)
+            f"{parameter.name} = {value:.4g}"
+            for parameter, value in zip(identification_problem.parameters, start_values, strict=True)
         )
         raise InputError("identify", "start", names, "the model fails at these values: start from others")
     solved = least_squares(
         lambda x: residuals(x * scale).ravel(),
         begin,
-        jac=lambda x: problem.jacobian(x * scale, residuals, executor).reshape(-1, len(x)),
+        jac=lambda x: identification_problem.jacobian(x * scale, residuals, executor).reshape(-1, len(x)),
         bounds=(low / scale, high / scale),
         max_nfev=TRIALS_OF_STAGE,
         ftol=0.1 * LEAST_COST_DECREASE,
@@ -109,18 +114,18 @@ def _one_stage(
 
 
 def problem_with_fixed_parameter(
-    problem: IdentificationProblem, parameter_index: int, fixed_value: float, start_values: np.ndarray
+    identification_problem: IdentificationProblem, parameter_index: int, fixed_value: float, start_values: np.ndarray
 ) -> IdentificationProblem:
     """The problem with parameter number ``parameter_index`` fixed at a value; the others start from ``start_values``
     (p,).
     """
     other_parameters = [
         replace(parameter, start=float(start_value))
-        for parameter, start_value in zip(problem.parameters, start_values, strict=True)
+        for parameter, start_value in zip(identification_problem.parameters, start_values, strict=True)
     ]
     del other_parameters[parameter_index]
 
     def model(free_values: np.ndarray) -> object:
-        return problem.model(np.insert(free_values, parameter_index, fixed_value))
+        return identification_problem.model(np.insert(free_values, parameter_index, fixed_value))
 
-    return replace(problem, model=model, parameters=other_parameters)  # type: ignore[arg-type]
+    return replace(identification_problem, model=model, parameters=other_parameters)  # type: ignore[arg-type]

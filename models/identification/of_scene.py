@@ -119,7 +119,7 @@ class SceneModel:
     """Model of a scene for identification: its channels over time as a function of the values of some keys, computed by
     an engine.
 
-    table, file, folder : of the scene; keys : scene keys of the parameters; engine : name of the engine.
+    table, file, folder : of the scene; scene_keys : of the parameters; engine : name of the engine.
     """
 
     def __init__(self, scene: Any, scene_keys: Sequence[str], engine: str) -> None:

@@ -162,8 +162,8 @@ def ranked_subsets(
     candidates: Mapping[str, CandidateParameter],
     joint_removals: Mapping[str, Sequence[str]] | None = None,
 ) -> SubsetChoice:
-    """Fits of every subset of the candidate parameters, ranked by the information criterion; together : named sets of
-    candidates whose joint removal is tested, too."""
+    """Fits of every subset of the candidate parameters, ranked by the information criterion; joint_removals : named
+    sets of candidates whose joint removal is tested, too."""
     everything = fit_all(deviation_function, candidates)
     blind = tuple(name for name in candidates if name in everything.undetermined)
     names_seen = [name for name in candidates if name not in blind]

@@ -215,10 +215,12 @@ def likelihood_profile(uncertainty: Uncertainty, parameter_index: int) -> Likeli
 
 
 def _fixed_parameter_problem(
-    problem: IdentificationProblem, parameter_index: int, fixed_value: float, start_values: np.ndarray
+    identification_problem: IdentificationProblem, parameter_index: int, fixed_value: float, start_values: np.ndarray
 ) -> IdentificationProblem:
     """The problem with parameter ``parameter_index`` fixed at a value; the others start from ``start_values`` (p,),
     moved inside their bounds."""
-    low, high = problem.bounds
-    start_inside = np.clip(start_values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
-    return problem_with_fixed_parameter(problem, parameter_index, fixed_value, start_inside)
+    low, high = identification_problem.bounds
+    start_inside = np.clip(
+        start_values, low + 1e-6 * identification_problem.scale, high - 1e-6 * identification_problem.scale
+    )
+    return problem_with_fixed_parameter(identification_problem, parameter_index, fixed_value, start_inside)

@@ -118,9 +118,9 @@ def _common_mistake_findings(axle_forces: AxleForces) -> list[Finding]:
     return _exchanged_finding(axle_forces)
 
 
-def _is_near(values: np.ndarray, expected_values: np.ndarray, scale: np.ndarray) -> bool:
+def _is_near(mean_values: np.ndarray, expected_values: np.ndarray, scale: np.ndarray) -> bool:
     """Whether values differ from the wanted ones by less than half of EXPLANATION_ERROR of a scale."""
-    return bool((np.abs(values - expected_values) < EXPLANATION_ERROR * scale / 2).all())
+    return bool((np.abs(mean_values - expected_values) < EXPLANATION_ERROR * scale / 2).all())
 
 
 def _exchanged_finding(axle_forces: AxleForces) -> list[Finding]:

@@ -87,7 +87,7 @@ def measured_samples(
     """Measured samples (m, signals): every ``sample_stride``-th row of the true values (n, signals), which are
     ``time_step`` (s) apart, with all faults; NaN where a sample is lost.
 
-    seed and path name the noise: the same ones give the same samples, whoever asks.
+    seed and path_number determine the noise: the same ones give the same samples, whoever asks.
     """
     period = time_step * sample_stride
     columns = []
@@ -107,14 +107,14 @@ def measured_samples(
     return np.column_stack(columns)
 
 
-def quantised_values(values: np.ndarray, bits: int) -> np.ndarray:
+def quantised_values(true_values: np.ndarray, bits: int) -> np.ndarray:
     """Values (n,) rounded to the steps of a converter with this number of bits, whose range is a little larger than the
     largest value."""
-    largest = float(np.abs(values).max())
+    largest = float(np.abs(true_values).max())
     if largest == 0.0:
-        return values
+        return true_values
     quantum = 2.0 * FULL_SCALE_RATIO * largest / 2**bits
-    return quantum * np.rint(values / quantum)
+    return quantum * np.rint(true_values / quantum)
 
 
 def lost_samples(
@@ -146,7 +146,7 @@ def _delayed_samples(true_samples: np.ndarray, time_step: float, sample_stride: 
 
 
 def _random_stream(stream_name: str, seed: int, path_number: int, sample_count: int, source_number: int) -> np.ndarray:
-    """Standard normal random samples (count,) that depend only on seed, path, source and the name."""
+    """Standard normal random samples (count,) that depend only on seed, path_number, source_number and stream_name."""
     return normal_samples(
         seed, (path_number << 32) + crc32(stream_name.encode()), sample_count, 1, source=source_number
     )[:, 0]

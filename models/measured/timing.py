@@ -95,14 +95,16 @@ def _timing_of_valid_times(times: np.ndarray, measurement_place: str, signal_nam
     """``SampleTiming`` of values (n,) that can be times (s)."""
     findings, sample_count = list[Finding](), len(times)
 
-    def report(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
+    def report(
+        check: str, severity: Weight, finding_text: str, finding_size: float, unit: str, times: Iterable[float]
+    ) -> None:
         findings.append(
             Finding(
                 check,
-                weight,
+                severity,
                 measurement_place,
-                f"{measurement_place}: {text}.",
-                size,
+                f"{measurement_place}: {finding_text}.",
+                finding_size,
                 unit,
                 signal_names,
                 tuple(map(float, times)),

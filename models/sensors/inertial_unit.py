@@ -50,8 +50,8 @@ def measured_attitude(
     """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are constant over each period and
     integrated by exact rotations.
 
-    rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
-    its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
+    rates : true local rates (n, 3) in rad/s, one for each period (s); rate_deviation : (3,) in rad/s per sample, each
+    axis its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
     noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in path_numbers], axis=1)
     return true_attitude(rates[:, None, :] + rate_deviation * noise, sample_period, start_attitude)

@@ -100,5 +100,5 @@ def _tilt_from_gravity(first_specific_force: np.ndarray) -> np.ndarray:
     return np.array([np.arctan2(np.hypot(first_specific_force[0], first_specific_force[1]), -first_specific_force[2])])
 
 
-def _watched_values(values: dict[str, np.ndarray], _unused_run: Result) -> Watched:
-    return values
+def _watched_values(watched: dict[str, np.ndarray], _unused_run: Result) -> Watched:
+    return watched

@@ -27,7 +27,7 @@ class _RateFilter(ExtendedKalmanFilter):
 
 
 def filter_rates(
-    body_rotation: BodyRotation,
+    rotation: BodyRotation,
     sample_period: float,
     start_rates: np.ndarray,
     reading_deviation: float,
@@ -35,37 +35,34 @@ def filter_rates(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Local angular rates (n, 3) in rad/s and their stated standard deviations (n, 3), by the Kalman filter.
 
-    start_rates : (3,) rad/s at the first sample, known to ``start_deviation`` (rad/s); noise : standard deviation of
-    each reading (m/s^2), white. The same readings make the prediction and the measurement, two correlations that the
-    filter leaves out: between neighbouring predictions, and between a prediction and the measurement after it.
+    start_rates : (3,) rad/s at the first sample, known to ``start_deviation`` (rad/s); reading_deviation : standard
+    deviation of each reading (m/s^2), white. The same readings make the prediction and the measurement, two
+    correlations that the filter leaves out: between neighbouring predictions, and between a prediction and the
+    measurement after it.
     """
     if not reading_deviation > 0:
         allowed = (
             "the standard deviation of the readings must be above 0 (m/s^2): it weighs integration against measurement"
         )
         raise InputError("", "noise", reading_deviation, allowed)
-    frame, planar = body_rotation.accelerometers.principal_axes, body_rotation.accelerometers.is_planar
+    frame, planar = rotation.sensors.principal_axes, rotation.sensors.is_planar
     pairs = SYMMETRIC_ENTRIES[: 3 if planar else 6]
-    indices = tuple(np.accelerometers(pairs).T)
+    indices = tuple(np.array(pairs).T)
     filter_ = _RateFilter(3, len(pairs))
     filter_.x, filter_.P = np.asarray(start_rates) @ frame, start_deviation**2 * UNIT_MATRIX
-    filter_.Q = np.diag(
-        (sample_period * reading_deviation * body_rotation.accelerometers.array_noise_gains(planar)) ** 2
-    )
-    squares = body_rotation.accelerometers.inverse_squares
+    filter_.Q = np.diag((sample_period * reading_deviation * rotation.sensors.array_noise_gains(planar)) ** 2)
+    squares = rotation.sensors.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag(
         [(reading_deviation * spread) ** 2 for spread in spreads]
     )  # noise of each entry per unit of the readings'
-    values = np.column_stack(
-        [0.5 * (body_rotation.rate_matrix[:, i, j] + body_rotation.rate_matrix[:, j, i]) for i, j in pairs]
-    )
-    known, rows = array_angular_acceleration(body_rotation, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
+    values = np.column_stack([0.5 * (rotation.rate_matrix[:, i, j] + rotation.rate_matrix[:, j, i]) for i, j in pairs])
+    known, rows = array_angular_acceleration(rotation, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
         _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), sample_period, planar)
         filter_.update(values[i], _rate_product_jacobian, _skew_squared_entries, args=indices, hx_args=indices)
         rows.append((filter_.x.copy(), filter_.P))
-    rates, covariances = (np.accelerometers(column) for column in zip(*rows, strict=True))
+    rates, covariances = (np.array(column) for column in zip(*rows, strict=True))
     return rates @ frame.T, np.sqrt(np.einsum("ij,njk,ik->ni", frame, covariances, frame))
 
 
@@ -75,8 +72,8 @@ def _predict_rates(rate_filter: _RateFilter, alpha: np.ndarray, sample_period: f
     slope, change = np.zeros((3, 3)), alpha
     if is_planar:
         w = rate_filter.x + 0.5 * sample_period * alpha  # the middle of the period
-        slope = np.accelerometers([[0.0, -w[2], -w[1]], [w[2], 0.0, w[0]], [0.0, 0.0, 0.0]])
-        change = alpha + np.accelerometers([-w[1] * w[2], w[0] * w[2], 0.0])
+        slope = np.array([[0.0, -w[2], -w[1]], [w[2], 0.0, w[0]], [0.0, 0.0, 0.0]])
+        change = alpha + np.array([-w[1] * w[2], w[0] * w[2], 0.0])
     rate_filter.F = UNIT_MATRIX + sample_period * slope
     rate_filter.predict(sample_period * change)
 

@@ -39,7 +39,7 @@ class BodyRotation:
     relative_acceleration : (n, 3, sensors) in m/s^2, readings less their mean
     """
 
-    accelerometers: SensorArray
+    sensors: SensorArray
     rate_matrix: np.ndarray
     relative_acceleration: np.ndarray
 
@@ -123,59 +123,57 @@ class RecoveredMotion:
         return self.position + rotation_matrix(self.orientation) @ np.asarray(local_position)
 
 
-def body_rotation_from_readings(accelerometers: SensorArray, readings: np.ndarray) -> BodyRotation:
+def body_rotation_from_readings(sensors: SensorArray, readings: np.ndarray) -> BodyRotation:
     """``BodyRotation`` from the accelerometers' readings (n, sensors, 3) in m/s^2; gravity cancels at any attitude.
 
     Raises InputError for a reading that is not a finite number, and for a wrong number of sensors.
     """
-    if readings.ndim != 3 or readings.shape[1:] != accelerometers.positions.shape:
-        raise InputError(
-            "", "readings", str(readings.shape), f"must have the shape (n, {len(accelerometers.names)}, 3)"
-        )
+    if readings.ndim != 3 or readings.shape[1:] != sensors.positions.shape:
+        raise InputError("", "readings", str(readings.shape), f"must have the shape (n, {len(sensors.names)}, 3)")
     if not np.isfinite(readings).all():
         sample, sensor, axis = np.argwhere(~np.isfinite(readings))[0]
         raise InputError(
             "",
-            f"sensor {accelerometers.names[sensor]}, sample {sample} along {'xyz'[axis]}",
+            f"sensor {sensors.names[sensor]}, sample {sample} along {'xyz'[axis]}",
             float(readings[sample, sensor, axis]),
             "must be a finite number: repair it or leave the sensor out",
         )
     local = readings - readings.mean(axis=1, keepdims=True)
-    relative = np.einsum("ji,nsj->nis", accelerometers.principal_axes, local)
-    return BodyRotation(accelerometers, relative @ accelerometers.position_weights, relative)
+    relative = np.einsum("ji,nsj->nis", sensors.principal_axes, local)
+    return BodyRotation(sensors, relative @ sensors.position_weights, relative)
 
 
-def angular_acceleration(body_rotation: BodyRotation, rates: np.ndarray) -> np.ndarray:
+def angular_acceleration(rotation: BodyRotation, rates: np.ndarray) -> np.ndarray:
     """Local angular acceleration (n, 3) of the body in rad/s^2, eq. (20); rates (n, 3) in rad/s, local.
 
     The rates are read by the formula for a plane alone: alpha_1 = n.M e2 - w2 w3, alpha_2 = -n.M e1 + w1 w3.
     """
     return (
-        array_angular_acceleration(body_rotation, rates @ body_rotation.accelerometers.principal_axes)
-        @ body_rotation.accelerometers.principal_axes.T
+        array_angular_acceleration(rotation, rates @ rotation.sensors.principal_axes)
+        @ rotation.sensors.principal_axes.T
     )
 
 
-def array_angular_acceleration(body_rotation: BodyRotation, w: np.ndarray) -> np.ndarray:
+def array_angular_acceleration(rotation: BodyRotation, w: np.ndarray) -> np.ndarray:
     """Angular acceleration (n, 3) in rad/s^2 in the array's axes from the ``BodyRotation`` of the readings; w (n, 3),
     rad/s, in the same axes."""
-    m = body_rotation.rate_matrix
+    m = rotation.rate_matrix
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
-    if body_rotation.accelerometers.is_planar:
+    if rotation.sensors.is_planar:
         about_first, about_second = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
     else:
         about_first, about_second = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
     return np.column_stack([about_first, about_second, about_normal])
 
 
-def rates_up_to_sign(body_rotation: BodyRotation) -> np.ndarray:
+def rates_up_to_sign(rotation: BodyRotation) -> np.ndarray:
     """Local angular rates (n, 3) in rad/s from the symmetric part of M alone: no integration, no drift, but no sign.
 
     w w^T = M+ - (tr M+ / 2) I, of which the nearest matrix of rank one is taken. For sensors in a plane the part
     along the normal has a sign of its own, apart from that of the other two.
     """
-    unsigned = _unsigned_rates_in_plane if body_rotation.accelerometers.is_planar else _unsigned_rates_in_space
-    return unsigned(body_rotation.rate_matrix) @ body_rotation.accelerometers.principal_axes.T
+    unsigned = _unsigned_rates_in_plane if rotation.sensors.is_planar else _unsigned_rates_in_space
+    return unsigned(rotation.rate_matrix) @ rotation.sensors.principal_axes.T
 
 
 def _unsigned_rates_in_space(rate_matrix: np.ndarray) -> np.ndarray:
@@ -197,50 +195,44 @@ def _unsigned_rates_in_plane(rate_matrix: np.ndarray) -> np.ndarray:
     return np.hstack([within, about_normal])
 
 
-def unexplained_accelerations(body_rotation: BodyRotation) -> np.ndarray:
+def unexplained_accelerations(rotation: BodyRotation) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 that no rigid motion explains, in the array's axes.
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
-    flat = _unsigned_rates_in_plane(body_rotation.rate_matrix)
+    flat = _unsigned_rates_in_plane(rotation.rate_matrix)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += (
-        [] if body_rotation.accelerometers.lies_in_plane else [_unsigned_rates_in_space(body_rotation.rate_matrix)]
-    )
-    left = np.stack(
-        [body_rotation.relative_acceleration - _nearest_rigid_accelerations(body_rotation, w) for w in offers]
-    )
+    offers += [] if rotation.sensors.lies_in_plane else [_unsigned_rates_in_space(rotation.rate_matrix)]
+    left = np.stack([rotation.relative_acceleration - _nearest_rigid_accelerations(rotation, w) for w in offers])
     sensor_with_least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[sensor_with_least, np.arange(len(sensor_with_least))]
 
 
-def _nearest_rigid_accelerations(body_rotation: BodyRotation, w: np.ndarray) -> np.ndarray:
+def _nearest_rigid_accelerations(rotation: BodyRotation, w: np.ndarray) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 of a rigid body with rates w and the angular acceleration that
     fits best.
 
     By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
     """
-    array, square = body_rotation.accelerometers, skew_matrix(w) @ skew_matrix(w)
+    array, square = rotation.sensors, skew_matrix(w) @ skew_matrix(w)
     weights = np.where(np.arange(3) < array.position_weights.shape[1], array.spreads, 0.0) ** 2
     rate_products = np.zeros_like(square)
-    rate_products[:, :, : array.position_weights.shape[1]] = body_rotation.rate_matrix
+    rate_products[:, :, : array.position_weights.shape[1]] = rotation.rate_matrix
     moment = weights * (rate_products - square)
     angular_part = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
     return (angular_part + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.principal_axes).T
 
 
-def fit_quality(accelerometers: SensorArray, readings: np.ndarray, reading_deviation: float = 0.0) -> RigidFitQuality:
+def fit_quality(sensors: SensorArray, readings: np.ndarray, reading_deviation: float = 0.0) -> RigidFitQuality:
     """Quality of the rigid-body fit to readings (n, sensors, 3) in m/s^2; ``reading_deviation`` is their standard
     deviation.
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
     """
-    full_quality = _quality_of(accelerometers, readings, reading_deviation)
+    full_quality = _quality_of(sensors, readings, reading_deviation)
     if full_quality.rigid is not False:
         return full_quality
-    without = {
-        name: _quality_without(accelerometers, readings, name, reading_deviation) for name in accelerometers.names
-    }
+    without = {name: _quality_without(sensors, readings, name, reading_deviation) for name in sensors.names}
     shares = {
         name: other_quality.unexplained_share
         for name, other_quality in without.items()
@@ -249,25 +241,25 @@ def fit_quality(accelerometers: SensorArray, readings: np.ndarray, reading_devia
     return replace(full_quality, suspect_sensor=min(shares, key=lambda name: shares[name])) if shares else full_quality
 
 
-def _quality_of(accelerometers: SensorArray, readings: np.ndarray, reading_deviation: float) -> RigidFitQuality:
-    spins = body_rotation_from_readings(accelerometers, readings)
+def _quality_of(sensors: SensorArray, readings: np.ndarray, reading_deviation: float) -> RigidFitQuality:
+    spins = body_rotation_from_readings(sensors, readings)
     left = unexplained_accelerations(spins)
-    count = 3 * len(accelerometers.names)
+    count = 3 * len(sensors.names)
     size = float(np.sqrt(np.mean(spins.relative_acceleration**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
     share = float(np.sqrt(np.mean(misfit**2))) / size if size > 0 else 0.0
     return RigidFitQuality(
-        misfit, share, reading_deviation * float(np.sqrt(accelerometers.redundancy / count)), accelerometers.redundancy
+        misfit, share, reading_deviation * float(np.sqrt(sensors.redundancy / count)), sensors.redundancy
     )
 
 
 def _quality_without(
-    accelerometers: SensorArray, readings: np.ndarray, sensor_name: str, reading_deviation: float
+    sensors: SensorArray, readings: np.ndarray, sensor_name: str, reading_deviation: float
 ) -> RigidFitQuality | None:
     """Quality of the fit without the sensor ``sensor_name``; None if the remaining sensors do not make an array."""
-    keep = [i for i, other_name in enumerate(accelerometers.names) if other_name != sensor_name]
+    keep = [i for i, other_name in enumerate(sensors.names) if other_name != sensor_name]
     try:
-        remaining_array = sensor_array({accelerometers.names[i]: accelerometers.positions[i].tolist() for i in keep})
+        remaining_array = sensor_array({sensors.names[i]: sensors.positions[i].tolist() for i in keep})
     except InputError:
         return None
     return _quality_of(remaining_array, readings[:, keep], reading_deviation)
@@ -282,31 +274,31 @@ def time_integral(samples: np.ndarray, sample_period: float, start_values: np.nd
     )
 
 
-def integrate_rates(body_rotation: BodyRotation, sample_period: float, start_rates: np.ndarray) -> np.ndarray:
+def integrate_rates(rotation: BodyRotation, sample_period: float, start_rates: np.ndarray) -> np.ndarray:
     """Local rates (n, 3) in rad/s by integration (20), from (3,) at the first sample; they drift with every error.
 
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
     mu = n.M e2 - i n.M e1, which w3 solves by quadratures alone.
     """
-    if len(body_rotation.rate_matrix) < 4:
+    if len(rotation.rate_matrix) < 4:
         raise InputError(
-            "", "readings", len(body_rotation.rate_matrix), "at least four samples are needed to integrate them"
+            "", "readings", len(rotation.rate_matrix), "at least four samples are needed to integrate them"
         )
-    first = np.asarray(start_rates) @ body_rotation.accelerometers.principal_axes
-    if not body_rotation.accelerometers.is_planar:
+    first = np.asarray(start_rates) @ rotation.sensors.principal_axes
+    if not rotation.sensors.is_planar:
         return (
-            time_integral(array_angular_acceleration(body_rotation, np.zeros((1, 3))), sample_period, first)
-            @ body_rotation.accelerometers.principal_axes.T
+            time_integral(array_angular_acceleration(rotation, np.zeros((1, 3))), sample_period, first)
+            @ rotation.sensors.principal_axes.T
         )
-    m = body_rotation.rate_matrix
+    m = rotation.rate_matrix
     w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), sample_period, first[2])
-    turn = np.exp(1j * time_integral(w3, sample_period, np.accelerometers(0.0)))
+    turn = np.exp(1j * time_integral(w3, sample_period, np.array(0.0)))
     c = turn * time_integral((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, sample_period, first[0] + 1j * first[1])
-    return np.column_stack([c.real, c.imag, w3]) @ body_rotation.accelerometers.principal_axes.T
+    return np.column_stack([c.real, c.imag, w3]) @ rotation.sensors.principal_axes.T
 
 
 def recovered_motion(
-    accelerometers: SensorArray,
+    sensors: SensorArray,
     readings: np.ndarray,
     sample_period: float,
     start_state: BodyStartState | None = None,
@@ -322,39 +314,30 @@ def recovered_motion(
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
     start_state, cut_offs = start_state or BodyStartState(), cut_offs or CutOffFrequencies()
-    spins = body_rotation_from_readings(accelerometers, readings)
-    w = integrate_rates(spins, sample_period, np.accelerometers(start_state.rates)) if rates is None else rates
+    spins = body_rotation_from_readings(sensors, readings)
+    w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates
     w = _high_passed(w, sample_period, cut_offs.rotation)
-    orientation = integrate_attitude(w, sample_period, np.accelerometers(start_state.orientation))
+    orientation = integrate_attitude(w, sample_period, np.array(start_state.orientation))
     if cut_offs.rotation is not None:
         orientation = quaternion_from_cardan(
             *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.rotation).T
         )
     alpha = angular_acceleration(spins, w)
-    gravity_vector = np.accelerometers([0.0, 0.0, GRAVITY])
+    gravity_vector = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(
-        accelerometers,
-        readings - gravity_vector if gravity_corrected else readings,
-        orientation,
-        alpha,
-        w,
-        gravity_vector,
+        sensors, readings - gravity_vector if gravity_corrected else readings, orientation, alpha, w, gravity_vector
     )
     velocity = _high_passed(
-        time_integral(acceleration, sample_period, np.accelerometers(start_state.velocity)),
-        sample_period,
-        cut_offs.position,
+        time_integral(acceleration, sample_period, np.array(start_state.velocity)), sample_period, cut_offs.position
     )
     position = _high_passed(
-        time_integral(velocity, sample_period, np.accelerometers(start_state.position)),
-        sample_period,
-        cut_offs.position,
+        time_integral(velocity, sample_period, np.array(start_state.position)), sample_period, cut_offs.position
     )
     return RecoveredMotion(alpha, w, orientation, acceleration, velocity, position)
 
 
 def reference_acceleration(
-    accelerometers: SensorArray,
+    sensors: SensorArray,
     readings: np.ndarray,
     orientation: np.ndarray,
     alpha: np.ndarray,
@@ -362,7 +345,7 @@ def reference_acceleration(
     down_axis: np.ndarray,
 ) -> np.ndarray:
     """Global acceleration (n, 3) in m/s^2 of the body's reference point: the mean over all sensors, eq. (23)."""
-    lever = (skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates)) @ accelerometers.positions.mean(axis=0)
+    lever = (skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates)) @ sensors.positions.mean(axis=0)
     return np.einsum("nij,nj->ni", rotation_matrix(orientation), readings.mean(axis=1) - lever) + down_axis
 
 

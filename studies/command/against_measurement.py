@@ -232,19 +232,24 @@ def _channel_match(
     None if no measured time lies within it."""
     from scipy.interpolate import CubicSpline
 
-    times = channel_pair.times - time_shift_seconds
+    times = channel_pair.measured_times - time_shift_seconds
     slack = 1e-9 * (channel_pair.run_times[-1] - channel_pair.run_times[0])
     is_within = (
-        np.isfinite(channel_pair.values)
+        np.isfinite(channel_pair.measured_values)
         & (times >= channel_pair.run_times[0] - slack)
         & (times <= channel_pair.run_times[-1] + slack)
     )
     if not is_within.any():
         return None
-    read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[is_within])
+    read = CubicSpline(channel_pair.run_times, channel_pair.run_values)(times[is_within])
     stated = errors_of(run).get(name.partition(", ")[0])
     return ChannelComparison(
-        name, unit, times[is_within], read, channel_pair.values[is_within], np.nan if stated is None else stated.error
+        name,
+        unit,
+        times[is_within],
+        read,
+        channel_pair.measured_values[is_within],
+        np.nan if stated is None else stated.error,
     )
 
 

@@ -227,12 +227,14 @@ def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: flo
     with the measurement shifted earlier by a time (s)."""
     shares = []
     for pair in channel_pairs:
-        shifted_times = pair.times - time_shift_seconds
+        shifted_times = pair.measured_times - time_shift_seconds
         is_within = (
-            np.isfinite(pair.values) & (shifted_times >= pair.run_times[0]) & (shifted_times <= pair.run_times[-1])
+            np.isfinite(pair.measured_values)
+            & (shifted_times >= pair.run_times[0])
+            & (shifted_times <= pair.run_times[-1])
         )
-        gap = np.interp(shifted_times[is_within], pair.run_times, pair.run) - pair.values[is_within]
-        shares.append(float(np.sqrt(np.mean(gap**2))) / (float(np.nanstd(pair.values)) or 1.0))
+        gap = np.interp(shifted_times[is_within], pair.run_times, pair.run_values) - pair.measured_values[is_within]
+        shares.append(float(np.sqrt(np.mean(gap**2))) / (float(np.nanstd(pair.measured_values)) or 1.0))
     return float(np.mean(shares))
 
 

@@ -83,7 +83,7 @@ def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.nda
     """Rows of a quick run: a few paths of one second, computed in threads because these start at once."""
     paths = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
-        two = run_paths(job, 12, executor=pool, blocks=PathBlocks(3))
+        two = run_paths(job, 12, executor=pool, path_blocks=PathBlocks(3))
     engines, _ = _engine_rows_and_times(scene, job.truth, times, paths, 2, None)
     return [
         _single_run_row(force_folder, 1.0, paths),
@@ -127,9 +127,9 @@ def _interrupted_row(job: NoisePaths, paths: ArraysByName, block_folder: Path) -
             raise KeyboardInterrupt
 
     try:
-        run_paths(job, 12, block_folder, blocks=PathBlocks(3), report_progress=stop)
+        run_paths(job, 12, block_folder, path_blocks=PathBlocks(3), report_progress=stop)
     except KeyboardInterrupt:
-        again = run_paths(job, 12, block_folder, blocks=PathBlocks(3))
+        again = run_paths(job, 12, block_folder, path_blocks=PathBlocks(3))
         return _equal_bits_row(
             "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", paths, again
         )
@@ -145,7 +145,7 @@ def _killed_row(job: NoisePaths, paths: ArraysByName, block_folder: Path) -> Row
     child.kill()
     child.join()
     modification_times = {path: path.stat().st_mtime_ns for path in block_folder.glob("block*.npz")}
-    again = run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=PathBlocks(20))
+    again = run_paths(job, RECOMPUTED_PATHS, block_folder, path_blocks=PathBlocks(20))
     if (
         not modification_times
         or len(modification_times) == RECOMPUTED_PATHS // 20
@@ -162,7 +162,9 @@ def _killed_row(job: NoisePaths, paths: ArraysByName, block_folder: Path) -> Row
 
 
 def _run_slow_job(job: NoisePaths, block_folder: Path) -> None:
-    run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=PathBlocks(20), report_progress=lambda state: time.sleep(0.1))
+    run_paths(
+        job, RECOMPUTED_PATHS, block_folder, path_blocks=PathBlocks(20), report_progress=lambda state: time.sleep(0.1)
+    )
 
 
 def _in_separate_process(function: Callable[..., Any], *args: Any) -> Any:
@@ -271,7 +273,7 @@ def _engine_rows_and_times(
         "mujoco, 1 thread": lambda: run_paths(single, path_count),
         "mujoco, 2 threads": lambda: run_paths(two, path_count),
         "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(
-            exudyn, path_count, executor=pool, blocks=PathBlocks(1)
+            exudyn, path_count, executor=pool, path_blocks=PathBlocks(1)
         ),
     }
     rows, prices = [], {}

@@ -246,7 +246,7 @@ def _engine_rows(engine: str, duration: float) -> list[Row]:
         behaviour_row(
             f"motion.bracket.{engine}",
             SYSTEM,
-            f"six sensors, of which a bracket of 30 Hz carries one, {engine}: {100 * loose.share:.2g} "
+            f"six sensors, of which a bracket of 30 Hz carries one, {engine}: {100 * loose.unexplained_share:.2g} "
             "% fits no rigid body",
             f"loose: {loose.suspect_sensor}" if not loose.rigid else "rigid",
             "loose: battery",

@@ -57,10 +57,10 @@ class Swing:
     """Test problem y' = y cos t in the form of ``models.advice.price.PricedScene``. Its error keeps growing after the
     part of the run in which settings are searched."""
 
-    title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, work_count_name = "y' = y cos t", "y", "", 0.0, "", "force calls"
     full_duration, searched_duration = 8.0, 2.0
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Settings (step sizes) of four methods of an engine: the default has order 2, and the method "broken" gives
         NaN."""
         return [
@@ -70,7 +70,7 @@ class Swing:
             SettingLadder("mujoco", "broken", STEPS_TRIED, 1),
         ]
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Settings of the reference: RK4 with successively halved steps. The coarsest is no more accurate than some
         settings to be judged."""
         return SettingLadder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
@@ -97,7 +97,7 @@ class Swing:
         times, values, calls = solution
         return PricedRun(times, values[:, None], {"force calls": calls})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select a setting; here its label."""
         return [setting.label()]
 
@@ -124,7 +124,7 @@ def _fewest_calls(tolerance: float) -> int:
     swing = Swing()
     return min(
         swing.solve(setting, swing.full_duration)[2]
-        for ladder in swing.ladders()
+        for ladder in swing.setting_ladders()
         for setting in map(ladder.setting, range(len(STEPS_TRIED)))
         if _error(setting) <= tolerance
     )

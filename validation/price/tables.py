@@ -96,7 +96,7 @@ def _text_of_winner(
 
 
 def _coarsest_text(cheapest_reach: ToleranceCost) -> str:
-    return " (coarsest)" if cheapest_reach.how == "coarsest" else ""
+    return " (coarsest)" if cheapest_reach.origin == "coarsest" else ""
 
 
 def loss_table(measured_points: WorkPrecisionPoints) -> Table:
@@ -144,9 +144,13 @@ def loss_table(measured_points: WorkPrecisionPoints) -> Table:
 def _text_of_loss(loss: LossByDefault | None) -> str:
     if loss is None:
         return "-"
-    factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.factor, loss.low, loss.high))
-    mark = "*" if loss.how == "extrapolated" else ""
-    interval_text = f" [{low}, {high}]" if loss.low < loss.high else ""  # none of a count, or after too few rounds
+    factor, low, high = (
+        f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.cost_ratio, loss.lower_limit, loss.upper_limit)
+    )
+    mark = "*" if loss.origin == "extrapolated" else ""
+    interval_text = (
+        (f" [{low}, {high}]") if loss.lower_limit < loss.upper_limit else ""
+    )  # none of a count, or after too few rounds
     return f"{factor}{mark}{interval_text}"
 
 

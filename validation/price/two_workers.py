@@ -80,9 +80,9 @@ def cost_of_blocks(executor: Executor) -> dict[int, float]:
     """Processor time (s) of this process per block, for each number of values that a block sends back."""
     costs = {}
     for numbers in SENT_COUNTS:
-        run_paths(Sender(numbers), 4, executor=executor, blocks=PathBlocks(1))
+        run_paths(Sender(numbers), 4, executor=executor, path_blocks=PathBlocks(1))
         start_time = time.process_time()
-        run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, blocks=PathBlocks(1))
+        run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, path_blocks=PathBlocks(1))
         costs[numbers] = (time.process_time() - start_time) / EMPTY_BLOCKS
     return costs
 
@@ -109,7 +109,7 @@ def measured_pools(round_count: int = TIMING_ROUNDS, job: Any = None) -> dict[st
         single_pools: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
         turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, single_pools, job)]
         turns += [
-            partial(run_paths, job, PATHS_PER_RUN, executor=pool, blocks=BLOCKS_OF_RUN) for pool in pools.values()
+            partial(run_paths, job, PATHS_PER_RUN, executor=pool, path_blocks=BLOCKS_OF_RUN) for pool in pools.values()
         ]
         seconds = interleave(turns, round_count)
         return {

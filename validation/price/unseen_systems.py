@@ -110,7 +110,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
     """Largest error of each setting over the complete run, against a solution that is computed differently from the
     recommendation's reference."""
     scene: Any = recommendation.scene
-    ladder = scene.reference()
+    ladder = scene.reference_ladder()
     finer = Setting(
         ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / TRUTH_STEPS_RATIO, ladder.order
     )

@@ -103,15 +103,15 @@ class PricedScene(Protocol):
         ...
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work, such as force calls."""
         ...
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of solver settings, one for each method of each requested engine."""
         ...
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference's settings, which are refined until the true quantity is known well enough; each step
         is half the previous one.
         """
@@ -133,6 +133,6 @@ class PricedScene(Protocol):
         """The quantity along a run, read from what ``solve`` returned."""
         ...
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
         ...

@@ -73,11 +73,11 @@ class MeshedScene(ABC):
         """
 
     @abstractmethod
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work: contact cells if there are any, else force calls."""
         return "contact cells" if self.cells else "force calls"
 
@@ -87,7 +87,7 @@ class MeshedScene(ABC):
         steps = dict.fromkeys(self._longest_fraction(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """A ladder of cell numbers for every engine and step or, without cells, a ladder of steps for every engine."""
         if not self.cells:
             steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, STEP_HALVINGS)))
@@ -103,7 +103,7 @@ class MeshedScene(ABC):
             for method in self.steps
         ]
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference: twice the cells on every rung and half the step on every second rung; without cells,
         half the step on every rung.
         """

@@ -139,14 +139,14 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
     searched = known = refined_reference(scene, tolerance, scene.searched_duration, executor=executor)
     search = SettingSearch(scene, searched, tolerance, scene.searched_duration).search_all_ladders()
     timed = _timed_settings(search)
-    engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
+    engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.setting_ladders()))
     winners = _cheapest_by_key(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
     if scene.full_duration > scene.searched_duration * (1 + 1e-9) and winners:
         known, timed, winners = _confirmed_over_whole_run(search, timed, winners, executor)
     known, timed, winners = _with_finer_reference(scene, known, timed, winners, executor)
     defaults = {
         ladder.engine: settings
-        for ladder in scene.ladders()
+        for ladder in scene.setting_ladders()
         if ladder.default and (settings := _default_cost(search, ladder, timed)) is not None
     }
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
@@ -262,7 +262,7 @@ def _confirmed_over_whole_run(
     scene = search.scene
     rung = max(0, search.reference_solution.rung - 1)
     known = refined_reference(scene, search.tolerance, scene.full_duration, rung, False, executor)
-    ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
+    ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.setting_ladders()}
     able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed_choices, cheapest)}
     full_search = SettingSearch(scene, known, search.tolerance, scene.full_duration)
     blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
@@ -361,7 +361,7 @@ def _finer_reference(
     errors = {setting: reference.error(answer) for setting, answer in priced_runs.items()}
     while _needs_finer_reference(reference, errors):
         try:
-            tolerance = scene.reference().confirmation_divisor * reference.uncertainty
+            tolerance = scene.reference_ladder().confirmation_divisor * reference.uncertainty
             finer = refined_reference(
                 scene, tolerance, scene.full_duration, reference.rung, second_method=False, executor=executor
             )

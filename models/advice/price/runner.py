@@ -267,10 +267,10 @@ class WorkPrecisionPoints:
         return list({p.setting: p for p in chosen}.values())
 
 
-def measured_points(problem: WorkPrecisionProblem, points: Iterable[WorkPrecisionPoint]) -> WorkPrecisionPoints:
+def measured_points(priced_problem: WorkPrecisionProblem, points: Iterable[WorkPrecisionPoint]) -> WorkPrecisionPoints:
     """The points of a work-precision problem, together with the facts about the problem."""
     problem_facts = {
-        problem_field.name: getattr(problem, problem_field.name)
+        problem_field.name: getattr(priced_problem, problem_field.name)
         for problem_field in fields(WorkPrecisionPoints)
         if problem_field.name != "points"
     }
@@ -292,27 +292,27 @@ def points_from_saved(saved_points: dict[str, Any]) -> WorkPrecisionPoints:
     return WorkPrecisionPoints(**{**saved_points, "points": points})
 
 
-def attempt(work_precision_problem: WorkPrecisionProblem, setting: Setting) -> WorkPrecisionPoint:
+def attempt(priced_problem: WorkPrecisionProblem, setting: Setting) -> WorkPrecisionPoint:
     """Try one setting of a problem. Its status is ok, raised (the run failed with a message), refused (it was not run),
     flagged (the solution has a ``doubt``), or SILENT (the solution is not finite, or absurd, without any message).
     """
     start_time = PROCESSOR_CLOCK()
     try:
         with collected_breaches() as broken:
-            solution = work_precision_problem.build(setting).run()
-            seconds, errors = PROCESSOR_CLOCK() - start_time, work_precision_problem.errors(solution)
+            solution = priced_problem.build(setting).run()
+            seconds, errors = PROCESSOR_CLOCK() - start_time, priced_problem.errors(solution)
     except InputError as error:
         return WorkPrecisionPoint(setting, "refused", str(error))
     except RunFailed as error:
         return WorkPrecisionPoint(setting, "raised", str(error))
     status: PointStatus = "SILENT"
-    first = errors[next(iter(work_precision_problem.units))]
+    first = errors[next(iter(priced_problem.units))]
     if reason := getattr(solution, "doubt", ""):
         status = "flagged"
     elif not all(map(math.isfinite, errors.values())):
         reason = "an error that is not a number came back as a result"
-    elif first > work_precision_problem.bound:
-        reason = f"an error of {first:.3g}, more than {work_precision_problem.bound:.3g}, came back as a result"
+    elif first > priced_problem.bound:
+        reason = f"an error of {first:.3g}, more than {priced_problem.bound:.3g}, came back as a result"
     else:
         status = "ok"
     counts = dict(solution.counts)
@@ -328,23 +328,23 @@ def attempt(work_precision_problem: WorkPrecisionProblem, setting: Setting) -> W
 
 
 def measure(
-    problem: WorkPrecisionProblem, quick: bool, round_count: int, minimum_seconds: float
+    priced_problem: WorkPrecisionProblem, quick: bool, round_count: int, minimum_seconds: float
 ) -> WorkPrecisionPoints:
     """All points of a work-precision problem. Decisive points have the seconds of ``round_count`` interleaved rounds,
     the others those of one run.
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
     """
-    settings = problem.settings(quick)
+    settings = priced_problem.settings(quick)
     for first in {setting.curve: setting for setting in reversed(settings)}.values():
-        attempt(problem, first)  # imports and compiled code are loaded before anything is timed
-    once = measured_points(problem, [attempt(problem, setting) for setting in settings])
-    rerun = _timed_points(problem, once.points_to_time(), round_count, minimum_seconds)
+        attempt(priced_problem, first)  # imports and compiled code are loaded before anything is timed
+    once = measured_points(priced_problem, [attempt(priced_problem, setting) for setting in settings])
+    rerun = _timed_points(priced_problem, once.points_to_time(), round_count, minimum_seconds)
     return replace(once, points=[rerun.get(p.setting, p) for p in once.points])
 
 
 def _timed_points(
-    problem: WorkPrecisionProblem, points: list[WorkPrecisionPoint], round_count: int, minimum_seconds: float
+    priced_problem: WorkPrecisionProblem, points: list[WorkPrecisionPoint], round_count: int, minimum_seconds: float
 ) -> dict[Setting, WorkPrecisionPoint]:
     """The points with the seconds of their rounds, and whether counts or errors of the last run differ from those of
     the first run.
@@ -352,7 +352,7 @@ def _timed_points(
     last_runs: dict[Setting, Any] = {}
 
     def run(setting: Setting) -> None:
-        last_runs[setting] = problem.build(setting).run()
+        last_runs[setting] = priced_problem.build(setting).run()
 
     lasted = [p.cost("seconds") for p in points]
     interval_of_slow = -(-round_count // FEWEST_TIMING_ROUNDS) if round_count >= FEWEST_TIMING_ROUNDS else round_count
@@ -365,7 +365,8 @@ def _timed_points(
         p.setting: replace(
             p,
             seconds=tuple(seconds[np.isfinite(seconds)].tolist()),
-            changed=dict(last_runs[p.setting].counts) != p.counts or problem.errors(last_runs[p.setting]) != p.errors,
+            changed=dict(last_runs[p.setting].counts) != p.counts
+            or priced_problem.errors(last_runs[p.setting]) != p.errors,
         )
         for p, seconds in zip(points, timed, strict=True)
         if p.setting in last_runs

@@ -68,9 +68,11 @@ class SettingSearch:
         """Search every ladder of settings, methods of high order first: their cost decides where other ladders are
         given up. Returns the search.
         """
-        for ladder in {any_ladder.engine: any_ladder for any_ladder in self.scene.ladders()}.values():
+        for ladder in {any_ladder.engine: any_ladder for any_ladder in self.scene.setting_ladders()}.values():
             self._warm_up(ladder)
-        for ladder in sorted(self.scene.ladders(), key=lambda any_ladder: (any_ladder.adaptive, -any_ladder.order)):
+        for ladder in sorted(
+            self.scene.setting_ladders(), key=lambda any_ladder: (any_ladder.adaptive, -any_ladder.order)
+        ):
             self.search_ladder(ladder)
         return self
 
@@ -86,7 +88,7 @@ class SettingSearch:
         except RunFailed as error:
             attempt = TriedSetting(setting, "raised", str(error))
         else:
-            error_of, calls = self.reference_solution.error(answer), answer.counts.get(self.scene.counted, 0)
+            error_of, calls = self.reference_solution.error(answer), answer.counts.get(self.scene.work_count_name, 0)
             attempt = TriedSetting(setting, "ok", "", error_of, calls, seconds)
             if not error_of <= LARGEST_RELATIVE_ERROR * max(self.reference_solution.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"

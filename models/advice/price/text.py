@@ -45,7 +45,7 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
 
 
 def _cheapest_settings_table(recommendation: Recommendation) -> list[str]:
-    rows, unit = [TABLE_HEADING.format(counted=recommendation.scene.counted)], recommendation.scene.unit
+    rows, unit = [TABLE_HEADING.format(counted=recommendation.scene.work_count_name)], recommendation.scene.unit
     for (engine, kinds), choice in _merged_winners(recommendation.winners).items():
         winner_text = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
@@ -152,7 +152,7 @@ def _scene_file_lines(recommendation: Recommendation) -> list[str]:
     if best is None:
         return []
     head = getattr(recommendation.scene, "where", "in the scene")
-    return ["", f"  {head}", *(f"    {line}" for line in recommendation.scene.lines(best.tried.setting))]
+    return ["", f"  {head}", *(f"    {line}" for line in recommendation.scene.scene_file_lines(best.tried.setting))]
 
 
 def as_dict(recommendation: Recommendation) -> dict[str, Any]:

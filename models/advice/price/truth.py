@@ -99,7 +99,7 @@ def refined_reference(
     InputError where this uncertainty cannot be reached, RunFailed where two families of solvers differ or no run
     ends.
     """
-    ladder = scene.reference()
+    ladder = scene.reference_ladder()
     settled, first_rung, change, seconds, broken = _settled_answer(
         scene, ladder, tolerance, duration, first_rung, executor
     )

@@ -61,8 +61,10 @@ def _body_finding(
         return Finding(
             CHECK_NAME, "note", body_name, f"{body_name}: {array.describe()[-1]}; a fourth sensor would tell."
         )
-    share_text = f"{100 * rigidity.share:.2g} % of what its {len(axes)} accelerometers read against each other"
-    size, names = 100 * rigidity.share, tuple(s.name for s in signals)
+    share_text = (
+        f"{100 * rigidity.unexplained_share:.2g} % of what its {len(axes)} accelerometers read against each other"
+    )
+    size, names = 100 * rigidity.unexplained_share, tuple(s.name for s in signals)
     if rigidity.rigid:
         text = f"A rigid body explains {body_name} but for {share_text}."
         return Finding(CHECK_NAME, "note", body_name, text, size, "%", names)

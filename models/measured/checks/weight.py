@@ -225,13 +225,14 @@ def _motion_confirms_factor(
     return 4 * error < abs(suggested_error) and abs(ratio - 1) < MOTION_SHARE * abs(suggested_error)
 
 
-def _offset_finding(signal: MeasuredSignal, size: float, sure: float) -> Finding:
+def _offset_finding(signal: MeasuredSignal, force_offset: float, offset_uncertainty: float) -> Finding:
     """Finding on a constant error (N) of one channel."""
-    zero = size / (signal.sign * signal.factor)
-    word = "much" if size > 0 else "little"
+    zero = force_offset / (signal.sign * signal.factor)
+    word = "much" if force_offset > 0 else "little"
     text = (
-        f"{signal.name} reads {abs(size):.3g} N too {word} (+-{2 * sure:.2g} N at 95 %) on average, while its "
+        f"{signal.name} reads {abs(force_offset):.3g} N too {word} (+-{2 * offset_uncertainty:.2g} N at 95 %) on "
+        "average, while its "
         f"factor is right by the motion of the vehicle: an offset; give it zero = {signal.zero + zero:.4g} in the "
         "channel map."
     )
-    return Finding("offset", "doubt", signal.name, text, size, "N", (signal.name,))
+    return Finding("offset", "doubt", signal.name, text, force_offset, "N", (signal.name,))

@@ -60,12 +60,12 @@ class CsvFile(OpenFile):
     columns: tuple[int, ...]
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of the rows of each span."""
         columns = [self.columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
-            for first, count in spans:
+            for first, count in sample_spans:
                 table, times = numbers_of_rows(self.path, self.layout, self._bytes_of_rows(file, first, count), first)
                 yield self.factor * table[:, self.time_column] if times is None else times, table[:, columns]
 
@@ -164,10 +164,10 @@ def _findings_on_end(
     return findings
 
 
-def _factor_to_seconds(csv_path: Path, header: TableHead, time_column: int, unit: str) -> float:
+def _factor_to_seconds(csv_path: Path, table_head: TableHead, time_column: int, unit: str) -> float:
     """Factor from the unit of the column of times to seconds."""
-    name, given = clock_heading(header.names[time_column])
+    name, given = clock_heading(table_head.names[time_column])
     if (given or unit).casefold() not in TIME_UNITS:
-        place = f"line {header.header.number} (header), column {name!r}, unit"
+        place = f"line {table_head.header.number} (header), column {name!r}, unit"
         raise InputError(csv_path, place, given or unit, f"write {name} [s]", tuple(SECONDS))
     return TIME_UNITS[(given or unit).casefold()]

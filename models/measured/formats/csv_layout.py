@@ -294,33 +294,33 @@ def is_other_clock(heading: str) -> bool:
     return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
 
 
-def first_cells(first_lines: FirstLines, header: TableHead) -> list[list[str]]:
+def first_cells(first_lines: FirstLines, table_head: TableHead) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; rows of another width are skipped here and reported later."""
-    lines = [line for line in first_lines.lines if line.number > header.line_before_numbers]
-    rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
-    return [[row[i] for row in rows] for i in range(len(header.names))]
+    lines = [line for line in first_lines.lines if line.number > table_head.line_before_numbers]
+    rows = [cells for line in lines if len(cells := split_cells(line.text, table_head.separator)) == table_head.width]
+    return [[row[i] for row in rows] for i in range(len(table_head.names))]
 
 
 def find_layout(
-    csv_path: Path, first_lines: FirstLines, header: TableHead, time_column: int, units: tuple[str, ...]
+    csv_path: Path, first_lines: FirstLines, table_head: TableHead, time_column: int, column_units: tuple[str, ...]
 ) -> tuple[CsvLayout, list[Finding]]:
     """``CsvLayout`` of the rows of a CSV file, from the first rows, and findings; raises InputError where two
     interpretations are possible."""
-    columns, first_row = first_cells(first_lines, header), header.line_before_numbers + 1
+    columns, first_row = first_cells(first_lines, table_head), table_head.line_before_numbers + 1
     first = next(iter(columns[time_column]), "")
-    stamps = find_stamps(csv_path, first, first_row, header.names[time_column]) if is_stamp(first) else None
-    nameless = tuple(i for i, name in enumerate(header.names) if not name_and_unit(name)[0])
+    stamps = find_stamps(csv_path, first, first_row, table_head.names[time_column]) if is_stamp(first) else None
+    nameless = tuple(i for i, name in enumerate(table_head.names) if not name_and_unit(name)[0])
     texts = tuple(i for i, cells in enumerate(columns) if i not in (time_column, *nameless) and _is_text(cells))
     taken = tuple(sorted({*texts, *nameless, *((time_column,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
-    decimal = decimal_sign(csv_path, first_row, header.separator, list(numbers))
+    decimal = decimal_sign(csv_path, first_row, table_head.separator, list(numbers))
     layout = CsvLayout(
-        header.separator,
+        table_head.separator,
         decimal,
-        header.numbers_begin,
-        header.line_before_numbers,
-        header.names,
-        header.width,
+        table_head.numbers_begin,
+        table_head.line_before_numbers,
+        table_head.names,
+        table_head.width,
         taken,
         time_column,
         stamps,
@@ -328,8 +328,8 @@ def find_layout(
     )
     said = list[Finding]()
     for i in texts:
-        weight: Weight = "doubt" if units[i] or name_and_unit(header.names[i])[1] else "note"
-        said.append(flaw_finding(csv_path, weight, f"left out, no numbers: {header.names[i]!r}"))
+        weight: Weight = "doubt" if column_units[i] or name_and_unit(table_head.names[i])[1] else "note"
+        said.append(flaw_finding(csv_path, weight, f"left out, no numbers: {table_head.names[i]!r}"))
     for i in nameless:
         cells = columns[i]
         counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
@@ -362,9 +362,9 @@ def is_stamp(cell: str) -> bool:
     return not is_number(cell) and CLOCK_TIME_PATTERN.fullmatch(cell) is not None
 
 
-def _is_text(cells: list[str]) -> bool:
+def _is_text(column_cells: list[str]) -> bool:
     """Whether a column holds text or dates, so that no cell in it can be a number."""
-    said = [cell for cell in cells if not MISSING_VALUE_PATTERN.fullmatch(cell)]
+    said = [cell for cell in column_cells if not MISSING_VALUE_PATTERN.fullmatch(cell)]
     return bool(said) and all(
         CLOCK_TIME_PATTERN.fullmatch(cell) or _DATE_PATTERN.fullmatch(cell) or not _NUMBER_START_PATTERN.match(cell)
         for cell in said
@@ -372,12 +372,12 @@ def _is_text(cells: list[str]) -> bool:
 
 
 def find_units(
-    csv_path: Path, first_lines: FirstLines, header: TableHead, time_column: int
+    csv_path: Path, first_lines: FirstLines, table_head: TableHead, time_column: int
 ) -> tuple[tuple[str, ...], list[Finding]]:
     """Units of the columns from a row below the headings, empty texts if there is no such row, and findings."""
-    stamped = any(map(is_stamp, first_cells(first_lines, header)[time_column][:1]))
-    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.rows_between]
-    known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[time_column])[1] else set(TIME_UNITS)
+    stamped = any(map(is_stamp, first_cells(first_lines, table_head)[time_column][:1]))
+    rows = [(line, [_bare_unit(cell) for cell in table_head.cells(line)]) for line in table_head.rows_between]
+    known = {*TIME_UNITS, "", "-"} if clock_heading(table_head.names[time_column])[1] else set(TIME_UNITS)
     unit_row = next((row for row in rows if row[1][time_column].casefold() in known or stamped), None)
     if unit_row is None:
         said = [
@@ -386,9 +386,9 @@ def find_units(
             )
             for line, _ in rows
         ]
-        return ("",) * len(header.names), said
+        return ("",) * len(table_head.names), said
     line, units = unit_row
-    for i, (name, unit) in enumerate(zip(header.names, units, strict=True)):
+    for i, (name, unit) in enumerate(zip(table_head.names, units, strict=True)):
         if unit not in ("", "-") and name_and_unit(name)[1] not in ("", unit) and not (stamped and i == time_column):
             raise InputError(csv_path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
     return tuple(units), [flaw_finding(csv_path, "note", f"line {line.number}, beneath the headings, is read as units")]

@@ -42,16 +42,16 @@ class TimeStamps:
         text = str(np.datetime64(self.first_time, "ns").astype("datetime64[us]"))
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
-    def seconds(self, csv_path: Path, cells: list[str], line_number: int, column_name: str) -> np.ndarray:
+    def seconds(self, csv_path: Path, time_cells: list[str], line_number: int, column_name: str) -> np.ndarray:
         """Seconds (n,) since the first time stamp, for the cells of some rows, of which the first is line
         ``line_number``.
 
         Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
         """
         try:
-            stamps = np.array([self._cell_for_numpy(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
+            stamps = np.array([self._cell_for_numpy(cell) for cell in time_cells], "datetime64[ns]").astype(np.int64)
         except (ValueError, TypeError):
-            raise self._first_wrong_cell(csv_path, cells, line_number, column_name) from None
+            raise self._first_wrong_cell(csv_path, time_cells, line_number, column_name) from None
         passed = stamps - self.first_time
         return np.asarray((passed % DAY_IN_NANOSECONDS if self.notation == "hh:mm:ss.fff" else passed) / 1e9)
 
@@ -62,9 +62,11 @@ class TimeStamps:
             raise ValueError(cell)
         return _iso_text(matched)
 
-    def _first_wrong_cell(self, csv_path: Path, cells: list[str], line_number: int, column_name: str) -> InputError:
+    def _first_wrong_cell(
+        self, csv_path: Path, time_cells: list[str], line_number: int, column_name: str
+    ) -> InputError:
         """InputError for the first cell that is no time in this notation."""
-        for i, cell in enumerate(cells):
+        for i, cell in enumerate(time_cells):
             try:
                 np.datetime64(self._cell_for_numpy(cell), "ns")
             except ValueError:

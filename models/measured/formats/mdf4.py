@@ -61,12 +61,12 @@ class MdfFile(OpenFile):
     channel_places: tuple[tuple[int, int], ...]
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of the records of each span, loaded once for all channels."""
         with opened_mdf(self.path) as mdf:
             group = self.channel_places[channel_indices[0]][0]
-            for first, count in spans:
+            for first, count in sample_spans:
                 with suppressed_output():
                     block = _record_block(
                         mdf, group, [self.channel_places[i][1] for i in channel_indices], first, count
@@ -297,17 +297,17 @@ def _plain_comment(comment: str) -> str:
     return (root.findtext(".//TX") or "").strip()
 
 
-def _start_time(mdf_path: Path, header: Any, mdf_version: int) -> tuple[datetime | None, list[Finding]]:
+def _start_time(mdf_path: Path, file_header: Any, mdf_version: int) -> tuple[datetime | None, list[Finding]]:
     """Date and time at time 0; None, with a finding, where the file does not give the time zone."""
-    if not getattr(header, "abs_time", 0):
+    if not getattr(file_header, "abs_time", 0):
         return None, [flaw_finding(mdf_path, "note", "the file does not say when it was measured")]
-    if mdf_version == 4 and header.time_flags & LOCAL_TIME_FLAG:
-        clock = datetime.fromtimestamp(header.abs_time / 1e9, UTC)
+    if mdf_version == 4 and file_header.time_flags & LOCAL_TIME_FLAG:
+        clock = datetime.fromtimestamp(file_header.abs_time / 1e9, UTC)
         text = f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the file does not name, and is not used"
         return None, [flaw_finding(mdf_path, "doubt", text)]
-    minutes = 60 * header.tz_offset if mdf_version == 3 else 0
-    if mdf_version == 4 and header.time_flags & OFFSET_VALID_FLAG:
-        minutes = header.tz_offset + header.daylight_save_time
-    seconds, nanoseconds = divmod(header.abs_time, 10**9)
+    minutes = 60 * file_header.tz_offset if mdf_version == 3 else 0
+    if mdf_version == 4 and file_header.time_flags & OFFSET_VALID_FLAG:
+        minutes = file_header.tz_offset + file_header.daylight_save_time
+    seconds, nanoseconds = divmod(file_header.abs_time, 10**9)
     zone = timezone(timedelta(minutes=minutes))
     return datetime.fromtimestamp(seconds, zone) + timedelta(microseconds=nanoseconds // 1000), []

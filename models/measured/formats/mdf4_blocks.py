@@ -92,29 +92,37 @@ def _linked_blocks(mdf_path: Path, file_bytes: mmap.mmap, file_size: int) -> Ite
         ahead += sorted(new)
 
 
-def _check_chains(mdf_path: Path, blocks: dict[int, MdfBlock]) -> None:
+def _check_chains(mdf_path: Path, blocks_by_position: dict[int, MdfBlock]) -> None:
     """Raise InputError for a chain of links that leads back to one of its own blocks."""
     ended: set[int] = set()
-    for place in blocks:
+    for place in blocks_by_position:
         chain: dict[int, None] = {}
-        while place and place not in ended and blocks[place].kind in CHAINED_BLOCKS and blocks[place].links:
+        while (
+            place
+            and place not in ended
+            and blocks_by_position[place].kind in CHAINED_BLOCKS
+            and blocks_by_position[place].links
+        ):
             if place in chain:
                 raise InputError(mdf_path, f"byte {place}", None, "a chain of blocks leads back to this one")
             chain[place] = None
-            place = blocks[place].links[0]
+            place = blocks_by_position[place].links[0]
         ended |= set(chain)
 
 
 def _check_records(
-    mdf_path: Path, link_position: int, data_group: MdfBlock, blocks: dict[int, MdfBlock]
+    mdf_path: Path, link_position: int, data_group: MdfBlock, blocks_by_position: dict[int, MdfBlock]
 ) -> list[Finding]:
     """Findings on a data group with more bytes than its records need; raises InputError if channel groups announce more
     records than it has bytes for."""
-    there = sum(_unpacked_length(mdf_path, at, blocks) for at in _data_positions(mdf_path, data_group.links[2], blocks))
+    there = sum(
+        _unpacked_length(mdf_path, at, blocks_by_position)
+        for at in _data_positions(mdf_path, data_group.links[2], blocks_by_position)
+    )
     id_size = data_group.data[0]
     needed, loose, at = 0, False, data_group.links[1]
     while at:
-        block = blocks[at]
+        block = blocks_by_position[at]
         _, cycles, flags = struct.unpack_from("<QQH", block.data)
         record_size = sum(struct.unpack_from("<II", block.data, 24))
         loose |= bool(flags & VARIABLE_LENGTH_FLAG)
@@ -129,25 +137,25 @@ def _check_records(
     return []
 
 
-def _data_positions(mdf_path: Path, link_position: int, blocks: dict[int, MdfBlock]) -> list[int]:
+def _data_positions(mdf_path: Path, link_position: int, blocks_by_position: dict[int, MdfBlock]) -> list[int]:
     """Positions of the data blocks that a link leads to, directly or through a list."""
     places, ahead = list[int](), [link_position]
     while ahead:
         at = ahead.pop()
-        if len(places) > len(blocks):
+        if len(places) > len(blocks_by_position):
             raise InputError(
                 mdf_path, f"byte {link_position}", None, "a list of data blocks names more of them than there are"
             )
-        if at and blocks[at].kind in (b"##DL", b"##HL", b"##LD"):
-            ahead += blocks[at].links
+        if at and blocks_by_position[at].kind in (b"##DL", b"##HL", b"##LD"):
+            ahead += blocks_by_position[at].links
         elif at:
             places.append(at)
     return places
 
 
-def _unpacked_length(mdf_path: Path, block_position: int, blocks: dict[int, MdfBlock]) -> int:
+def _unpacked_length(mdf_path: Path, block_position: int, blocks_by_position: dict[int, MdfBlock]) -> int:
     """Number of bytes of records in a data block after unpacking."""
-    block = blocks[block_position]
+    block = blocks_by_position[block_position]
     if block.kind != b"##DZ":
         return block.length - HEAD_BYTES - 8 * len(block.links)
     plain, packed = struct.unpack_from("<QQ", block.data, 8)

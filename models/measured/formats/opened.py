@@ -47,7 +47,7 @@ class OpenFile(ABC):
 
     @abstractmethod
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times (n,) in s and values (n, channels) of each span, read by the format's own method; fewer where the file
         ends."""
@@ -65,9 +65,9 @@ class OpenFile(ABC):
             )
         return chosen
 
-    def _checked_blocks(self, channel_indices: list[int], spans: Iterable[SampleSpan]) -> Iterator[SampleBlock]:
+    def _checked_blocks(self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]) -> Iterator[SampleBlock]:
         """Complete blocks, with times that are finite and values that are finite or NaN."""
-        names, (mine, theirs) = [self.channels[i].name for i in channel_indices], tee(spans)
+        names, (mine, theirs) = [self.channels[i].name for i in channel_indices], tee(sample_spans)
         with library_errors_as_input(self.path):
             for (first, count), (times, values) in zip(mine, self.pieces(channel_indices, theirs), strict=True):
                 if len(times) != count:

@@ -61,13 +61,13 @@ class RpcFile(OpenFile):
     layout: SampleLayout
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of each span, from the groups that hold it."""
         layout = self.layout
         size = layout.points * layout.width * layout.dtype.itemsize
         with self.path.open("rb") as file:
-            for first, count in spans:
+            for first, count in sample_spans:
                 low, high = first // layout.points, -(-(first + count) // layout.points)
                 file.seek(layout.first_byte + low * size)
                 data = np.frombuffer(file.read((high - low) * size), layout.dtype).reshape(

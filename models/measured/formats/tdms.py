@@ -60,13 +60,13 @@ class TdmsData(OpenFile):
     channel_places: tuple[ChannelLocation, ...]
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of each span, read separately for each channel."""
         places = [self.channel_places[i] for i in channel_indices]
         with BoundedFile(self.path) as file:
             data = opened_tdms(self.path, file)
-            for first, count in spans:
+            for first, count in sample_spans:
                 values = [np.asarray(data[each.group][each.name].read_data(first, count), float) for each in places]
                 least = min(len(column) for column in values)
                 place = places[0]
@@ -190,48 +190,48 @@ def _file_with_channels(tdms_path: Path, tdms_file: Any, cut_off_findings: list[
     return TdmsData(tdms_path, channels, zero, comment, (*findings, *repeated), tuple(place for _, place in with_clock))
 
 
-def _is_numeric(channel: Any, skipped_channels: SkippedChannels) -> bool:
+def _is_numeric(tdms_channel: Any, skipped_channels: SkippedChannels) -> bool:
     """Whether a channel holds real numbers, one or more."""
-    if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
+    if len(tdms_channel) and tdms_channel.data_type is not None and tdms_channel.dtype.kind in "iuf":
         return True
-    skipped_channels.add("no numbers" if len(channel) else "no samples", repr(channel.name))
+    skipped_channels.add("no numbers" if len(tdms_channel) else "no samples", repr(tdms_channel.name))
     return False
 
 
 def _channel_location(
-    group: Any, channel: Any, time_zero: datetime | None, skipped_channels: SkippedChannels
+    tdms_group: Any, tdms_channel: Any, time_zero: datetime | None, skipped_channels: SkippedChannels
 ) -> ChannelLocation | None:
     """Location of a channel's samples and times; None where it has no time axis, or is a time axis itself."""
-    properties, start = channel.properties, _start_in_utc(channel)
+    properties, start = tdms_channel.properties, _start_in_utc(tdms_channel)
     late = 0.0 if time_zero is None or start is None else (start - time_zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
     if str(properties.get("wf_xunit_string", "s")).casefold() not in SECOND_SPELLINGS:
-        skipped_channels.add("its clock does not count seconds", repr(channel.name))
+        skipped_channels.add("its clock does not count seconds", repr(tdms_channel.name))
         return None
     if np.isfinite(increment) and increment > 0.0:
         return ChannelLocation(
-            group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment
+            tdms_group.name, tdms_channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment
         )
     clocks = [
         clock
-        for clock in group.channels()
+        for clock in tdms_group.channels()
         if clock.name.casefold() in TIME_CHANNEL_NAMES
-        and len(clock) == len(channel)
+        and len(clock) == len(tdms_channel)
         and _property_text(clock, *UNIT_PROPERTIES).casefold() in SECOND_SPELLINGS
     ]
-    if channel.name.casefold() in TIME_CHANNEL_NAMES and clocks:
+    if tdms_channel.name.casefold() in TIME_CHANNEL_NAMES and clocks:
         return None
     if len(clocks) != 1:
         skipped_channels.add(
-            "no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name)
+            "no clock (wf_increment, or one channel 'time' in s of the same length)", repr(tdms_channel.name)
         )
         return None
-    return ChannelLocation(group.name, channel.name, clocks[0].name, late, 0.0)
+    return ChannelLocation(tdms_group.name, tdms_channel.name, clocks[0].name, late, 0.0)
 
 
-def _start_in_utc(channel: Any) -> datetime | None:
+def _start_in_utc(tdms_channel: Any) -> datetime | None:
     """Date and time in UTC at which a channel begins; None where the file does not say."""
-    stamp = channel.properties.get("wf_start_time")
+    stamp = tdms_channel.properties.get("wf_start_time")
     if not hasattr(stamp, "seconds"):
         return None
     start = TDMS_EPOCH + timedelta(
@@ -240,12 +240,14 @@ def _start_in_utc(channel: Any) -> datetime | None:
     return None if start - TDMS_EPOCH < timedelta(days=1) else start
 
 
-def _property_text(channel: Any, *property_names: str) -> str:
+def _property_text(tdms_channel: Any, *property_names: str) -> str:
     """Value of the first of the named properties that a channel has, as text."""
-    return next((str(channel.properties[name]).strip() for name in property_names if name in channel.properties), "")
+    return next(
+        (str(tdms_channel.properties[name]).strip() for name in property_names if name in tdms_channel.properties), ""
+    )
 
 
-def _value_step(channel: Any) -> float:
+def _value_step(tdms_channel: Any) -> float:
     """Step between values stored as whole numbers without a scaling; 0 otherwise."""
-    scaled = any(name.startswith("NI_Scale") for name in channel.properties)
-    return 1.0 if channel.dtype.kind in "iu" and not scaled else 0.0
+    scaled = any(name.startswith("NI_Scale") for name in tdms_channel.properties)
+    return 1.0 if tdms_channel.dtype.kind in "iu" and not scaled else 0.0

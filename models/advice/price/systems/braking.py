@@ -63,11 +63,11 @@ class PricedBraking:
     searched_duration = full_duration
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work: tyre forces, evaluated once per step in every engine."""
         return "force calls"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of steps for the only method of braking, one for each engine that integrates the chassis."""
         run = self.scene.run
         values = tuple(run.sample / n for n in sorted({*SUBSTEPS_TRIED, run.substeps}))
@@ -75,7 +75,7 @@ class PricedBraking:
             SettingLadder(engine, METHOD_NAME, values, 1, default=run.sample / run.substeps) for engine in self.engines
         ]
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference, with twice as many steps within a sample on every rung."""
         engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
         return SettingLadder(
@@ -108,7 +108,7 @@ class PricedBraking:
         value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
         return PricedRun(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of steps within a sample."""
         return [
             "[run]",

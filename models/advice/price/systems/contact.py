@@ -41,7 +41,7 @@ class PricedContact:
     table_rows: RowBlock | None
     kink_period = 0.0
     full_duration = searched_duration = 1.0
-    counted = "contact cells"
+    work_count_name = "contact cells"
 
     @property
     def title(self) -> str:
@@ -72,7 +72,7 @@ class PricedContact:
         """Text on what the price leaves out: the error of the contact theory."""
         return "errors are those of cells: how far the theory is off stands beside the forces of a run"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of cell numbers for every integration scheme of the scene's theory."""
         name, usual = self.scene.method.name, self.scene.method
         values = tuple(1.0 / n for n in sorted({*CELLS_TRIED, usual.cells}))
@@ -94,7 +94,7 @@ class PricedContact:
     def _convergence_order(self, march_name: str) -> int:
         return int(self._method(march_name, self.scene.method.cells).order)
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference: cells that halve, with the integration scheme of the highest order."""
         name = self.scene.method.name
         march = MARCHES_OF_THEORY[name][0]
@@ -131,7 +131,7 @@ class PricedContact:
         values = np.repeat(values, 2, axis=0) if len(values) == 1 else values
         return PricedRun(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of cells and the integration scheme."""
         march = [f'march = "{setting.method}"'] if setting.method in MARCHES_OF_THEORY["fastsim"] else []
         return ["[method]", f"cells = {round(1.0 / setting.value)}", *march]

@@ -81,7 +81,7 @@ class PricedHandling(MeshedScene):
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of contact cells and the step."""
         return [
             "[tyres]",

@@ -54,8 +54,8 @@ SECOND_SOLVER_TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class PricedPitchPlane:
-    """A pitch-plane scene as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; base
-    : step (s) whose whole fractions all divide the run and its samples.
+    """A pitch-plane scene as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity;
+    base_step : step (s) whose whole fractions all divide the run and its samples.
     """
 
     assembly: Assembly
@@ -97,11 +97,11 @@ class PricedPitchPlane:
         return "adaptive methods are left out: they restart at every sample" if self.has_sampled_input else ""
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work: force calls, for every method."""
         return "force calls"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of settings for every method of the engines; generalised-alpha with Exudyn's default spectral radius
         and with the recommended one.
         """
@@ -119,7 +119,7 @@ class PricedPitchPlane:
                     ladders.append(SettingLadder(engine, method, values, order, adaptive, default))
         return ladders
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference: RK4 on the hand-written equations of motion; each step is half the previous one."""
         fewest_steps = math.ceil((FEWEST_ROWS - 1) * self.base_step / self.searched_duration * (1 - 1e-9))
         coarsest_steps = max(fewest_steps, math.ceil(self.base_step / 4e-3 * (1 - 1e-9)))
@@ -145,7 +145,7 @@ class PricedPitchPlane:
         """The quantity's channels along a run."""
         return PricedRun(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
         if setting.engine in OUTSIDE_CLASSES:
             return _outside_engine_lines(setting)

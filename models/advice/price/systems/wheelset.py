@@ -57,7 +57,7 @@ class PricedWheelset(MeshedScene):
             columns = [wheelset_run.contacts[CONTACTS[name][0]] for wheelset_run in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of contact cells and the step."""
         step = f"step = {self.steps.get(setting.method, setting.value)!r}"
         cells = ["[contact]", f"cells = {round(1 / setting.value)}"] if self.cells else []
