@@ -41,19 +41,19 @@ T = TypeVar("T")
 
 
 class PathBlocks(NamedTuple):
-    """Division of an ensemble's paths into blocks: ``size`` paths per block, at most ``ahead`` blocks computed at
-    once."""
+    """Division of an ensemble's paths into blocks: ``paths_per_block`` each, at most ``blocks_ahead`` blocks computed
+    at once."""
 
-    size: int = PATHS_PER_BLOCK
-    ahead: int = BLOCKS_AHEAD
+    paths_per_block: int = PATHS_PER_BLOCK
+    blocks_ahead: int = BLOCKS_AHEAD
 
     def count(self, path_count: int) -> int:
         """Number of blocks for a number of paths."""
-        return -(-path_count // self.size)
+        return -(-path_count // self.paths_per_block)
 
     def block(self, block_number: int, path_count: int) -> range:
         """Numbers of the paths in a block."""
-        return range(block_number * self.size, min((block_number + 1) * self.size, path_count))
+        return range(block_number * self.paths_per_block, min((block_number + 1) * self.paths_per_block, path_count))
 
 
 DEFAULT_BLOCKS = PathBlocks()
@@ -103,7 +103,7 @@ class _Failure:
     """Failure that a worker returns instead of results, since many exceptions cannot be sent between processes."""
 
     reason: str
-    full: bool = False
+    disk_is_full: bool = False
     worker_is_gone: bool = False
     error: InputError | RunFailed | None = None
 
@@ -183,14 +183,14 @@ def arrays_by_block(
     that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement_of_failed :
     (paths, reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.
     """
-    facts = {"paths": path_count, "paths per block": path_blocks.size, **path_job.facts()}
+    facts = {"paths": path_count, "paths per block": path_blocks.paths_per_block, **path_job.facts()}
     count, block = path_blocks.count(path_count), partial(path_blocks.block, path_count=path_count)
     store = _MemoryStore() if store_folder is None else BlockStore(store_folder)
     with nullcontext() if isinstance(store, _MemoryStore) else store.reserved_folder(facts):
         failed = dict[int, str]()
         counted = _PathCounter(path_count, sum(len(block(i)) for i in range(count) if store.has(i)), report_progress)
         missing = ((i, block(i)) for i in range(count) if not store.has(i))
-        answers = _answers_of_blocks(path_job, missing, executor, path_blocks.ahead)
+        answers = _answers_of_blocks(path_job, missing, executor, path_blocks.blocks_ahead)
         with closing(answers):  # an interrupt drops at once what waits
             blocks_given = 0
             while blocks_given < count:
@@ -240,7 +240,7 @@ def values_in_order(
     with closing(_answers_of_blocks(block_function, unfinished_blocks(), executor, blocks_ahead)) as answers:
         for i, _, answer in answers:
             if isinstance(answer, _Failure):
-                raise (_disk_full_error if answer.full else _lost_workers_error)(
+                raise (_disk_full_error if answer.disk_is_full else _lost_workers_error)(
                     f"block {i}: {answer.reason}", values_by_index
                 )
             _save_block(values_by_index, i, answer)
@@ -281,7 +281,7 @@ def _store_next_answer(
     if i < 0:
         return False
     if isinstance(answer, _Failure):
-        if answer.full:
+        if answer.disk_is_full:
             raise _disk_full_error(answer.reason, block_store)
         if answer.worker_is_gone:
             raise _lost_workers_error(answer.reason, block_store)

@@ -239,7 +239,7 @@ class _WorkerState(NamedTuple):
 
     sources: str
     threads: int
-    missing: list[str]
+    missing_paths: list[str]
 
 
 def _worker_state(used_paths: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
@@ -268,8 +268,8 @@ def _check_workers(dask_client: Any, scheduler_address: str, used_paths: tuple[P
         elif worker_state.threads != 1:
             threads = f"has {worker_state.threads} threads, which would share an engine's callbacks"
             allowed = f"{threads}: start it with --nthreads 1"
-        elif worker_state.missing:
-            allowed = f"does not see {', '.join(worker_state.missing)}: use a folder that all machines share"
+        elif worker_state.missing_paths:
+            allowed = f"does not see {', '.join(worker_state.missing_paths)}: use a folder that all machines share"
         else:
             continue
         raise InputError("", "cluster", scheduler_address, f"the worker {worker} {allowed}")

@@ -45,7 +45,7 @@ class SubsetFit:
     values: np.ndarray
     covariance: np.ndarray
     chi_square: float
-    count: int
+    data_count: int
     undetermined: tuple[str, ...]
 
     @property
@@ -61,12 +61,12 @@ class SubsetFit:
     @property
     def degrees_of_freedom(self) -> int:
         """Number of fitted data less the number of determined parameters."""
-        return self.count - self.rank
+        return self.data_count - self.rank
 
     def criterion(self, variance_inflation: float) -> float:
         """Quasi-likelihood information criterion (QAICc), with the correction for small samples."""
         k = self.rank + 1
-        return self.chi_square / variance_inflation + 2.0 * k + 2.0 * k * (k + 1) / max(self.count - k - 1, 1)
+        return self.chi_square / variance_inflation + 2.0 * k + 2.0 * k * (k + 1) / max(self.data_count - k - 1, 1)
 
     def prediction_and_variance(
         self, prediction_function: Callable[[dict[str, float]], np.ndarray]

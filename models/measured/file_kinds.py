@@ -43,7 +43,7 @@ class UnreadableKind:
 
     name: str
     remedy: str
-    begins: bytes
+    first_bytes: bytes
     extensions: tuple[str, ...] = ()
 
 
@@ -139,7 +139,7 @@ def format_of(measurement_path: Path, first_bytes: bytes) -> str:
         (
             kind
             for kind in UNREADABLE_KINDS
-            if re.match(kind.begins, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)
+            if re.match(kind.first_bytes, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)
         ),
         None,
     )

@@ -58,9 +58,9 @@ def _agreement_by_window(checked_recording: CheckedRecording) -> list[tuple[floa
             local = replace(
                 now,
                 frequencies=part.frequencies,
-                forces=part.cross[:, :c, :c],
-                cross_spectra=part.cross[:, c:, :c],
-                reading_powers=np.einsum("fkk->fk", part.cross[:, c:, c:]).real,
+                forces=part.cross_spectra[:, :c, :c],
+                cross_spectra=part.cross_spectra[:, c:, :c],
+                reading_powers=np.einsum("fkk->fk", part.cross_spectra[:, c:, c:]).real,
                 response=now.response[lines],
                 independent_averages=part.independent_averages,
             )

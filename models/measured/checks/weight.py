@@ -35,18 +35,18 @@ CHI_SQUARE_FALL = 25.0
 @dataclass(frozen=True)
 class EquilibriumResidual:
     """Residual (e,) of the equilibrium of mean forces: vertical force (N), moments about x and y (N m), and conditions
-    from elasticity alone. columns (e, h) : residual that an excess of one whole load at each hub would cause. inverse
-    (e, e) : of the residual's covariance."""
+    from elasticity alone. load_columns (e, h) : residual that an excess of one whole load at each hub would cause.
+    inverse_covariance (e, e) : of the residual's covariance."""
 
     residual: np.ndarray
-    columns: np.ndarray
-    inverse: np.ndarray
+    load_columns: np.ndarray
+    inverse_covariance: np.ndarray
 
     def fit(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Generalised least-squares fit of columns (e, p) to the residual: their factors (p,), the covariance of these,
         and the fall of chi square."""
-        normal = columns.T @ self.inverse @ columns
-        share = np.linalg.solve(normal, columns.T @ self.inverse @ self.residual)
+        normal = columns.T @ self.inverse_covariance @ columns
+        share = np.linalg.solve(normal, columns.T @ self.inverse_covariance @ self.residual)
         return share, np.linalg.inv(normal), float(share @ normal @ share)
 
 
@@ -95,7 +95,7 @@ def mean_hub_moments(checked_recording: CheckedRecording) -> np.ndarray:
         _component_indices(checked_recording, vehicle),
         *windowed_means(_force_columns(checked_recording, vehicle)),
     )
-    residual, deviations = balanced.residual[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
+    residual, deviations = balanced.residual[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse_covariance)))[1:3]
     return residual if (np.abs(residual) > MOMENT_STANDARD_DEVIATIONS * deviations).any() else none
 
 
@@ -174,7 +174,7 @@ def _single_channel_error(
 ) -> Finding:
     """Finding on an offset or a wrong factor of one channel, or on a weight that differs from the vehicle file."""
     names, weight = tuple(s.name for s in signals), float(static_loads.sum())
-    single = [equilibrium.fit(equilibrium.columns[:, [i]]) for i in range(len(signals))]
+    single = [equilibrium.fit(equilibrium.load_columns[:, [i]]) for i in range(len(signals))]
     worst = max(range(len(signals)), key=lambda i: single[i][2])
     force, error, fall = equilibrium.fit(np.eye(len(equilibrium.residual))[:, :3])
     sure = [float(uncertainty[0, 0]) ** 0.5 for _, uncertainty, _ in single]

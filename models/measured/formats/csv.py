@@ -46,34 +46,38 @@ from models.measured.formats.opened import (
 
 @dataclass(frozen=True)
 class CsvFile(OpenFile):
-    """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, and its last element is the end of the
-    used rows.
+    """Reader of a CSV file; ``row_positions[k]`` is the byte where row 1000 k begins, and its last element is the end
+    of the used rows.
 
-    time_column : column of time among those of numbers, None where times are those of the clock. factor : to s. columns
+    time_column : column of time among those of numbers, None where times are those of the clock. factor : to s.
+    channel_columns
     : of the channels, among those of numbers.
     """
 
     layout: CsvLayout
-    rows: np.ndarray
+    row_positions: np.ndarray
     time_column: int | None
-    factor: float
-    columns: tuple[int, ...]
+    seconds_per_unit: float
+    channel_columns: tuple[int, ...]
 
     def pieces(
         self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of the rows of each span."""
-        columns = [self.columns[i] for i in channel_indices]
+        columns = [self.channel_columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
             for first, count in sample_spans:
                 table, times = numbers_of_rows(self.path, self.layout, self._bytes_of_rows(file, first, count), first)
-                yield self.factor * table[:, self.time_column] if times is None else times, table[:, columns]
+                yield self.seconds_per_unit * table[:, self.time_column] if times is None else times, table[:, columns]
 
     def _bytes_of_rows(self, open_file: io.BufferedReader, first_row: int, row_count: int) -> bytes:
         """Bytes of ``row_count`` rows from row ``first_row`` on."""
-        low, high = first_row // ROWS_PER_MARK, min(-(-(first_row + row_count) // ROWS_PER_MARK), len(self.rows) - 1)
-        open_file.seek(int(self.rows[low]))
-        text = open_file.read(int(self.rows[high] - self.rows[low]))
+        low, high = (
+            first_row // ROWS_PER_MARK,
+            min(-(-(first_row + row_count) // ROWS_PER_MARK), len(self.row_positions) - 1),
+        )
+        open_file.seek(int(self.row_positions[low]))
+        text = open_file.read(int(self.row_positions[high] - self.row_positions[low]))
         unit = self.layout.unit
         ends = np.flatnonzero(np.frombuffer(text, unit) == ord("\n"))
         skipped = first_row - low * ROWS_PER_MARK
@@ -107,7 +111,7 @@ def open_csv(csv_path: Path) -> CsvFile:
             FileChannel(
                 name,
                 unit_of(head.names[i]) or units[i],
-                "\n".join(remarks.of_channels.get(name, [])),
+                "\n".join(remarks.channel_comments.get(name, [])),
                 0,
                 count,
                 None,
@@ -148,7 +152,7 @@ def _findings_on_end(
     """Findings on a file that does not end as a complete file does."""
     if row_count == 0:
         raise InputError(csv_path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
-    findings, samples = list[Finding](), remarks.samples
+    findings, samples = list[Finding](), remarks.sample_count
     if byte_count_left:
         with csv_path.open("rb") as file:
             file.seek(-byte_count_left, io.SEEK_END)

@@ -108,8 +108,8 @@ class Remarks:
 
     comments: list[str] = field(default_factory=list)
     start: str = ""
-    samples: int | None = None
-    of_channels: dict[str, list[str]] = field(default_factory=dict)
+    sample_count: int | None = None
+    channel_comments: dict[str, list[str]] = field(default_factory=dict)
 
     def add(self, csv_path: Path, line_number: int, comment_text: str) -> None:
         """Evaluate one comment line, given without its ``#``."""
@@ -119,9 +119,9 @@ class Remarks:
         elif key == "samples":
             if not value.strip().isdecimal():
                 raise InputError(csv_path, f"line {line_number}, samples", value.strip(), "a number of rows is needed")
-            self.samples = int(value)
+            self.sample_count = int(value)
         elif (remark := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', comment_text)) is not None:
-            self.of_channels.setdefault(_name_in_quotes(csv_path, line_number, remark[1]), []).append(remark[2])
+            self.channel_comments.setdefault(_name_in_quotes(csv_path, line_number, remark[1]), []).append(remark[2])
         else:
             self.comments.append(value.removeprefix(" ") if key == "comment" else comment_text)
 
@@ -345,7 +345,7 @@ def _layout_remarks(layout: CsvLayout, cells: list[str]) -> Iterator[str]:
         wraps = "; they go on past midnight" if stamps.notation == "hh:mm:ss.fff" else ""
         yield (
             f"{layout.names[layout.time_column]!r} holds times of the clock ({stamps.notation}); seconds are "
-            f"counted from the first, {stamps.first}{wraps}"
+            f"counted from the first, {stamps.first_text}{wraps}"
         )
     marks = [
         repr(cell) for cell in cells if cell.casefold() not in ("", "nan") and MISSING_VALUE_PATTERN.fullmatch(cell)

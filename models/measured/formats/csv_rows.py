@@ -39,7 +39,7 @@ class CsvLayout:
     """Layout of the rows of a CSV file: separators, columns, clock.
 
     separator, decimal_sign : characters. first_byte : byte where the rows begin. line : number of the line before them.
-    names : headings of all columns. width : cells of a row, which may have empty ones beyond the last heading.
+    names : headings of all columns. cells_per_row : cells of a row, which may have empty ones beyond the last heading.
     text_columns : columns that hold no numbers. time_column : the column of time; time_stamps : how it is written, None
     for numbers. unit : bytes of a character, as numpy reads it.
     """
@@ -49,7 +49,7 @@ class CsvLayout:
     first_byte: int
     line: int
     names: tuple[str, ...]
-    width: int
+    cells_per_row: int
     text_columns: tuple[int, ...]
     time_column: int
     time_stamps: TimeStamps | None
@@ -135,7 +135,7 @@ def numbers_of_rows(
 def _number_table(csv_path: Path, layout: CsvLayout, row_text: bytes, line_number: int) -> np.ndarray:
     """Numbers (rows, columns) in the columns of numbers and in any beyond the last heading; NaN where a cell marks a
     missing value."""
-    columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
+    columns, wrong = [*layout.numbers, *range(len(layout.names), layout.cells_per_row)], None
     if row_text.translate(None, _PLAIN_BYTES + layout.separator.encode()):
         wrong = _first_wrong_cell(csv_path, layout, row_text, line_number)
     if wrong is None:
@@ -197,17 +197,17 @@ def _refuse_uneven_row(csv_path: Path, layout: CsvLayout, row_text: bytes, line_
     ends = np.flatnonzero(data == ord("\n"))
     signs = np.searchsorted(np.flatnonzero(data == ord(layout.separator)), ends)
     cells = np.diff(signs, prepend=0) + 1
-    wrong = np.flatnonzero(cells != layout.width)
+    wrong = np.flatnonzero(cells != layout.cells_per_row)
     if wrong.size:
         width = int(cells[wrong[0]])
-        doubled = width in (2 * layout.width, 2 * layout.width - 1) and layout.separator == ","
+        doubled = width in (2 * layout.cells_per_row, 2 * layout.cells_per_row - 1) and layout.separator == ","
         hint = "; where commas are decimal signs, semicolons must part the columns" if doubled else ""
         raise _error_at_byte(
             csv_path,
             line_number,
             row_text,
             int(ends[wrong[0]]),
-            f"{layout.width} values are needed, found {width}{hint}",
+            f"{layout.cells_per_row} values are needed, found {width}{hint}",
         )
 
 

@@ -32,7 +32,7 @@ class TimeStamps:
     notation: str
     zone: str
     first_time: int
-    first: str
+    first_text: str
 
     @property
     def start(self) -> datetime | None:
@@ -75,7 +75,7 @@ class TimeStamps:
                     csv_path,
                     f"line {line_number + i}, column {column_name!r}",
                     cell.strip(),
-                    f"a time such as {self.first} is needed ({self.notation}{where}, as in the first row)",
+                    f"a time such as {self.first_text} is needed ({self.notation}{where}, as in the first row)",
                 )
         return InputError(
             csv_path, f"line {line_number} and after, column {column_name!r}", None, "times of the clock are needed"

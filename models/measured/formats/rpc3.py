@@ -47,8 +47,8 @@ class SampleLayout:
     type, factor of each channel, period (s)."""
 
     first_byte: int
-    points: int
-    width: int
+    samples_per_group: int
+    channel_count: int
     dtype: np.dtype
     scales: np.ndarray
     period: float
@@ -65,18 +65,18 @@ class RpcFile(OpenFile):
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of each span, from the groups that hold it."""
         layout = self.layout
-        size = layout.points * layout.width * layout.dtype.itemsize
+        size = layout.samples_per_group * layout.channel_count * layout.dtype.itemsize
         with self.path.open("rb") as file:
             for first, count in sample_spans:
-                low, high = first // layout.points, -(-(first + count) // layout.points)
+                low, high = first // layout.samples_per_group, -(-(first + count) // layout.samples_per_group)
                 file.seek(layout.first_byte + low * size)
                 data = np.frombuffer(file.read((high - low) * size), layout.dtype).reshape(
-                    -1, layout.width, layout.points
+                    -1, layout.channel_count, layout.samples_per_group
                 )
                 samples = data[:, channel_indices].transpose(0, 2, 1).reshape(-1, len(channel_indices))
                 with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN all the same
                     values = samples.astype(float) * layout.scales[channel_indices]
-                skipped = first - low * layout.points
+                skipped = first - low * layout.samples_per_group
                 yield layout.period * np.arange(first, first + count), values[skipped : skipped + count]
 
 
@@ -86,11 +86,13 @@ def open_rpc(rpc_path: Path) -> RpcFile:
         parameters = read_parameters(rpc_path)
         layout = _sample_layout(rpc_path, parameters)
         count, said = _usable_samples(rpc_path, parameters, layout)
-        said += _findings_on_names(rpc_path, parameters, layout.width)
-        numbers = range(1, layout.width + 1)
+        said += _findings_on_names(rpc_path, parameters, layout.channel_count)
+        numbers = range(1, layout.channel_count + 1)
         names = [parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}" for i in numbers]
         names, repeated = distinct_names(rpc_path, names)
-        steps = np.abs(layout.scales) if layout.dtype == SAMPLE_TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
+        steps = (
+            np.abs(layout.scales) if layout.dtype == SAMPLE_TYPES["SHORT_INTEGER"] else np.zeros(layout.channel_count)
+        )
         channels = tuple(
             FileChannel(
                 name,
@@ -194,20 +196,21 @@ def _sample_layout(rpc_path: Path, parameters: dict[str, str]) -> SampleLayout:
 
 def _usable_samples(rpc_path: Path, parameters: dict[str, str], layout: SampleLayout) -> tuple[int, list[Finding]]:
     """Number of usable samples, and findings on missing or surplus ones."""
-    frame = whole_number(rpc_path, parameters, "PTS_PER_FRAME", layout.points)
+    frame = whole_number(rpc_path, parameters, "PTS_PER_FRAME", layout.samples_per_group)
     announced = frame * whole_number(rpc_path, parameters, "FRAMES", 10**12)
-    size = layout.points * layout.width * layout.dtype.itemsize
+    size = layout.samples_per_group * layout.channel_count * layout.dtype.itemsize
     data = rpc_path.stat().st_size - layout.first_byte
-    present = layout.points * (data // size)
+    present = layout.samples_per_group * (data // size)
     texts = list[str]()
     if "SAMPLES" in parameters:
         announced = whole_number(rpc_path, parameters, "SAMPLES", announced)
     else:
         texts.append(
-            f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at "
+            f"the header does not say how many of the {announced} samples are measured: up to "
+            f"{layout.samples_per_group - 1} at "
             "the end may be padding of the last group"
         )
-    count, extra = min(announced, present), data - size * -(-announced // layout.points)
+    count, extra = min(announced, present), data - size * -(-announced // layout.samples_per_group)
     if count == 0:
         raise InputError(
             rpc_path, f"byte {layout.first_byte}", None, "the file ends before its first group of samples does"
