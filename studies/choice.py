@@ -18,7 +18,7 @@ from models.advice.choice.choose import (
     EffectChoice,
     EffectChooser,
 )
-from models.advice.choice.variants import Variants, system_of
+from models.advice.choice.variants import Variants, module_of_system
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
@@ -74,7 +74,7 @@ class SceneChoice:
 
 def check(scene: Any, engines: tuple[str, ...]) -> None:
     """Raise InputError for further scenes of the option "beside" that ask for no choice of effects."""
-    system_of(scene)
+    module_of_system(scene)
     for name in read(Options, scene.options, scene.file, "options").beside:
         other_scene = load_scene(name, None)
         if other_scene.tolerance is None:
@@ -147,7 +147,7 @@ def has_closed_form(scene: Any) -> bool:
 def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:
     """Engine for the choice: the system's usual engine if it is requested or none is; else the first requested
     engine."""
-    usual: str = system_of(scene).ENGINE
+    usual: str = module_of_system(scene).DEFAULT_ENGINE
     return usual if not engines or usual in engines else engines[0]
 
 

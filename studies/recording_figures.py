@@ -61,7 +61,7 @@ def figure_of_finding(finding: Finding, evidence: CheckedRecording, path: Path) 
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
     if not signals:
         return None
-    vertical, hubs = evidence.vertical(), evidence.vehicle.hubs if evidence.vehicle else ()
+    vertical, hubs = evidence.vertical_force_signals(), evidence.vehicle.hubs if evidence.vehicle else ()
     loads = len(vertical) == len(hubs) > 0 and set(signals) <= set(vertical.values())
     if finding.check in ("weight", "gain", "sign", "unit") and loads:
         return _plot_mean_forces(evidence, path)
@@ -120,8 +120,8 @@ def _plot_signals(
 def _plot_mean_forces(evidence: CheckedRecording, path: Path) -> Path:
     """Save a bar chart of each hub's mean measured vertical force beside its static load by the vehicle file."""
     assert evidence.vehicle is not None
-    hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
-    means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
+    hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical_force_signals()
+    means = np.array([evidence.mean_of_signal(vertical[hub]) for hub in hubs])
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
     bar_positions = np.arange(len(hubs))
     axis.bar(bar_positions - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
@@ -151,7 +151,9 @@ def _plot_ratio(evidence: CheckedRecording, fault: MeasurementFault, path: Path)
     group = SignalGroup(
         fault.name, group_channels is agreement.force_signals, tuple(group_channels.index(s) for s in fault.signals)
     )
-    line, size = ((agreement.weights * part_of_weights).sum(axis=1) for part_of_weights in agreement.share(group))
+    line, size = (
+        (agreement.weights * part_of_weights).sum(axis=1) for part_of_weights in agreement.cross_and_own_power(group)
+    )
     f, ratio, sure = agreement.frequencies, size / line if group.forces else line / size, size / size.max()
     late, factor = (fault.size, 1.0) if fault.kind == "late" else (0.0, fault.size)
     size_text = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"

@@ -212,7 +212,7 @@ def test_slow_forces_on_a_free_vehicle_are_felt_as_force_by_mass(axis):
     car, whole = r19(), rigid_vehicle(r19())
     felt = MeasuredSignal("a", "", "a", "acceleration", "body", "xyz"[axis], "body", 1, "m/s^2", 1.0)
     place = TransducerPlace("body", tuple(whole.centre))
-    response = SensorResponse(car, "hub").at(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]
+    response = SensorResponse(car, "hub").transfer_functions(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]
     assert (response @ car.loads / car.loads.sum()).real == pytest.approx(1 / whole.mass, rel=1e-3)
 
 

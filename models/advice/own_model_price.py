@@ -68,7 +68,7 @@ class PricedModel:
     @property
     def unit(self) -> str:
         """Unit of the quantity: rad, m, or both."""
-        kinds = {unit_of(self.own_model, i) for i in self.coordinate_indices}
+        kinds = {unit_of_coordinate(self.own_model, i) for i in self.coordinate_indices}
         return kinds.pop() if len(kinds) == 1 else "rad or m"
 
     @property
@@ -201,7 +201,7 @@ def _joint_name(quoted_name: str) -> str:
     return quoted_name.removeprefix("joint ").replace("'", "")
 
 
-def unit_of(own_model: TwinModel, coordinate_index: int) -> str:
+def unit_of_coordinate(own_model: TwinModel, coordinate_index: int) -> str:
     """Unit of a coordinate of the model: "rad" or "m"."""
     _, freedom = own_model.driven.vehicle.coordinates()[coordinate_index]
     return "rad" if freedom.startswith("r") else "m"

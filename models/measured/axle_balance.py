@@ -67,17 +67,17 @@ class AxleForces:
     turns_with_chassis: bool = False
 
     @cached_property
-    def rigid(self) -> RigidPitch:
+    def rigid_pitch_body(self) -> RigidPitch:
         """The vehicle as one rigid body in the pitch plane."""
         return rigid_pitch(self.parameters)
 
     @cached_property
-    def loads(self) -> np.ndarray:
+    def static_loads(self) -> np.ndarray:
         """Static axle loads (2,) in N; computed with 9.81 m/s^2 if the vehicle has no gravity."""
         return _axle_masses(self.parameters) * (self.parameters.g or GRAVITY)
 
     @cached_property
-    def means(self) -> np.ndarray:
+    def mean_forces(self) -> np.ndarray:
         """Mean forces (2,) of the axles in N."""
         return self.forces.mean(axis=0)
 
@@ -85,8 +85,8 @@ class AxleForces:
     def is_unloaded(self) -> np.ndarray:
         """Which axles (2,) have a mean force that is negligible compared with their static load and with their
         variation."""
-        return (np.abs(self.means) < NEGLIGIBLE_MEAN_LOAD_SHARE * self.loads) & (
-            np.abs(self.means) <= self.forces.std(axis=0)
+        return (np.abs(self.mean_forces) < NEGLIGIBLE_MEAN_LOAD_SHARE * self.static_loads) & (
+            np.abs(self.mean_forces) <= self.forces.std(axis=0)
         )
 
     @property
@@ -102,13 +102,13 @@ class AxleForces:
     @cached_property
     def accelerations_per_newton(self) -> np.ndarray:
         """Accelerations (2, 2) per 1 N at the front and at the rear axle: heave (upwards), then pitch (nose up)."""
-        body = self.rigid
+        body = self.rigid_pitch_body
         return np.array(
             [[1 / body.mass, 1 / body.mass], [body.front_arm / body.total_inertia, -body.rear_arm / body.total_inertia]]
         )
 
     @cached_property
-    def pitch(self) -> tuple[np.ndarray, np.ndarray]:
+    def pitch_motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Pitch rate (n,) in rad/s and pitch angle (n,) in rad, nose up, from integrating the forces alone, starting at
         rest.
 
@@ -128,7 +128,7 @@ class AxleForces:
     @cached_property
     def vertical_speed(self) -> np.ndarray:
         """Vertical speed (n,) of the centre of mass in m/s, upwards, from integrating the forces, starting at rest."""
-        pitch = self.pitch[1]
+        pitch = self.pitch_motion[1]
         upright = np.cos(pitch) if self.turns_with_chassis and abs(pitch).max() < STEEPEST_GRADE else 1.0
         return self._time_integral(self.forces @ self.accelerations_per_newton[0] * upright - self.parameters.g)
 
@@ -199,13 +199,13 @@ def equilibrium_residual(axle_forces: AxleForces) -> SteadyResidual:
     Vertical motion is compared with two explanations: a level road, and a climb with the pitch that the forces give.
     The residual is that of the better explanation.
     """
-    rate, pitch = axle_forces.pitch
+    rate, pitch = axle_forces.pitch_motion
     times = _block_means(axle_forces.last_sample_time * np.linspace(-0.5, 0.5, len(axle_forces.forces)))
     units = np.array(
         [
             GRAVITY,
             axle_forces.accelerations_per_newton[1, 0]
-            * axle_forces.loads[0]
+            * axle_forces.static_loads[0]
             * GRAVITY
             / (axle_forces.parameters.g or GRAVITY),
         ]

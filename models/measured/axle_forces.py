@@ -52,8 +52,10 @@ FILE_REMEDIES: dict[WrongFactor, str] = {
 def check_axle_forces(axle_forces: AxleForces) -> list[Finding]:
     """Findings on the axles' forces. If one finding explains a fault, no other finding names it."""
     largest = float(np.abs(axle_forces.forces).max())
-    if largest > IMPOSSIBLE_FORCE_RATIO * axle_forces.loads.sum():
-        text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axle_forces.loads.sum():.4g} N."
+    if largest > IMPOSSIBLE_FORCE_RATIO * axle_forces.static_loads.sum():
+        text = (
+            f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axle_forces.static_loads.sum():.4g} N."
+        )
         return [_axle_error_finding(axle_forces, "weight", text, largest, "N")]
     for look in (
         _sparse_finding,
@@ -87,31 +89,41 @@ def _common_mistake_findings(axle_forces: AxleForces) -> list[Finding]:
         text = " ".join(
             missing_load_sentence(axle[0].name, mean, load)
             for axle, mean, load, empty in zip(
-                axle_forces.signals, axle_forces.means, axle_forces.loads, axle_forces.is_unloaded, strict=True
+                axle_forces.signals,
+                axle_forces.mean_forces,
+                axle_forces.static_loads,
+                axle_forces.is_unloaded,
+                strict=True,
             )
             if empty
         )
         return [
             _axle_error_finding(
-                axle_forces, "weight", text, 100 * (axle_forces.means.sum() / axle_forces.loads.sum() - 1), "%"
+                axle_forces,
+                "weight",
+                text,
+                100 * (axle_forces.mean_forces.sum() / axle_forces.static_loads.sum() - 1),
+                "%",
             )
         ]
     wheels = np.array([p.m1, p.m2]) * p.g
     missing, lacks = (
-        axle_forces.loads - axle_forces.means,
-        100 * (axle_forces.means.sum() / axle_forces.loads.sum() - 1),
+        axle_forces.static_loads - axle_forces.mean_forces,
+        100 * (axle_forces.mean_forces.sum() / axle_forces.static_loads.sum() - 1),
     )
-    if _is_near(missing, wheels, axle_forces.loads) and not _is_near(missing, 0 * wheels, axle_forces.loads):
+    if _is_near(missing, wheels, axle_forces.static_loads) and not _is_near(
+        missing, 0 * wheels, axle_forces.static_loads
+    ):
         text = (
             f"The wheel forces lack {missing[0]:.4g} N in front and {missing[1]:.4g} N at the rear on average, the "
             f"weight of the wheels ({wheels[0]:.4g} N and {wheels[1]:.4g} N): they were measured above the wheels. Add "
             "it, with the wheels' inertia force if they move."
         )
         return [_axle_error_finding(axle_forces, "weight", text, lacks, "%")]
-    if _is_near(axle_forces.means, axle_forces.loads / 2, axle_forces.loads / 2):
+    if _is_near(axle_forces.mean_forces, axle_forces.static_loads / 2, axle_forces.static_loads / 2):
         text = (
             f"The wheel forces are half the static loads of the axles "
-            f"({axle_forces.loads[0]:.5g} N and {axle_forces.loads[1]:.5g} N): "
+            f"({axle_forces.static_loads[0]:.5g} N and {axle_forces.static_loads[1]:.5g} N): "
             "they are of one wheel of each axle. Add those of the other."
         )
         return [_axle_error_finding(axle_forces, "weight", text, -50.0, "%")]
@@ -126,7 +138,8 @@ def _is_near(mean_values: np.ndarray, expected_values: np.ndarray, scale: np.nda
 def _exchanged_finding(axle_forces: AxleForces) -> list[Finding]:
     """Finding that the two axles' forces fit the static loads only if they are exchanged."""
     as_is, crossed = (
-        np.abs(each / axle_forces.loads - 1).max() for each in (axle_forces.means, axle_forces.means[::-1])
+        np.abs(each / axle_forces.static_loads - 1).max()
+        for each in (axle_forces.mean_forces, axle_forces.mean_forces[::-1])
     )
     if (
         crossed > EXPLANATION_ERROR
@@ -135,9 +148,11 @@ def _exchanged_finding(axle_forces: AxleForces) -> list[Finding]:
     ):
         return []
     text = (
-        f"Front and rear are exchanged: {axle_forces.means[0]:.5g} N in front and {axle_forces.means[1]:.5g} N at "
+        f"Front and rear are exchanged: {axle_forces.mean_forces[0]:.5g} N in front and "
+        f"{axle_forces.mean_forces[1]:.5g} N at "
         "the rear on "
-        f"average, where {axle_forces.loads[0]:.5g} N and {axle_forces.loads[1]:.5g} N rest. Exchange their "
+        f"average, where {axle_forces.static_loads[0]:.5g} N and {axle_forces.static_loads[1]:.5g} N rest. Exchange "
+        "their "
         "columns, or a and b of "
         "the vehicle."
     )
@@ -149,7 +164,10 @@ def _wrong_mean_findings(axle_forces: AxleForces) -> list[Finding]:
     road does."""
     findings, far = [], _travels_too_far(axle_forces, equilibrium_residual(axle_forces)).any()
     for axle, mean, load in zip(
-        axle_forces.signals, axle_forces.means, axle_forces.loads if axle_forces.parameters.g else (), strict=False
+        axle_forces.signals,
+        axle_forces.mean_forces,
+        axle_forces.static_loads if axle_forces.parameters.g else (),
+        strict=False,
     ):
         for_axle = f"the {load:.5g} N that rest on it on average"
         ratio, names = float(mean / load), tuple(s.name for s in axle)
@@ -172,7 +190,7 @@ def _imbalance_findings(axle_forces: AxleForces) -> list[Finding]:
     excess = np.linalg.solve(
         axle_forces.accelerations_per_newton, np.where(motion.is_beyond_uncertainty, motion.accelerations, 0.0)
     )
-    share = excess / axle_forces.loads
+    share = excess / axle_forces.static_loads
     told = " and ".join(
         _excess_text(*each)
         for each in zip(("the front axle", "the rear axle"), excess, share, strict=True)
@@ -221,8 +239,10 @@ def _motion_text(axle_forces: AxleForces, steady_residual: SteadyResidual) -> st
 
 def _start_in_motion_finding(axle_forces: AxleForces) -> list[Finding]:
     """Finding on forces that begin while the vehicle moves, although the run begins at rest."""
-    first = axle_forces.forces[0] / axle_forces.loads - 1
-    last = axle_forces.pitch[1][min(len(axle_forces.forces) - 1, round(axle_forces.duration / axle_forces.period))]
+    first = axle_forces.forces[0] / axle_forces.static_loads - 1
+    last = axle_forces.pitch_motion[1][
+        min(len(axle_forces.forces) - 1, round(axle_forces.duration / axle_forces.period))
+    ]
     if (
         not axle_forces.starts_at_rest
         or axle_forces.parameters.g == 0
@@ -246,7 +266,10 @@ def _pitch_noise(axle_forces: AxleForces) -> float:
     signals.
     """
     rough = float(np.diff(axle_forces.forces, 3, axis=0).std()) / 20**0.5
-    return 4 * (axle_forces.rigid.noise_intensity(rough, axle_forces.period) * axle_forces.duration**3 / 3) ** 0.5
+    return (
+        4
+        * (axle_forces.rigid_pitch_body.noise_intensity(rough, axle_forces.period) * axle_forces.duration**3 / 3) ** 0.5
+    )
 
 
 def _constant_axle_finding(axle_forces: AxleForces) -> list[Finding]:
@@ -261,7 +284,7 @@ def _constant_axle_finding(axle_forces: AxleForces) -> list[Finding]:
 
 def _copied_finding(axle_forces: AxleForces) -> list[Finding]:
     """Finding on an axle whose samples equal the other axle's, times a factor."""
-    off = axle_forces.forces - axle_forces.means
+    off = axle_forces.forces - axle_forces.mean_forces
     size = np.sqrt(np.mean(off**2, axis=0))
     if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED_RESIDUAL_SHARE:
         return []
@@ -290,7 +313,7 @@ def _axle_delay(axle_forces: AxleForces) -> tuple[float, float, float]:
     n = len(axle_forces.forces)
     frequencies = np.fft.rfftfreq(2 * n, axle_forces.period)
     band = (frequencies > COMMON_ROAD_BAND[0]) & (frequencies < COMMON_ROAD_BAND[1])
-    spectra = np.fft.rfft(axle_forces.forces - axle_forces.means, 2 * n, axis=0) * band[:, None]
+    spectra = np.fft.rfft(axle_forces.forces - axle_forces.mean_forces, 2 * n, axis=0) * band[:, None]
     power = np.sqrt(np.prod((np.abs(spectra) ** 2).sum(axis=0)))
     low, high = (round(lag / axle_forces.period) for lag in AXLE_LAG_RANGE)
     if not power > 0 or n < 2 * high:
@@ -320,7 +343,7 @@ def unchecked_delay_sentence(axle_forces: AxleForces) -> str:
 def _weight_finding(axle_forces: AxleForces) -> Finding:
     """Finding that the mean wheel forces carry the vehicle's weight, with the errors that would be seen."""
     motion = equilibrium_residual(axle_forces)
-    whole_load_effects = axle_forces.accelerations_per_newton[1] * axle_forces.loads
+    whole_load_effects = axle_forces.accelerations_per_newton[1] * axle_forces.static_loads
     text = (
         f"The mean wheel forces carry the vehicle to {motion.shares_of_load[0]:+.2%} of its weight; an error of "
         f"{100 * motion.uncertainties[0] / GRAVITY:.2g} % would be seen, of one axle of "

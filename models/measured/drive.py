@@ -15,7 +15,7 @@ DRIVE_CHANNELS = {"steer": "rad", "speed": "m/s"}
 """Channels of a measured drive, with their units."""
 LEAST_SPEED = 2.0
 """Least speed (m/s) of a drive, since slip angles are ratios to the speed."""
-FEWEST_SAMPLES = 16
+FEWEST_DRIVE_SAMPLES = 16
 """Least number of samples of a drive."""
 
 
@@ -48,8 +48,8 @@ def _read_drive(drive_path: Path, time_interval: tuple[float, ...], modification
         allowed = f"must rise and lie within the file's time, from {first:g} to {last:g} s"
         raise InputError(drive_path, "drive.stretch", [begin, end], allowed)
     grid = begin + period * np.arange(int((min(end, last) - begin) / period + 1e-6) + 1)
-    if len(grid) < FEWEST_SAMPLES:
-        raise InputError(drive_path, "rows", len(grid), f"a drive needs at least {FEWEST_SAMPLES} samples")
+    if len(grid) < FEWEST_DRIVE_SAMPLES:
+        raise InputError(drive_path, "rows", len(grid), f"a drive needs at least {FEWEST_DRIVE_SAMPLES} samples")
     values, left_out = dict[str, np.ndarray](), dict[str, int]()
     for name, (times, raw) in read.items():
         values[name], left_out[name] = on_even_grid(times, raw, grid, f"{drive_path}, {name}")
@@ -67,6 +67,6 @@ def on_even_grid(
     out."""
     cleaned = without_outliers(values)
     known = np.isfinite(cleaned)
-    if known.sum() < FEWEST_SAMPLES:
-        raise InputError(error_place, "", int(known.sum()), f"at least {FEWEST_SAMPLES} samples must be measured")
+    if known.sum() < FEWEST_DRIVE_SAMPLES:
+        raise InputError(error_place, "", int(known.sum()), f"at least {FEWEST_DRIVE_SAMPLES} samples must be measured")
     return np.interp(even_times, times[known], cleaned[known]), int(len(cleaned) - known.sum())

@@ -8,7 +8,7 @@ from scipy.special import stdtrit
 
 from models.core.errors import InputError
 
-Cases = tuple[np.ndarray, ...]
+CaseValues = tuple[np.ndarray, ...]
 """One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its time history (n,), or a single
 number (1,).
 """
@@ -30,11 +30,11 @@ class Quantity:
     """
 
     unit: str
-    cases: Cases
+    cases: CaseValues
     sampled: bool = False
 
     @property
-    def sizes(self) -> np.ndarray:
+    def reference_sizes(self) -> np.ndarray:
         """Reference sizes of the quantity, one for each case; changes are divided by them."""
         return np.sqrt([case.mean() for case in self.cases]) if self.sampled else reference_sizes_of_cases(self.cases)
 
@@ -91,7 +91,7 @@ in 0.15 % of the cases.
 """
 
 
-def sampled_change_and_error(differences: Cases, full_scene_values: Cases) -> tuple[float, float]:
+def sampled_change_and_error(differences: CaseValues, full_scene_values: CaseValues) -> tuple[float, float]:
     """Largest relative change among the cases of a quantity that is a root mean square of samples, and the statistical
     error of this change.
 
@@ -114,7 +114,7 @@ def sampled_change_and_error(differences: Cases, full_scene_values: Cases) -> tu
     return worst
 
 
-def difference_of_runs(changed_run_values: Cases, full_scene_values: Cases) -> Cases:
+def difference_of_runs(changed_run_values: CaseValues, full_scene_values: CaseValues) -> CaseValues:
     """Differences of two runs, case by case, at the output times of the run with longer steps.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
@@ -141,12 +141,12 @@ def _at_common_times(*time_histories: np.ndarray) -> list[np.ndarray]:
     return [path[:: (len(path) - 1) // max(row_count - 1, 1) or 1] for path in time_histories]
 
 
-def sum_of_differences(*differences: Cases) -> Cases:
+def sum_of_differences(*differences: CaseValues) -> CaseValues:
     """Sum of several differences of runs, case by case, at the output times that all of them have."""
     return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*differences, strict=True))
 
 
-def largest_relative_change(differences: Cases, reference_sizes: np.ndarray) -> float:
+def largest_relative_change(differences: CaseValues, reference_sizes: np.ndarray) -> float:
     """Largest relative change among the cases: the rms difference of a time history, or the difference of a single
     number, divided by the case's reference size.
     """

@@ -353,8 +353,8 @@ class EffectChooser:
         """
         path = list(sets_so_far)
         while True:
-            step = self._best_step(path[-1], refused_additions, [frozenset([effect]) for effect in self.effects])
-            step = step or self._best_step(path[-1], refused_additions, self._promising_pairs())
+            step = self._best_addition(path[-1], refused_additions, [frozenset([effect]) for effect in self.effects])
+            step = step or self._best_addition(path[-1], refused_additions, self._promising_pairs())
             if not step:
                 return path
             path.append(path[-1] | step)
@@ -383,7 +383,7 @@ class EffectChooser:
             within += [pair] if self.tolerance_share(pair) <= TOLERANCE_SHARE_OF_PREDICTION else []
         return within
 
-    def _best_step(
+    def _best_addition(
         self, omitted_effects: EffectSet, refused_additions: set[EffectSet], additions: list[EffectSet]
     ) -> EffectSet:
         """The effect or pair that saves the most work for the predicted error that it adds; empty where none may go."""

@@ -16,7 +16,7 @@ from typing import NoReturn
 import numpy as np
 
 from models.advice.choice.answer import (
-    Cases,
+    CaseValues,
     RunQuantities,
     difference_of_runs,
     largest_relative_change,
@@ -29,7 +29,7 @@ from models.core.errors import InputError
 
 LARGEST_SHARE_OF_SINGLE_SAMPLE = 1 / 3
 """Largest share that one sample may have of a sampled quantity's mean square."""
-ChangesByQuantity = dict[str, Cases]
+ChangesByQuantity = dict[str, CaseValues]
 """Differences of two runs, by the name of the quantity."""
 
 
@@ -45,7 +45,7 @@ class EffectScreen:
             full = variants.system.computed_quantities(variants.scene, variants.engine)
         quantities_by_name = {name: full.quantity(name, variants.scene.file) for name in quantities}
         self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
-        self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
+        self.sizes = {name: quantity.reference_sizes for name, quantity in quantities_by_name.items()}
         self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
         for name, size in self.sizes.items():
             if not (np.isfinite(size).all() and (size > rounding_floor(full, quantities_by_name[name].unit)).any()):
@@ -189,5 +189,5 @@ def _effect_sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
     return [frozenset(subset) for count in (1, 2) for subset in combinations(sorted(omitted_effects), count)]
 
 
-def _negated(case_values: Cases) -> Cases:
+def _negated(case_values: CaseValues) -> CaseValues:
     return tuple(-case for case in case_values)

@@ -45,7 +45,7 @@ load code.
 """
 
 
-def system_of(scene: Any) -> ModuleType:
+def module_of_system(scene: Any) -> ModuleType:
     """The module that runs scenes of this scene's system for a price or a choice; InputError where there is none."""
     files = modules_of("models.advice.choice.systems")
     if scene.system not in files:
@@ -81,7 +81,7 @@ class Variants:
     _computed_in_advance: dict[VariantKey, VariantOutcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.system = system_of(self.scene)
+        self.system = module_of_system(self.scene)
         self.scene = self.system.copies_of_scene(self.scene) if self._knows_effects else self.scene
         self._job = partial(_run_variant_in_worker, self.scene, self.engine)
 
@@ -178,7 +178,7 @@ class Variants:
         if step_factor == 1:
             return scene
         table = table_without_defaults(scene)
-        self.system.coarsen(table, scene, step_factor)
+        self.system.lengthen_steps(table, scene, step_factor)
         return rebuilt_scene(table, scene)
 
     def work(self, omitted_effects: EffectSet, step_factor: int = 1) -> float:
@@ -225,7 +225,7 @@ class Variants:
         count = self.system.step_count(self.scene)
         for part_steps in (n for n in range(least_step_count, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
             table = table_without_defaults(self.scene)
-            self.system.shorten(table, self.scene, part_steps)
+            self.system.shorten_run(table, self.scene, part_steps)
             with suppress(InputError):
                 return Variants(rebuilt_scene(table, self.scene), self.engine, self.executor)
         return self

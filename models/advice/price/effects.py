@@ -19,7 +19,7 @@ from models.advice.choice.answer import (
     rounding_floor,
     sampled_change_and_error,
 )
-from models.advice.choice.variants import Variants, system_of
+from models.advice.choice.variants import Variants, module_of_system
 from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import describe, paired_ratio
@@ -95,8 +95,8 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
         from models.advice.price.effects_of_ride import price_list_of_ride
 
         return price_list_of_ride(scene)
-    system = system_of(scene)
-    engine = engine or system.ENGINE
+    system = module_of_system(scene)
+    engine = engine or system.DEFAULT_ENGINE
     complete = Variants(scene, engine)
     variants = complete.window(PRICED_STEP_LIMIT)
     short, names = variants.scene, (*variants.effects, *variants.absent_effect_names)
@@ -203,7 +203,7 @@ def _quantity_changes(scene_quantities: RunQuantities, changed_quantities: RunQu
                 change = difference_of_runs(changed_quantities.quantities[name].cases, quantity.cases)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
-            size = quantity.sizes
+            size = quantity.reference_sizes
             if quantity.sampled:
                 share, chance = sampled_change_and_error(change, quantity.cases)
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))

@@ -130,7 +130,7 @@ class MotionAgreement:
         return float(np.median(self.unexplained_shares))
 
     @property
-    def rms(self) -> float:
+    def unexplained_rms(self) -> float:
         """Root mean square over the readings of the unexplained share of motion."""
         return float(np.sqrt(np.mean(self.unexplained_shares**2)))
 
@@ -146,7 +146,7 @@ class MotionAgreement:
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
         return self.independent_averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
-    def search(self) -> tuple["MotionAgreement", tuple[MeasurementFault, ...]]:
+    def search_faults(self) -> tuple["MotionAgreement", tuple[MeasurementFault, ...]]:
         """The ``MotionAgreement`` after correction of all faults that the search finds, and these faults, the worst
         first.
         """
@@ -188,7 +188,7 @@ class MotionAgreement:
     def _explaining_faults(self) -> Iterator[MeasurementFault]:
         """Every single fault whose correction would reduce the residual and whose size is large enough to be named."""
         weights = self.weights
-        for group in self.groups():
+        for group in self.signal_groups():
             for fault in (*self._delay_faults(group, weights), *self._factor_faults(group, weights)):
                 if self._is_worth_correcting(self.corrected_for(fault), weights):
                     yield fault
@@ -196,7 +196,7 @@ class MotionAgreement:
         yield from self._exchanged_channel_faults(weights)
         yield from self._moment_point_faults(weights)
 
-    def groups(self) -> Iterator[SignalGroup]:
+    def signal_groups(self) -> Iterator[SignalGroup]:
         """Groups of signals that may share a fault, small ones first: each signal, each hub, sensor and file, all
         readings."""
         for forces, signals in ((True, self.force_signals), (False, self.reading_signals)):
@@ -222,7 +222,7 @@ class MotionAgreement:
         """Phase factors exp(i omega t), shape (t, f), of all trial delays t."""
         return np.exp(2j * np.pi * np.outer(TRIAL_DELAYS, self.frequencies))
 
-    def share(self, signal_group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
+    def cross_and_own_power(self, signal_group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of a group's prediction with the readings less other predictions, and its own power."""
         pick = list(signal_group.member_indices)
         if signal_group.forces:
@@ -239,7 +239,7 @@ class MotionAgreement:
 
     def delay_of_group(self, signal_group: SignalGroup, frequency_weights: np.ndarray) -> tuple[float, float, float]:
         """Delay (s) of a group of signals, its standard error (infinite if unknown), and the fall of chi square."""
-        cross, power = self.share(signal_group)
+        cross, power = self.cross_and_own_power(signal_group)
         line = (frequency_weights * (cross.conj() if signal_group.forces else cross)).sum(axis=1)
         likely = (self._delay_factors @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
@@ -252,10 +252,10 @@ class MotionAgreement:
     def _delay_faults(self, signal_group: SignalGroup, frequency_weights: np.ndarray) -> Iterator[MeasurementFault]:
         late, error, fall = self.delay_of_group(signal_group, frequency_weights)
         if fall > LEAST_CHI_SQUARE_FALL and abs(late) > max(SMALL_DELAY, 4 * error):
-            yield MeasurementFault("late", signal_group.name, self._signals(signal_group), late, error, fall)
+            yield MeasurementFault("late", signal_group.name, self._signals_of_group(signal_group), late, error, fall)
 
     def _factor_faults(self, signal_group: SignalGroup, frequency_weights: np.ndarray) -> Iterator[MeasurementFault]:
-        cross, power = ((frequency_weights * part).sum() for part in self.share(signal_group))
+        cross, power = ((frequency_weights * part).sum() for part in self.cross_and_own_power(signal_group))
         ratio = float(cross.real / power) if power > 0 else 0.0
         if ratio == 0.0:
             return
@@ -263,7 +263,12 @@ class MotionAgreement:
         factor = 1 / ratio if signal_group.forces else ratio
         if fall > LEAST_CHI_SQUARE_FALL and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
             yield MeasurementFault(
-                "factor", signal_group.name, self._signals(signal_group), factor, error * abs(factor / ratio), fall
+                "factor",
+                signal_group.name,
+                self._signals_of_group(signal_group),
+                factor,
+                error * abs(factor / ratio),
+                fall,
             )
 
     def _moment_point_faults(self, frequency_weights: np.ndarray) -> Iterator[MeasurementFault]:
@@ -310,14 +315,23 @@ class MotionAgreement:
                 corrected = self.corrected_for(fault)
                 fall = chi_square - float((frequency_weights * corrected.residual_powers).sum())
                 if fall > LEAST_CHI_SQUARE_FALL and corrected.residual_powers.sum() < self.residual_powers.sum():
-                    yield replace(fault, size=self.rms, error=corrected.rms, chi_square_fall=fall)
+                    yield replace(
+                        fault, size=self.unexplained_rms, error=corrected.unexplained_rms, chi_square_fall=fall
+                    )
 
     def _exchanged_channel_faults(self, frequency_weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Faults in which two channels are exchanged with each other."""
         for pair, other in self._channel_exchanges():
             fall = self._certain_improvement(other, frequency_weights)
             if fall:
-                yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
+                yield MeasurementFault(
+                    "crossed",
+                    " and ".join(s.name for s in pair),
+                    pair,
+                    self.unexplained_rms,
+                    other.unexplained_rms,
+                    fall,
+                )
 
     def undetectable_exchanges(self) -> list[tuple[MeasuredSignal, ...]]:
         """Pairs of forces or moments along one axis whose exchange this recording could not reveal."""
@@ -370,8 +384,8 @@ class MotionAgreement:
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
         rest, smallest = LEAST_EXPLAINED_SHARE * self._unexplained_power(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
-            for group in (group for group in self.groups() if len(group.member_indices) == 1):
-                power = weights * self.share(group)[1]
+            for group in (group for group in self.signal_groups() if len(group.member_indices) == 1):
+                power = weights * self.cross_and_own_power(group)[1]
                 late, wrong = square @ power, power.sum(axis=0)
                 smallest[group.name] = (
                     _smallest_significant_size(late, rest, SMALL_DELAY),
@@ -382,7 +396,7 @@ class MotionAgreement:
     def factor_of_force(self, signal: MeasuredSignal) -> tuple[float, float]:
         """Ratio of a force's recorded to true value as the vehicle's motion shows it, and its standard error."""
         group = SignalGroup(signal.name, True, (self.force_signals.index(signal),))
-        cross, power = ((self.weights * part).sum() for part in self.share(group))
+        cross, power = ((self.weights * part).sum() for part in self.cross_and_own_power(group))
         return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
 
     def _unexplained_power(self, frequency_weights: np.ndarray) -> np.ndarray:
@@ -398,7 +412,7 @@ class MotionAgreement:
             )
         )
 
-    def _signals(self, signal_group: SignalGroup) -> tuple[MeasuredSignal, ...]:
+    def _signals_of_group(self, signal_group: SignalGroup) -> tuple[MeasuredSignal, ...]:
         return tuple(
             (self.force_signals if signal_group.forces else self.reading_signals)[i]
             for i in signal_group.member_indices

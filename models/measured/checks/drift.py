@@ -25,7 +25,7 @@ def check(checked_recording: CheckedRecording) -> list[Finding]:
     """Findings on clocks that drift. Sizes are the relative rate by which a file's clock runs faster than that of the
     hub forces."""
     clocks = {s.file for s in checked_recording.forces}
-    others = dict.fromkeys(s.file for s in checked_recording.inertial if s.file not in clocks)
+    others = dict.fromkeys(s.file for s in checked_recording.inertial_signals if s.file not in clocks)
     if not others:
         return []
     windows = (
@@ -76,7 +76,7 @@ def _drift_finding(
 ) -> Finding:
     """Finding on the clock of the file ``file_name`` compared with the clock of the hub forces."""
     of_file = tuple(i for i, s in enumerate(agreement_by_window[0][1].reading_signals) if s.file == file_name)
-    signals = tuple(s.name for s in checked_recording.inertial if s.file == file_name)
+    signals = tuple(s.name for s in checked_recording.inertial_signals if s.file == file_name)
     late = np.array(
         [
             part.delay_of_group(SignalGroup(file_name, False, of_file), part.weights)[:2]

@@ -19,7 +19,7 @@ def check(checked_recording: CheckedRecording) -> list[Finding]:
     signals = [s for s in checked_recording.recording.find("acceleration") if s.component in ("x", "y", "z")]
     if not signals:
         return [Finding(CHECK_NAME, "note", "", "Not looked at: no accelerometer.")]
-    findings = [finding for s in signals if (finding := _signal_finding(s, checked_recording.mean(s)))]
+    findings = [finding for s in signals if (finding := _signal_finding(s, checked_recording.mean_of_signal(s)))]
     quiet = "Every vertical accelerometer feels gravity as its channel map says, and no other does."
     return findings or [Finding(CHECK_NAME, "note", "", quiet)]
 

@@ -50,7 +50,7 @@ class SensorResponse:
             [(at((i + 1) * MODEL_TIME_STEP / 2, rest, rest) - still) / FORCE_DIFFERENCE_STEP for i in hubs]
         )
 
-    def at(
+    def transfer_functions(
         self, frequencies: np.ndarray, signals: Sequence[MeasuredSignal], transducer_places: Sequence[TransducerPlace]
     ) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) from the forces at h hubs to the signals, each at its place, at
@@ -60,11 +60,12 @@ class SensorResponse:
             laplace**2 * np.eye(n) - laplace * self.damped - self.stiff, self.pushed[None].astype(complex)
         )
         rows = np.stack(
-            [self._row(laplace[:, 0], s, place) for s, place in zip(signals, transducer_places, strict=True)], axis=1
+            [self._sensor_row(laplace[:, 0], s, place) for s, place in zip(signals, transducer_places, strict=True)],
+            axis=1,
         )
         return np.asarray(rows @ q)
 
-    def _row(self, i_omega: np.ndarray, signal: MeasuredSignal, transducer: TransducerPlace) -> np.ndarray:
+    def _sensor_row(self, i_omega: np.ndarray, signal: MeasuredSignal, transducer: TransducerPlace) -> np.ndarray:
         """Row (f, n) that maps the n coordinates to a sensor's reading, with ``i_omega`` (f, 1) the factor of a time
         derivative."""
         axis, turn = AXIS_INDEX[signal.component], self.motion.turn(transducer.body)

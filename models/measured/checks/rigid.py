@@ -21,19 +21,21 @@ def check(checked_recording: CheckedRecording) -> list[Finding]:
     readings, in %, that no rigid motion explains."""
     findings = [
         _body_finding(checked_recording, body, sensors)
-        for body, sensors in _bodies(checked_recording).items()
+        for body, sensors in _accelerometers_by_body(checked_recording).items()
         if len(sensors) > 2
     ]
     lacks = "Not looked at whether the body is rigid: this needs four tri-axial accelerometers on it, of known places."
     return findings or [Finding(CHECK_NAME, "note", "", lacks)]
 
 
-def _bodies(checked_recording: CheckedRecording) -> dict[str, dict[str, tuple[TransducerPlace, AxisSignals]]]:
+def _accelerometers_by_body(
+    checked_recording: CheckedRecording,
+) -> dict[str, dict[str, tuple[TransducerPlace, AxisSignals]]]:
     """Tri-axial accelerometers with all three channels, by body and by sensor name."""
     bodies: dict[str, dict[str, tuple[TransducerPlace, AxisSignals]]] = {}
     for name in dict.fromkeys(s.at for s in checked_recording.recording.find("acceleration")):
         axes = [checked_recording.recording.find("acceleration", name, axis) for axis in "xyz"]
-        place = checked_recording.place(axes[0][0]) if all(axes) else None
+        place = checked_recording.transducer_place(axes[0][0]) if all(axes) else None
         if place is not None:
             bodies.setdefault(place.body, {})[name] = place, [signals[0] for signals in axes]
     return bodies

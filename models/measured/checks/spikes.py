@@ -12,7 +12,7 @@ SPIKE_WIDTHS = 1, 2
 STEEP_RATIO, HIGH_RATIO = 6.0, 3.0
 """Least height of both sides of a spike: ratio to the step from sample to sample that 99 % do not exceed (Gaussian
 noise reaches a third of it), and ratio to the channel's standard deviation (lower spikes add no damage)."""
-USUAL_SHARE = 0.99
+USUAL_SPIKE_SHARE = 0.99
 """Share of the steps that defines the usual step."""
 
 
@@ -32,7 +32,7 @@ def spike_positions(samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     known = np.abs(steps[np.isfinite(steps)])
     if not len(known):
         return np.empty(0, np.int64), np.empty(0)
-    least = max(STEEP_RATIO * float(np.quantile(known, USUAL_SHARE)), HIGH_RATIO * float(np.nanstd(samples)))
+    least = max(STEEP_RATIO * float(np.quantile(known, USUAL_SPIKE_SHARE)), HIGH_RATIO * float(np.nanstd(samples)))
     heights = np.zeros(len(samples))
     for width in SPIKE_WIDTHS:
         up, down = steps[: len(steps) - width], -steps[width:]

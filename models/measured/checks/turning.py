@@ -39,7 +39,7 @@ def check(checked_recording: CheckedRecording) -> list[Finding]:
 
 def _body_of_signal(checked_recording: CheckedRecording, signal: MeasuredSignal) -> str:
     """Body that carries a signal's sensor, or the signal's location where the body is not known."""
-    place = checked_recording.place(signal)
+    place = checked_recording.transducer_place(signal)
     return place.body if place else signal.at
 
 

@@ -19,16 +19,16 @@ from models.multibody.cut_kernel import WRENCH
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid_vehicle
 
 CHECK_NAME = "weight"
-LOAD_ERROR = 1e-3
+STATIC_LOAD_ERROR = 1e-3
 """Relative difference of a hub's load from the vehicle file that a correct vehicle may have: tilt alone takes 0.1 %."""
-NEGLIGIBLE_SHARE = 0.005
+NEGLIGIBLE_LOAD_SHARE = 0.005
 """Share of a load below which an error is not reported."""
-MOTION_SHARE = 0.35
+CONFIRMED_ERROR_SHARE = 0.35
 """Largest ratio of a factor's error, as the motion shows it, to the excess of the mean for which the excess is an
 offset."""
 MOMENT_STANDARD_DEVIATIONS = 4.0
 """Number of standard deviations by which a mean moment must differ from the one that the motion requires."""
-CHI_SQUARE_FALL = 25.0
+LEAST_CHI_SQUARE_FALL = 25.0
 """Fall of chi square that a wrong channel must bring."""
 
 
@@ -58,7 +58,7 @@ def check(checked_recording: CheckedRecording) -> list[Finding]:
         return axle_forces.check_axle_forces(forces) if forces else []
     vehicle, of_hub = (
         checked_recording.vehicle,
-        {checked_recording.hub(s): s for s in checked_recording.vertical().values()},
+        {checked_recording.corrected_hub(s): s for s in checked_recording.vertical_force_signals().values()},
     )
     if vehicle is None or set(of_hub) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
@@ -123,7 +123,9 @@ def _angular_acceleration_readers(
 
 def _component_indices(checked_recording: CheckedRecording, vehicle: CutVehicle) -> list[int]:
     """Indices (k,) of the measured components among the components of all hubs."""
-    return [component_index(s, vehicle.hubs.index(checked_recording.hub(s))) for s in checked_recording.forces]
+    return [
+        component_index(s, vehicle.hubs.index(checked_recording.corrected_hub(s))) for s in checked_recording.forces
+    ]
 
 
 def _wrong_sign_or_unit_finding(
@@ -132,7 +134,7 @@ def _wrong_sign_or_unit_finding(
     """Finding on a vertical force whose mean shows a wrong sign or unit; None if it shows none."""
     kind, text = (
         ("size", missing_load_sentence(signal.name, mean_load, static_load))
-        if abs(mean_load) < NEGLIGIBLE_MEAN_LOAD_SHARE * static_load and checked_recording.empty(signal)
+        if abs(mean_load) < NEGLIGIBLE_MEAN_LOAD_SHARE * static_load and checked_recording.has_negligible_mean(signal)
         else cause_and_sentence(
             mean_load / static_load, signal, f"the {static_load:.0f} N that rest on {signal.at} on average"
         )
@@ -162,7 +164,7 @@ def _equilibrium_of_means(
         rows = np.hstack([rows, turned])
     rest = np.concatenate([[whole.mass * GRAVITY, 0.0, 0.0], elastic @ vehicle.loads])
     columns = np.vstack([lift, elastic]) * vehicle.loads
-    covariance = np.diag(np.diag(rows @ spread @ rows.T)) + LOAD_ERROR**2 * columns @ columns.T
+    covariance = np.diag(np.diag(rows @ spread @ rows.T)) + STATIC_LOAD_ERROR**2 * columns @ columns.T
     return EquilibriumResidual(rows @ centre - rest, columns, np.linalg.inv(covariance))
 
 
@@ -181,9 +183,9 @@ def _single_channel_error(
     share, uncertainty = float(single[worst][0][0]), sure[worst]
     excess, known = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
     if (
-        single[worst][2] > CHI_SQUARE_FALL
-        and abs(share) > max(NEGLIGIBLE_SHARE, 4 * uncertainty)
-        and single[worst][2] > fall - CHI_SQUARE_FALL
+        single[worst][2] > LEAST_CHI_SQUARE_FALL
+        and abs(share) > max(NEGLIGIBLE_LOAD_SHARE, 4 * uncertainty)
+        and single[worst][2] > fall - LEAST_CHI_SQUARE_FALL
     ):
         signal, size = signals[worst], share * static_loads[worst]
         if _motion_confirms_factor(checked_recording, signal, share):
@@ -196,8 +198,8 @@ def _single_channel_error(
             f"offset of {size:+.3g} N would do the same."
         )
         return Finding("gain", "doubt", signal.name, text, 100 * share, "%", (signal.name,))
-    if fall > CHI_SQUARE_FALL and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(
-        NEGLIGIBLE_SHARE, 4 * known
+    if fall > LEAST_CHI_SQUARE_FALL and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(
+        NEGLIGIBLE_LOAD_SHARE, 4 * known
     ):
         text = (
             f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * known:.2%} at 95 %) more than "
@@ -207,7 +209,7 @@ def _single_channel_error(
         return Finding(CHECK_NAME, "doubt", "", text, 100 * excess, "%", names)
     text = (
         f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * known:.2%} "
-        f"at 95 %); a channel that is wrong by {max(100 * NEGLIGIBLE_SHARE, 500 * max(sure)):.2g} % would be seen."
+        f"at 95 %); a channel that is wrong by {max(100 * NEGLIGIBLE_LOAD_SHARE, 500 * max(sure)):.2g} % would be seen."
     )
     return Finding(CHECK_NAME, "note", "", text, 100 * excess, "%", names)
 
@@ -222,7 +224,7 @@ def _motion_confirms_factor(
     ):
         return False
     ratio, error = checked_recording.agreement_and_faults[0].factor_of_force(signal)
-    return 4 * error < abs(suggested_error) and abs(ratio - 1) < MOTION_SHARE * abs(suggested_error)
+    return 4 * error < abs(suggested_error) and abs(ratio - 1) < CONFIRMED_ERROR_SHARE * abs(suggested_error)
 
 
 def _offset_finding(signal: MeasuredSignal, force_offset: float, offset_uncertainty: float) -> Finding:

@@ -49,8 +49,8 @@ class CsvFile(OpenFile):
     """Reader of a CSV file; ``row_positions[k]`` is the byte where row 1000 k begins, and its last element is the end
     of the used rows.
 
-    time_column : column of time among those of numbers, None where times are those of the clock. factor : to s.
-    channel_columns
+    time_column : column of time among those of numbers, None where times are those of the clock. seconds_per_unit : of
+    that column. channel_columns
     : of the channels, among those of numbers.
     """
 

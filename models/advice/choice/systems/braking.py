@@ -15,7 +15,7 @@ from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
-ENGINE, PART_REPRESENTS_RUN = "reference", False
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", False
 
 
 def computed_quantities(scene: BrakingScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
@@ -58,11 +58,11 @@ def divisible_step_count(scene: BrakingScene) -> int:
     return scene.run.substeps
 
 
-def shorten(scene_table: dict[str, Any], scene: BrakingScene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: BrakingScene, step_limit: int) -> None:
     """Edit ``scene_table`` to run only the first samples of every procedure."""
     scene_table.setdefault("run", {})["duration"] = max(2, step_limit // scene.run.substeps) * scene.run.sample
 
 
-def coarsen(scene_table: dict[str, Any], scene: BrakingScene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: BrakingScene, step_factor: int) -> None:
     """Edit ``scene_table`` to take fewer steps within a sample."""
     scene_table.setdefault("run", {})["substeps"] = scene.run.substeps // step_factor

@@ -9,8 +9,8 @@ from models.core.errors import InputError
 from models.systems.contact.run import creepages, run
 from models.systems.contact.scene import ContactScene
 
-ENGINE, PART_REPRESENTS_RUN = "reference", False
-QUANTITIES = ("fx", "fy", "mz", "dissipation")
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", False
+COMPARED_QUANTITIES = ("fx", "fy", "mz", "dissipation")
 
 
 def computed_quantities(scene: ContactScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
@@ -18,7 +18,7 @@ def computed_quantities(scene: ContactScene, engine: str, with_error_estimate: b
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
     forces = run(scene, error=with_error_estimate)
-    quantities = {name: Quantity(forces.data[name].attrs["units"], (forces[name],)) for name in QUANTITIES}
+    quantities = {name: Quantity(forces.data[name].attrs["units"], (forces[name],)) for name in COMPARED_QUANTITIES}
     return RunQuantities(quantities, forces.counts(), forces.seconds)
 
 
@@ -32,9 +32,9 @@ def divisible_step_count(scene: ContactScene) -> int:
     return 1
 
 
-def shorten(scene_table: dict[str, Any], scene: ContactScene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: ContactScene, step_limit: int) -> None:
     """Do nothing: a contact has no time steps to shorten."""
 
 
-def coarsen(scene_table: dict[str, Any], scene: ContactScene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: ContactScene, step_factor: int) -> None:
     """Do nothing: a contact has no time steps to coarsen."""

@@ -10,7 +10,7 @@ from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.handling.run import TYRE_CHANNELS, run
 from models.systems.handling.scene import HandlingScene
 
-ENGINE, PART_REPRESENTS_RUN = "mujoco", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "mujoco", True
 MOTION_CHANNELS = {"speed": (0, "m/s"), "side speed": (1, "m/s"), "yaw rate": (2, "rad/s")}
 TYRE_QUANTITIES = ("load", "fx", "fy", "mz")
 """Channels of the tyres that are compared, with a case for each tyre."""
@@ -46,12 +46,12 @@ def step_count(scene: HandlingScene) -> int:
 divisible_step_count = step_count
 
 
-def shorten(scene_table: dict[str, Any], scene: HandlingScene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: HandlingScene, step_limit: int) -> None:
     """Edit ``scene_table`` to shorten every manoeuvre to at most ``step_limit`` of the scene's time steps."""
     for name, manoeuvre in scene_table["manoeuvres"].items():
         manoeuvre["duration"] = min(scene.manoeuvres[name].duration, step_limit * scene.run.step)
 
 
-def coarsen(scene_table: dict[str, Any], scene: HandlingScene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: HandlingScene, step_factor: int) -> None:
     """Edit ``scene_table`` to multiply the step by ``step_factor``."""
     scene_table.setdefault("run", {})["step"] = step_factor * scene.run.step

@@ -8,7 +8,7 @@ from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.hub_forces.run import MOTION_CHANNELS, run
 from models.systems.hub_forces.scene import HubScene
 
-ENGINE, PART_REPRESENTS_RUN = "mujoco", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "mujoco", True
 
 
 def computed_quantities(scene: HubScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
@@ -33,11 +33,11 @@ def step_count(scene: HubScene) -> int:
 divisible_step_count = step_count
 
 
-def shorten(scene_table: dict[str, Any], scene: HubScene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: HubScene, step_limit: int) -> None:
     """Edit ``scene_table`` to shorten the run to ``step_limit`` time steps of the scene's own length."""
     scene_table.setdefault("run", {})["duration"] = step_limit * scene.run.step
 
 
-def coarsen(scene_table: dict[str, Any], scene: HubScene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: HubScene, step_factor: int) -> None:
     """Edit ``scene_table`` to multiply the step by ``step_factor``."""
     scene_table.setdefault("run", {})["step"] = step_factor * scene.run.step

@@ -13,7 +13,7 @@ from models.systems.measured.clock import FEWEST_SAMPLES
 from models.systems.measured.run import Examination, read_files, run
 from models.systems.measured.scene import MeasuredScene
 
-ENGINE, PART_REPRESENTS_RUN = "mujoco", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "mujoco", True
 SHORTEST_PART_STEPS = 60
 """Number of steps of which whole multiples make up the shortest part of a recording, so that it can be computed with
 longer steps, too.
@@ -62,7 +62,7 @@ def _period_and_duration(scene: MeasuredScene) -> tuple[float, float]:
         return recording.period, recording.duration
 
 
-def shorten(scene_table: dict[str, Any], scene: MeasuredScene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: MeasuredScene, step_limit: int) -> None:
     """Edit ``scene_table`` to shorten the run to ``step_limit`` steps, but no less than a recording must have; a
     virtual measurement is shortened with it.
     """
@@ -76,6 +76,6 @@ def shorten(scene_table: dict[str, Any], scene: MeasuredScene, step_limit: int) 
         scene_table.get("clock", {}).pop("duration", None)
 
 
-def coarsen(scene_table: dict[str, Any], scene: MeasuredScene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: MeasuredScene, step_factor: int) -> None:
     """Edit ``scene_table`` to multiply the step by ``step_factor``."""
     scene_table.setdefault("run", {})["step"] = step_factor * _step(scene)

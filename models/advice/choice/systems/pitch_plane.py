@@ -7,7 +7,7 @@ from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
-ENGINE, PART_REPRESENTS_RUN = "reference", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", True
 FORCE_CALLS_PER_STEP = {"RK4": 4, "RK44": 4, "Euler": 1}
 """Right-hand side calls in a step of the methods that do not count them."""
 
@@ -38,13 +38,13 @@ def step_count(scene: Scene) -> int:
 divisible_step_count = step_count
 
 
-def shorten(scene_table: dict[str, Any], scene: Scene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: Scene, step_limit: int) -> None:
     """Edit ``scene_table`` to shorten the run to ``step_limit`` time steps of the scene's own length."""
     scene_table["run"] |= {"duration": step_limit * scene.run.step}
     scene_table["run"].pop("output_step", None)
 
 
-def coarsen(scene_table: dict[str, Any], scene: Scene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: Scene, step_factor: int) -> None:
     """Edit ``scene_table`` to multiply the steps of all engines by ``step_factor``; every step becomes a saved row."""
     scene_table["run"] |= {"step": step_factor * scene.run.step}
     scene_table["run"].pop("output_step", None)

@@ -15,7 +15,7 @@ from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
-ENGINE, PART_REPRESENTS_RUN = "reference", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", True
 
 
 def copies_of_scene(scene: RideScene | CopiesInTime) -> CopiesInTime:
@@ -32,7 +32,7 @@ def computed_quantities(scene: CopiesInTime, engine: str, with_error_estimate: b
     """Integrate the copies at every speed with their own equations, and collect the mean squares of the outputs;
     InputError for another engine.
     """
-    if engine != ENGINE:
+    if engine != DEFAULT_ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     squares_of, seconds = dict[str, list[np.ndarray]](), 0.0
     for pace in scene.steps_at_speeds:

@@ -12,7 +12,7 @@ from models.systems.wheelset.of_scene import path_speeds
 from models.systems.wheelset.run import run
 from models.systems.wheelset.scene import WheelsetScene
 
-ENGINE, PART_REPRESENTS_RUN = "reference", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", True
 
 
 def computed_quantities(scene: WheelsetScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
@@ -43,13 +43,13 @@ def step_count(scene: WheelsetScene) -> int:
 divisible_step_count = step_count
 
 
-def shorten(scene_table: dict[str, Any], scene: WheelsetScene, step_limit: int) -> None:
+def shorten_run(scene_table: dict[str, Any], scene: WheelsetScene, step_limit: int) -> None:
     """Edit ``scene_table`` to shorten the paths to ``step_limit`` time steps of the scene's own length, at the speeds
     of the whole scene.
     """
     scene_table.setdefault("run", {}).update(duration=step_limit * scene.run.step, speeds=path_speeds(scene))
 
 
-def coarsen(scene_table: dict[str, Any], scene: WheelsetScene, step_factor: int) -> None:
+def lengthen_steps(scene_table: dict[str, Any], scene: WheelsetScene, step_factor: int) -> None:
     """Edit ``scene_table`` to multiply the step by ``step_factor``."""
     scene_table.setdefault("run", {})["step"] = step_factor * scene.run.step

@@ -40,7 +40,7 @@ USUAL_QUANTITY = {
     "heave-pitch": "enforced_force",
 }
 """Quantity that is priced where the user names none, by the vehicle's input."""
-SENSORS = frozenset({"accelerometers", "gyro", "gyro_bias", "pitch_sensor"})
+SENSOR_EFFECTS = frozenset({"accelerometers", "gyro", "gyro_bias", "pitch_sensor"})
 """Effects that only read the motion: they are left out, since otherwise no step could be tried that misses a sampling
 time.
 """
@@ -187,12 +187,12 @@ def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -
     channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY[assembly.mode]).split(","))
     base, first = _base_step_and_duration(assembly)
     priced = PricedPitchPlane(assembly, engines, channels, "", base, first)
-    return replace(priced, unit=_unit(priced))
+    return replace(priced, unit=_common_unit(priced))
 
 
 def _without_sensors(scene: Scene) -> Scene:
     """The pitch-plane scene without its sensor effects."""
-    moving = {name: parameters for name, parameters in scene.effects.items() if name not in SENSORS}
+    moving = {name: parameters for name, parameters in scene.effects.items() if name not in SENSOR_EFFECTS}
     return scene.model_copy(update={"effects": moving})
 
 
@@ -211,7 +211,7 @@ def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
     return base, min(length, base * math.ceil(SEARCHED_DURATION / base * (1 - 1e-9)))
 
 
-def _unit(priced: PricedPitchPlane) -> str:
+def _common_unit(priced: PricedPitchPlane) -> str:
     """The common unit of the priced channels; InputError for an unknown channel, or several units."""
     longest = float(priced.assembly.scene.settings("reference").step or priced.base_step)
     settings = Settings("RK4", priced.base_step / math.ceil(priced.base_step / longest * (1 - 1e-9)), priced.base_step)

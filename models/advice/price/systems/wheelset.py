@@ -16,7 +16,7 @@ from models.systems.wheelset.scene import WheelsetScene
 SEARCHED_DURATION = 0.25
 """Longest part (s) of a path over which settings are searched."""
 USUAL_QUANTITY = "y"
-QUANTITIES = {**STATES, **CONTACTS}
+PRICED_QUANTITIES = {**STATES, **CONTACTS}
 """Quantities that can be priced: state index or contact field, and unit, by name."""
 
 
@@ -86,7 +86,7 @@ def _exact_path(equations: Equations, start_state: np.ndarray, step: float, dura
 def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> PricedWheelset:
     """The wheelset scene with a quantity to price: a state or a contact force, along its paths at all speeds."""
     quantity_name, wheelset, contact = (
-        checked_quantity(quantity or USUAL_QUANTITY, QUANTITIES),
+        checked_quantity(quantity or USUAL_QUANTITY, PRICED_QUANTITIES),
         wheelset_of(scene),
         scene.contact,
     )
@@ -99,7 +99,7 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
     return PricedWheelset(
         scene.title,
         quantity_name,
-        QUANTITIES[quantity_name][1],
+        PRICED_QUANTITIES[quantity_name][1],
         note,
         run.duration,
         duration_of_first_part(run.duration, SEARCHED_DURATION),

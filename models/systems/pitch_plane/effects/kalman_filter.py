@@ -275,7 +275,10 @@ def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
 
 def _positions_in_intervals(consistency: FilterConsistency, run: Result) -> Watched:
     """Position of each statistic of the innovations in its interval, from -1 at the lower end to 1 at the upper end."""
-    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
+    return {
+        f.name: np.array([(2.0 * f.value - f.lower_limit - f.upper_limit) / (f.upper_limit - f.lower_limit)])
+        for f in consistency.statistics
+    }
 
 
 def _check_bandwidth(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
