@@ -104,7 +104,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         results |= {} if source.run is None else {name: source.run}
         results[f"{name}: motion"] = _save_motions(scene, source, folder, options)
         sources.append(source)
-    arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
+    arranged = ["  The sensors", *(f"    {line}" for line in array.description_sentences())]
     table = [*arranged, *(line for source in sources for line in _screen_lines(source, p)), *_closing_lines(options)]
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 1.0)

@@ -244,12 +244,15 @@ def _panels_over_time(row_count: int, height: float, **options_of_panels: Any) -
 
 def inputs_figure(examination: Examination, path: Path) -> Path:
     """Save a figure of the measured forces at all hubs along each axis over time."""
-    recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
+    recording, axes = (
+        examination.recording,
+        [a for a in "zxy" if examination.recording.find_signals("force", component=a)],
+    )
     drawn, panels = _panels_over_time(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     sample_times = recording.period * np.arange(recording.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
         for i, hub in enumerate(examination.rig.hubs):
-            for signal in (s for s in recording.find("force", hub, axis) if not s.check):
+            for signal in (s for s in recording.find_signals("force", hub, axis) if not s.check):
                 panel.plot(
                     *thinned_curve(sample_times, recording.samples(signal) / 1e3),
                     color=WHEEL_COLOURS[i % len(WHEEL_COLOURS)],
@@ -288,7 +291,7 @@ def _angles_of_runs(examination: Examination, angle: str) -> dict[str, tuple[np.
     """Times (s) and values (rad) of an angle by name: measured, of every run, and true for a virtual measurement."""
     recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
-    for signal in recording.find("angle", chassis, angle)[:1]:
+    for signal in recording.find_signals("angle", chassis, angle)[:1]:
         curves["measured"] = recording.period * np.arange(recording.count), recording.samples(signal)
     for name, run in examination.runs.items():
         curves[name] = run.period * np.arange(run.done), run.samples(f"{chassis} {angle}")

@@ -111,13 +111,13 @@ def test_estimates_are_the_truth_within_their_errors(scene: SingleTrackScene) ->
             fit(identification_problem_of(begun(scene), measured(scene, seed), KEYS, low_pass_edge=5.0))
         )
         assert known.fit.converged
-        off = (known.fit.values - TRUTH) / known.fit.problem.scale
+        off = (known.fit.values - TRUTH) / known.fit.problem.scales
         distances.append(float(off @ np.linalg.solve(known.covariance, off)))
         inside.append(np.abs(known.fit.values - TRUTH) < 2.0 * known.deviations)
     total = sum(distances)  # of chi-square with 24 freedoms 99.9 % lie below 52; errors are the larger of two estimates
     assert 3.0 < total < 52.0
     assert np.mean(inside) > 0.75
-    with_fault = (known.fit.values * 1.05 - TRUTH) / known.fit.problem.scale
+    with_fault = (known.fit.values * 1.05 - TRUTH) / known.fit.problem.scales
     assert with_fault @ np.linalg.solve(known.covariance, with_fault) > 52.0  # estimates 5 % off are seen
 
 

@@ -174,7 +174,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
     names = [signal.name for signal in signals]
     angles = true[:, [names.index("roll"), names.index("pitch")]]
     made = np.cumsum(Inputs(own.recording, own.vehicle).tilt(0, 201)[:, 2:], axis=0)
-    assert own.recording.find("angular rate", component="roll")[0].frame == "body"
+    assert own.recording.find_signals("angular rate", component="roll")[0].frame == "body"
     assert np.abs(made[-1] * 1e-3 - (angles[200] - angles[0])).max() < 5e-4  # noise of 5e-3 rad/s, 200 samples: 7e-5
 
 
@@ -240,7 +240,9 @@ def test_sections_are_named_and_their_files_are_not_overwritten(whole, tmp_path)
 
 def test_accelerometers_feel_gravity_and_motion(whole):
     own, outcome, _ = whole
-    signals = tuple(replace(s, at="engine", gravity=False) for s in own.recording.find("acceleration", "acc fl"))
+    signals = tuple(
+        replace(s, at="engine", gravity=False) for s in own.recording.find_signals("acceleration", "acc fl")
+    )
     assert accelerometer_points(own.vehicle, signals, {}) == (
         AccelerometerPoint("engine", "engine", (0.95, 0.0, 0.55), gravity=False),
     )

@@ -54,7 +54,7 @@ def test_a_recording_hands_on_the_samples_and_the_signals_that_it_has():
     recording = recording_of({force: np.array([1.5, -2.5, 3.5, 0.5]), roll: np.full(4, 0.25)}, 0.25)
     assert recording.duration == 0.75
     assert recording.samples(force).tolist() == [1.5, -2.5, 3.5, 0.5]
-    assert recording.find("force", "fl", "z") == (force,) and recording.find("angle") == (roll,)
+    assert recording.find_signals("force", "fl", "z") == (force,) and recording.find_signals("angle") == (roll,)
 
 
 def test_even_times_have_the_period_of_their_clock():

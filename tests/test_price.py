@@ -279,7 +279,7 @@ def test_rounds_are_for_settings_that_decide_something():
 
 def test_a_slow_run_is_not_repeated_in_few_rounds(monkeypatch):
     """Three rounds, of which a slow setting is in the first: that is the run that has been."""
-    monkeypatch.setattr(cost, "SLOW_RUN_SECONDS", 0.0)
+    monkeypatch.setattr(cost, "SLOW_RUN_DURATION", 0.0)
     points = cost.measure(PlantedProblem(), True, cost.FEWEST_TIMING_ROUNDS - 2, 0.0).points
     assert {(len(p.seconds), p.changed) for p in points} == {(1, None)}
     points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST_TIMING_ROUNDS - 1, 0.0).points

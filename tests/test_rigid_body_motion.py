@@ -68,7 +68,7 @@ def test_in_a_plane_the_plain_formula_would_give_half_and_a_bias():
     w, plain = PATH.rates, 0.5 * (m[:, 2, 1] - m[:, 1, 2])
     assert np.abs(plain - 0.5 * (PATH.alpha[:, 0] + w[:, 1] * w[:, 2])).max() < 1e-13
     array = sensor_array(SENSOR_ARRANGEMENTS["5 in a plane"])
-    assert array.is_planar and "lie in a plane" in " ".join(array.describe())
+    assert array.is_planar and "lie in a plane" in " ".join(array.description_sentences())
     with pytest.raises(InputError, match="half of the angular acceleration"):
         sensor_array(SENSOR_ARRANGEMENTS["5 in a plane"], "spatial")
 
@@ -134,7 +134,7 @@ def test_misfit_of_noise_is_what_the_redundancy_says(height):
 def test_three_sensors_say_that_nothing_can_be_said():
     array = sensor_array(SENSOR_ARRANGEMENTS["3"])
     assert motion.fit_quality(array, sensor_readings(array.positions)).rigid is None
-    assert "nothing over to check" in array.describe()[-1]
+    assert "nothing over to check" in array.description_sentences()[-1]
 
 
 def test_a_reading_that_is_no_number_is_named():

@@ -48,13 +48,13 @@ class FilterConsistency:
     statistics: tuple[InnovationStatistic, ...]
 
     @property
-    def consistent(self) -> bool:
+    def is_consistent(self) -> bool:
         """Whether all statistics lie within their acceptance intervals."""
         return all(figure.is_within_interval for figure in self.statistics)
 
     def __str__(self) -> str:
         """Sentence on the statistics outside their acceptance intervals, or that all are inside."""
-        if self.consistent:
+        if self.is_consistent:
             return f"its innovations are as stated: {self.statistics[0]}"
         wrong = "; ".join(map(str, (figure for figure in self.statistics if not figure.is_within_interval)))
         return (

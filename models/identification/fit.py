@@ -34,10 +34,10 @@ class ParameterFit:
     converged: bool
 
     @property
-    def at_bound(self) -> np.ndarray:
+    def is_at_bound(self) -> np.ndarray:
         """Which of the estimates (p,) lie at a bound."""
         low, high = self.problem.bounds
-        near = 1e-3 * self.problem.scale
+        near = 1e-3 * self.problem.scales
         return (self.values - low < near) | (high - self.values < near)
 
 
@@ -53,7 +53,7 @@ def fit(
     stage_store : finished stages, the first of them block ``first_block_number``; report_stage : told after each stage;
     executor : computes the columns of Jacobians.
     """
-    values, cost, converged = identification_problem.start, np.inf, False
+    values, cost, converged = identification_problem.start_values, np.inf, False
     for stage in range(MOST_STAGES):
         if stage_store is not None and stage_store.has(first_block_number + stage):
             block = stage_store.load(first_block_number + stage)
@@ -89,7 +89,7 @@ def _one_stage(
     from scipy.optimize import least_squares
 
     scale, (low, high), residuals = (
-        identification_problem.scale,
+        identification_problem.scales,
         identification_problem.bounds,
         identification_problem.residuals,
     )

@@ -98,5 +98,5 @@ def cross_validation_errors_of(fitted: ParameterFit, part_count: int, report_pro
 def _estimates_inside_bounds(fitted: ParameterFit) -> np.ndarray:
     """Estimates (p,) of a fit, moved slightly inside their bounds."""
     low, high = fitted.problem.bounds
-    margin = 1e-3 * fitted.problem.scale
+    margin = 1e-3 * fitted.problem.scales
     return np.clip(fitted.values, low + margin, high - margin)

@@ -147,12 +147,12 @@ class IdentificationProblem:
     counted_times: np.ndarray | None = None
 
     @property
-    def start(self) -> np.ndarray:
+    def start_values(self) -> np.ndarray:
         """Start values (p,) of the parameters."""
         return np.array([parameter.start for parameter in self.parameters])
 
     @property
-    def scale(self) -> np.ndarray:
+    def scales(self) -> np.ndarray:
         """Scales (p,) of the parameters: significant changes, in which steps are measured."""
         return np.array([parameter.scale for parameter in self.parameters])
 
@@ -167,7 +167,7 @@ class IdentificationProblem:
         """Channels of the model (channels, n) at all times of the clock, low-passed as the measurement; read-only."""
         key, kept_predictions = parameter_values.tobytes(), self._latest_predictions
         if key not in kept_predictions:
-            prediction = self._march(parameter_values)
+            prediction = self._run_model(parameter_values)
             if len(kept_predictions) >= CACHED_PREDICTION_COUNT * (len(self.parameters) + 1):
                 kept_predictions.pop(next(iter(kept_predictions)))
             kept_predictions[key] = prediction
@@ -183,7 +183,7 @@ class IdentificationProblem:
         """State for pickling without cached predictions, which other processes do not need."""
         return {name: value for name, value in vars(self).items() if name != "_latest_predictions"}
 
-    def _march(self, parameter_values: np.ndarray) -> np.ndarray:
+    def _run_model(self, parameter_values: np.ndarray) -> np.ndarray:
         """Low-passed channels (channels, n) of a run of the model with parameter values (p,)."""
         run = self.model(parameter_values)
         rows = []
@@ -203,7 +203,7 @@ class IdentificationProblem:
         return np.array([row[sample_stride] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
-    def target(self) -> np.ndarray:
+    def measured_values(self) -> np.ndarray:
         """Measured channels (channels, m) at the times of the residuals."""
         return np.array([channel.values[:: self.clock.stride] for channel in self.channels])
 
@@ -214,7 +214,7 @@ class IdentificationProblem:
             predicted = self.predicted(parameter_values)[:, :: self.clock.stride]
         except RunFailed:
             return np.where(self.weights > 0.0, FAILED_RESIDUAL, 0.0)
-        return (predicted - self.target) * self.weights
+        return (predicted - self.measured_values) * self.weights
 
     def jacobian(
         self,

@@ -50,7 +50,7 @@ class Uncertainty:
     def deviations(self) -> np.ndarray:
         """Standard errors (p,) in the units of the parameters; very large for parameters that the data do not
         determine, NaN for estimates at a bound."""
-        spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
+        spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scales
         return np.where(self.at_no_bound, spread, np.nan)
 
     @cached_property
@@ -58,7 +58,7 @@ class Uncertainty:
         """For each parameter (p,): whether its 95 % interval is narrower than its scale, and its estimate lies at no
         bound."""
         with np.errstate(invalid="ignore"):
-            narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scale
+            narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scales
         return self.at_no_bound & narrow
 
     @cached_property
@@ -86,7 +86,7 @@ def uncertainty(fit: ParameterFit, executor: Executor | None = None) -> Uncertai
     Jacobian."""
     problem = fit.problem
     jacobian = problem.jacobian(fit.values, executor=executor)
-    free = ~fit.at_bound
+    free = ~fit.is_at_bound
     inner = np.einsum("cmp,cmq->pq", jacobian, jacobian)
     scores = np.einsum("cmp,cm->mp", jacobian, fit.residuals)
     lags, staying = _longest_lags(fit.residuals)
@@ -192,7 +192,7 @@ def likelihood_profile(uncertainty: Uncertainty, parameter_index: int) -> Likeli
     """Likelihood profile of parameter ``parameter_index``. The misfit is weighted as in the covariance, so that
     correlated residuals do not count as independent ones."""
     solved, problem = uncertainty.fit, uncertainty.fit.problem
-    scale, parameter = problem.scale[parameter_index], problem.parameters[parameter_index]
+    scale, parameter = problem.scales[parameter_index], problem.parameters[parameter_index]
     spread = uncertainty.deviations[parameter_index] if np.isfinite(uncertainty.deviations[parameter_index]) else scale
     spread = min(spread, 0.5 * scale)
     naive = _information_inverse(uncertainty.information)[parameter_index, parameter_index] * scale**2
@@ -221,6 +221,6 @@ def _fixed_parameter_problem(
     moved inside their bounds."""
     low, high = identification_problem.bounds
     start_inside = np.clip(
-        start_values, low + 1e-6 * identification_problem.scale, high - 1e-6 * identification_problem.scale
+        start_values, low + 1e-6 * identification_problem.scales, high - 1e-6 * identification_problem.scales
     )
     return problem_with_fixed_parameter(identification_problem, parameter_index, fixed_value, start_inside)

@@ -140,7 +140,7 @@ class AxleForces:
 def axle_signals(recording: Recording, axle_name: str) -> list[MeasuredSignal]:
     """Signals of the vertical force of an axle: the axle's own signal, or those of its wheels."""
     vertical = [
-        s for at in LOCATIONS_OF_AXLE_FORCES[axle_name] for s in recording.find("force", at, "z") if not s.check
+        s for at in LOCATIONS_OF_AXLE_FORCES[axle_name] for s in recording.find_signals("force", at, "z") if not s.check
     ]
     whole = [signal for signal in vertical if signal.at == axle_name]
     return whole or vertical

@@ -45,7 +45,7 @@ class Recording:
         """Time (s) of the last sample; the first is at 0."""
         return self.period * (self.count - 1)
 
-    def find(self, quantity: str, location: str = "", component: str = "") -> tuple[MeasuredSignal, ...]:
+    def find_signals(self, quantity: str, location: str = "", component: str = "") -> tuple[MeasuredSignal, ...]:
         """Signals of a quantity, limited to a location or component if given, in the order of the channel map."""
         return tuple(
             s

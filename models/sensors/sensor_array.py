@@ -85,7 +85,7 @@ class SensorArray:
         variance."""
         return np.append(1 / self.spreads[:2] ** 2, np.inf if self.lies_in_plane else 1 / self.spreads[2] ** 2)
 
-    def describe(self) -> list[str]:
+    def description_sentences(self) -> list[str]:
         """Sentences on the strengths and weaknesses of the sensor arrangement."""
         normal = ", ".join(f"{value:.3g}" for value in np.round(self.principal_axes[:, 2], 12) + 0.0)
         flatness = self.spreads[2] / self.spreads[1]

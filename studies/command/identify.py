@@ -130,7 +130,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
                 "at a bound": bool(is_at_bound),
             }
             for name, value, error, sure, is_at_bound in zip(
-                names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.at_bound, strict=True
+                names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.is_at_bound, strict=True
             )
         },
         "correlation": {"of": names, "rows": correlation(uncertainty).tolist()},
@@ -179,7 +179,7 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
     solved = uncertainty.fit
     table = [f"  {'parameter':<32}{'estimate':>13}{'standard error':>16}"]
     for k, parameter in enumerate(solved.problem.parameters):
-        error = "at its bound" if solved.at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
+        error = "at its bound" if solved.is_at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
         doubt = "" if uncertainty.is_determined[k] else "  not determined by the data"
         table.append(f"  {parameter.name:<32}{solved.values[k]:>13.6g}{error:>16}{doubt}")
     table += [

@@ -77,7 +77,7 @@ def _tyre_rows() -> list[Row]:
         )
     )
     off = known.fit.values - 1.0
-    scaled = off / known.fit.problem.scale
+    scaled = off / known.fit.problem.scales
     return [
         Observed(
             "measured_drive.tyres",

@@ -353,7 +353,7 @@ def _moving_car_rows(folder: Path) -> list[Row]:
     findings = check_recording(recording, None, scene.places, {})
     ratio = next((f.size for f in findings if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in findings if f.check == "shift" and "roll_rate" in f.place), None)
-    up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
+    up = [recording.samples(recording.find_signals("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
     id, gyro = (
         "measured_virtual.moving",
         f"{what} ratio of the gyro's pitch rate to the derivative of the camera's angle",

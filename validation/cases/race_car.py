@@ -110,9 +110,9 @@ def _known_car_rows(folder: Path) -> list[Row]:
     solved = [uncertainty(fit(_noisy_problem(scene, seed))) for seed in range(NOISE_REPEATS)]
     distance, worst = 0.0, 0.0
     for known in solved:
-        off = (known.fit.values - truth) / known.fit.problem.scale
+        off = (known.fit.values - truth) / known.fit.problem.scales
         distance += float(off @ np.linalg.solve(known.covariance, off))
-        worst = max(worst, float(np.abs(off * known.fit.problem.scale / known.deviations).max()))
+        worst = max(worst, float(np.abs(off * known.fit.problem.scales / known.deviations).max()))
     inside = _coverage(solved)
     return [
         Observed(

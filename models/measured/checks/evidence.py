@@ -99,7 +99,9 @@ class CheckedRecording:
             if not self.has_negligible_mean(s)
         }
         ratios |= {
-            s: self.mean_of_signal(s) / GRAVITY for s in self.recording.find("acceleration", "", "z") if s.gravity
+            s: self.mean_of_signal(s) / GRAVITY
+            for s in self.recording.find_signals("acceleration", "", "z")
+            if s.gravity
         }
         return {
             s: ratio

@@ -16,7 +16,7 @@ HORIZONTAL_MEAN_LIMIT = 3.0
 def check(checked_recording: CheckedRecording) -> list[Finding]:
     """Findings on gravity in accelerometers. Sizes are in m/s^2, or the ratio of recorded to true value where sign or
     unit is wrong."""
-    signals = [s for s in checked_recording.recording.find("acceleration") if s.component in ("x", "y", "z")]
+    signals = [s for s in checked_recording.recording.find_signals("acceleration") if s.component in ("x", "y", "z")]
     if not signals:
         return [Finding(CHECK_NAME, "note", "", "Not looked at: no accelerometer.")]
     findings = [finding for s in signals if (finding := _signal_finding(s, checked_recording.mean_of_signal(s)))]

@@ -33,8 +33,8 @@ def _accelerometers_by_body(
 ) -> dict[str, dict[str, tuple[TransducerPlace, AxisSignals]]]:
     """Tri-axial accelerometers with all three channels, by body and by sensor name."""
     bodies: dict[str, dict[str, tuple[TransducerPlace, AxisSignals]]] = {}
-    for name in dict.fromkeys(s.at for s in checked_recording.recording.find("acceleration")):
-        axes = [checked_recording.recording.find("acceleration", name, axis) for axis in "xyz"]
+    for name in dict.fromkeys(s.at for s in checked_recording.recording.find_signals("acceleration")):
+        axes = [checked_recording.recording.find_signals("acceleration", name, axis) for axis in "xyz"]
         place = checked_recording.transducer_place(axes[0][0]) if all(axes) else None
         if place is not None:
             bodies.setdefault(place.body, {})[name] = place, [signals[0] for signals in axes]
@@ -61,7 +61,10 @@ def _body_finding(
     rigidity = fit_quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
     if rigidity.rigid is None:
         return Finding(
-            CHECK_NAME, "note", body_name, f"{body_name}: {array.describe()[-1]}; a fourth sensor would tell."
+            CHECK_NAME,
+            "note",
+            body_name,
+            f"{body_name}: {array.description_sentences()[-1]}; a fourth sensor would tell.",
         )
     share_text = (
         f"{100 * rigidity.unexplained_share:.2g} % of what its {len(axes)} accelerometers read against each other"

@@ -27,8 +27,8 @@ def check(checked_recording: CheckedRecording) -> list[Finding]:
     recording = checked_recording.recording
     pairs = [
         (angle, rate)
-        for angle in recording.find("angle")
-        for rate in recording.find("angular rate")
+        for angle in recording.find_signals("angle")
+        for rate in recording.find_signals("angular rate")
         if rate.component == angle.component != "yaw"
         and _body_of_signal(checked_recording, rate) == _body_of_signal(checked_recording, angle)
     ]

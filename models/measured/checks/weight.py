@@ -117,7 +117,7 @@ def _angular_acceleration_readers(
     def slope(gyro: MeasuredSignal) -> np.ndarray:
         return np.gradient(recording.samples(gyro), recording.period)
 
-    gyros = [recording.find("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
+    gyros = [recording.find_signals("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
     return [partial(slope, gyro) for (gyro,) in gyros] if all(gyros) else []
 
 

@@ -50,8 +50,7 @@ class CsvFile(OpenFile):
     of the used rows.
 
     time_column : column of time among those of numbers, None where times are those of the clock. seconds_per_unit : of
-    that column. channel_columns
-    : of the channels, among those of numbers.
+    that column. channel_columns : of the channels, among those of numbers.
     """
 
     layout: CsvLayout
@@ -156,7 +155,9 @@ def _findings_on_end(
     if byte_count_left:
         with csv_path.open("rb") as file:
             file.seek(-byte_count_left, io.SEEK_END)
-            is_whole = one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
+            is_whole = (
+                one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.cells_per_row
+            )
         ends = "may be" if is_whole else "is"
         text = f"the last line has no line end and {ends} cut off: it is left out, and {row_count} rows are used"
         findings.append(flaw_finding(csv_path, "note" if is_whole else "doubt", text))

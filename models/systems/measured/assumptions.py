@@ -131,7 +131,9 @@ def _same_attitude_assumption(
     if scene.stabilise.method != "none" or examination is None:
         return []
     frames = {s.frame for s in examination.recording.signals if s.at in vehicle.hubs and examination.is_input(s)}
-    angles = [s for s in examination.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")]
+    angles = [
+        s for s in examination.recording.find_signals("angle", vehicle.chassis) if s.component in ("roll", "pitch")
+    ]
     if frames != {"inertial"} or not angles:
         return []
 

@@ -39,7 +39,7 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
     """
     deviations = dict[str, float]()
     for key, quantity in QUANTITY_OF_NOISE_KEY.items():
-        sizes = np.array([white_noise(recording, s) for s in recording.find(quantity) if not s.check])
+        sizes = np.array([white_noise(recording, s) for s in recording.find_signals(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(AttitudeHold, key))
         deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)

@@ -85,7 +85,7 @@ def run(job: PlaneJob, folder: Path, limits: AcceptanceLimits | None = None, err
     scene, said = scene_of(job, folder)
     result = simulate(scene, job.engine, error=error)
     limited = trusted_time(scene, job.hold.force)
-    if limited and job.recording.find("angle", CHASSIS_NAME, "pitch"):
+    if limited and job.recording.find_signals("angle", CHASSIS_NAME, "pitch"):
         limited = replace(limited, unchecked_text="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
@@ -112,7 +112,7 @@ def _verdict_with_measured_pitch(
     Where forces turn with the vehicle no error grows, but offsets and forces in another frame still make it drift, and
     its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
-    angles = job.recording.find("angle", CHASSIS_NAME, "pitch")
+    angles = job.recording.find_signals("angle", CHASSIS_NAME, "pitch")
     if not angles:
         return StabilisedRunVerdict("stabilise", UNCHECKED_TEXT) if _force_frames(job) != {"inertial"} else verdict
     measured = job.recording.samples(angles[0])
@@ -203,7 +203,7 @@ def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> d
         ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
     )
     for quantity, name, unit, key, deviation in known if filtered else known[:1]:
-        for signal in [s for s in job.recording.find(quantity, CHASSIS_NAME, "pitch") if not s.check][:1]:
+        for signal in [s for s in job.recording.find_signals(quantity, CHASSIS_NAME, "pitch") if not s.check][:1]:
             values = job.recording.samples(signal) if filtered else _samples_without_gaps(job, signal, findings)
             columns[name], deviations[key] = (unit, -values), deviation
     if "pitch" not in columns:

@@ -308,7 +308,7 @@ def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
 
 def _initial_value(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
     """Mean of an angle (rad) or a rate (rad/s) over the first 0.1 s of a recording; 0 where it is not measured."""
-    for signal in recording.find(quantity, chassis, axis)[:1]:
+    for signal in recording.find_signals(quantity, chassis, axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
         return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
     return 0.0

@@ -247,14 +247,14 @@ def _check_innovations(assembly: Assembly, parameters: Parameters, guiding_estim
 
 def _filter_objections(parameters: Parameters, guiding_estimate: GuidingEstimate) -> tuple[str, ...]:
     """Objections to the measurement or the model, as text, where the filter's innovations are not consistent."""
-    if guiding_estimate.consistency.consistent:
+    if guiding_estimate.consistency.is_consistent:
         return ()
     square = guiding_estimate.consistency.statistics[0]
     largest = guiding_estimate.deviations[:, 0].max()
     known = f"the stated deviation of the pitch, up to {largest:.2g} rad, is not to be relied upon"
     remedy = (
         "the stated deviations are too large: state smaller ones"
-        if square.value < square.low
+        if square.value < square.lower_limit
         else f"check {parameters.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
     )
     return (f"the filter contradicts {parameters.file}: {guiding_estimate.consistency}; {known}; {remedy}",)
