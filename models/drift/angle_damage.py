@@ -15,7 +15,7 @@ from models.drift.score import SECTION_FORCE_CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
 from models.sensors.inertial_unit import bias_path
 
-ANGLE_NODES = 41
+ANGLE_ERROR_COUNT = 41
 """Number of constant angle errors at which damage is counted; odd, so that one of them is zero."""
 EVEN_SPACING_ANGLE = 1e-3
 """Angle error (rad) below which the nodes are evenly spaced; above it their spacing grows with the angle."""
@@ -61,9 +61,9 @@ def log_damage_over_pitch_error(run_result: Result, largest_pitch_error: float, 
     Raises InputError, which names the scene's file, for a run without damage.
     """
     widest = np.arcsinh(largest_pitch_error / EVEN_SPACING_ANGLE)
-    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, ANGLE_NODES))
+    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, ANGLE_ERROR_COUNT))
     damage = np.array([damage_at_angle_errors(run_result, angle) for angle in angles])
-    true = damage[ANGLE_NODES // 2]
+    true = damage[ANGLE_ERROR_COUNT // 2]
     if not (true > 0).all():
         allowed = "leaves no damage in the section forces to compare with: use a road that moves the vehicle"
         raise InputError(scene_path, "effects.road", None, allowed)

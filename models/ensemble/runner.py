@@ -29,7 +29,7 @@ PATHS_PER_BLOCK = 50
 BLOCKS_AHEAD = 64
 """Most blocks that are computed or waiting at once, so that memory stays bounded; two per worker of a cluster that has
 more workers."""
-NAMED_FAILURES = 5
+NAMED_FAILURE_COUNT = 5
 """Most failed blocks that a message names."""
 MOST_WORKER_LOSSES, AMONG_OTHERS = 4, 2
 """Number of times that a block may lose its worker before it fails, and number of these among other blocks; afterwards
@@ -298,8 +298,12 @@ def _failed_blocks_error(failed_blocks: dict[int, tuple[range, str]], store_fold
         f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed_blocks.items()
     ]
     folder_hint = "" if store_folder is None else f"; the finished blocks are kept in {store_folder}: resume there"
-    further_text = f"; {len(failed_blocks) - NAMED_FAILURES} more blocks" if len(failed_blocks) > NAMED_FAILURES else ""
-    return RunFailed("ensemble", "; ".join(failure_texts[:NAMED_FAILURES]) + further_text + folder_hint)
+    further_text = (
+        (f"; {len(failed_blocks) - NAMED_FAILURE_COUNT} more blocks")
+        if len(failed_blocks) > NAMED_FAILURE_COUNT
+        else ""
+    )
+    return RunFailed("ensemble", "; ".join(failure_texts[:NAMED_FAILURE_COUNT]) + further_text + folder_hint)
 
 
 def _answers_of_blocks(

@@ -7,14 +7,14 @@ import numpy as np
 from models.identification.problem import IdentificationProblem
 from models.identification.uncertainty import NORMAL_QUANTILE, Uncertainty
 
-BAND_SHARE = 0.95
+SHARE_INSIDE_BAND = 0.95
 """Share of the residuals that lie inside the bands where these were fitted."""
 
 
 @dataclass(frozen=True)
 class ErrorModel:
     """Model of a prediction's error: sqrt(constant_error^2 + (prediction_share x prediction)^2) times ``band_factor``
-    contains BAND_SHARE of the residuals."""
+    contains SHARE_INSIDE_BAND of the residuals."""
 
     constant_error: float
     prediction_share: float
@@ -39,7 +39,7 @@ def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
     return ErrorModel(
         model.constant_error,
         model.prediction_share,
-        float(np.quantile(np.abs(residuals) / np.maximum(size, floor), BAND_SHARE)),
+        float(np.quantile(np.abs(residuals) / np.maximum(size, floor), SHARE_INSIDE_BAND)),
     )
 
 

@@ -27,9 +27,9 @@ SINGULAR_EIGENVALUE_SHARE = 1e-12
 """Ratio to the largest eigenvalue of the information matrix below which an eigenvalue counts as zero."""
 DETERMINED_HALF_WIDTH = 1.0
 """Half-width of the 95 % interval, in the parameter's scale, from which on a parameter counts as not determined."""
-CHI_SQUARE = 3.841
+CHI_SQUARE_LIMIT = 3.841
 """95 % quantile of chi-square with one degree of freedom."""
-PROFILE_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
+PROFILED_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
 """Distances from the estimate, in standard deviations, at which a likelihood profile is computed."""
 
 
@@ -203,7 +203,7 @@ def likelihood_profile(uncertainty: Uncertainty, parameter_index: int) -> Likeli
     )
     values = [
         v
-        for v in solved.values[parameter_index] + spread * np.array(PROFILE_DEVIATIONS)
+        for v in solved.values[parameter_index] + spread * np.array(PROFILED_DEVIATIONS)
         if parameter.lower_bound < v < parameter.upper_bound
     ]
     rises = []

@@ -24,14 +24,14 @@ FORMAT_OF_EXTENSION = {
 FORMAT_OF_FIRST_BYTES = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
 """Format of a readable file, by its first bytes; any other text is read as CSV."""
 KNOWN_FORMATS = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
-AS_CSV = "save its channels as CSV with a column time [s]"
+EXPORT_AS_CSV_ADVICE = "save its channels as CSV with a column time [s]"
 DESCRIPTION_OF_FORMAT = {
     "ASAM MDF": "ASAM MDF, which begins with MDF",
     "TDMS": "TDMS, which begins with TDSm",
     "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT",
 }
 """Full name and first bytes of each format."""
-WRITE_ANEW = f"write it anew from the software that has it, or {AS_CSV}"
+WRITE_ANEW_ADVICE = f"write it anew from the software that has it, or {EXPORT_AS_CSV_ADVICE}"
 DECODE_ADVICE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
 UNPACK_ADVICE = "unpack it, and name the file inside"
 
@@ -102,14 +102,17 @@ UNREADABLE_KINDS = (
         "the index of a TDMS file", "name the .tdms file beside it, which has the data", rb"TDSh", (".tdms_index",)
     ),
     UnreadableKind(
-        "a LabVIEW measurement file", f"write TDMS in LabVIEW, or {AS_CSV}", rb"LabVIEW Measurement", (".lvm",)
+        "a LabVIEW measurement file",
+        f"write TDMS in LabVIEW, or {EXPORT_AS_CSV_ADVICE}",
+        rb"LabVIEW Measurement",
+        (".lvm",),
     ),
-    UnreadableKind("a universal file of modal analysis", AS_CSV, rb"\s{1,4}-1\s", (".unv", ".uff")),
+    UnreadableKind("a universal file of modal analysis", EXPORT_AS_CSV_ADVICE, rb"\s{1,4}-1\s", (".unv", ".uff")),
     UnreadableKind("imc FAMOS", "export it as MDF 4 or CSV from the software that wrote it", rb"\|CF,", (".raw",)),
     UnreadableKind("a Dewesoft file", "export it as MDF 4 or CSV from Dewesoft", rb"(?!)", (".dxd", ".d7d")),
     UnreadableKind("an nCode time series", "export it as RPC III or CSV", rb"(?!)", (".s3t", ".dac")),
     UnreadableKind("a CarMaker result file", "export it as MDF 4 or CSV", rb"(?!)", (".erg",)),
-    UnreadableKind("a numpy array", AS_CSV, rb"\x93NUMPY", (".npy", ".npz")),
+    UnreadableKind("a numpy array", EXPORT_AS_CSV_ADVICE, rb"\x93NUMPY", (".npy", ".npz")),
     UnreadableKind("packed by gzip", UNPACK_ADVICE, rb"\x1f\x8b", (".gz", ".tgz")),
     UnreadableKind("packed by bzip2", UNPACK_ADVICE, rb"BZh", (".bz2",)),
     UnreadableKind("packed by xz", UNPACK_ADVICE, rb"\xfd7zXZ", (".xz",)),
@@ -117,12 +120,12 @@ UNREADABLE_KINDS = (
     UnreadableKind("a 7-Zip archive", UNPACK_ADVICE, rb"7z\xbc\xaf", (".7z",)),
     UnreadableKind("a RAR archive", UNPACK_ADVICE, rb"Rar!", (".rar",)),
     UnreadableKind("a zip archive", UNPACK_ADVICE, rb"PK\x03\x04|PK\x05\x06", (".zip",)),
-    UnreadableKind("a web page", AS_CSV, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
-    UnreadableKind("XML", AS_CSV, rb"<\?xml", (".xml",)),
-    UnreadableKind("JSON", AS_CSV, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
-    UnreadableKind("a PDF", AS_CSV, rb"%PDF", (".pdf",)),
-    UnreadableKind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
-    UnreadableKind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
+    UnreadableKind("a web page", EXPORT_AS_CSV_ADVICE, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
+    UnreadableKind("XML", EXPORT_AS_CSV_ADVICE, rb"<\?xml", (".xml",)),
+    UnreadableKind("JSON", EXPORT_AS_CSV_ADVICE, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
+    UnreadableKind("a PDF", EXPORT_AS_CSV_ADVICE, rb"%PDF", (".pdf",)),
+    UnreadableKind("sound", EXPORT_AS_CSV_ADVICE, rb"RIFF....WAVE", (".wav",)),
+    UnreadableKind("an SQLite database", EXPORT_AS_CSV_ADVICE, rb"SQLite format 3", (".db", ".sqlite")),
 )
 """Kinds of measurement files that cannot be read here; the first kind that fits a file is reported."""
 WORKBOOK_KIND, ARRAYS_KIND = UNREADABLE_KINDS[0], next(kind for kind in UNREADABLE_KINDS if ".npz" in kind.extensions)
@@ -176,7 +179,7 @@ def extension_phrase(measurement_path: Path) -> str:
     return (
         usual
         and f", and its extension {measurement_path.suffix} is that of {usual}: it is damaged or something else; "
-        f"{WRITE_ANEW}"
+        f"{WRITE_ANEW_ADVICE}"
     )
 
 

@@ -23,7 +23,7 @@ LONGEST_BRIDGED_GAP = 0.1
 NEIGHBOUR_SPAN = 0.3
 """Time (s) on either side of a gap whose samples determine the filling: several waves of wheel hop and of the chassis'
 roll."""
-MOST_NEIGHBOURS = 200
+NEIGHBOUR_COUNT_LIMIT = 200
 """Approximate number of neighbouring samples for a filling: all close to the gap, and a selection of those farther
 away."""
 LARGEST_PLAUSIBLE: dict[Quantity, float] = {
@@ -73,7 +73,7 @@ def filled_samples(
     if not lost:
         return samples, []
     out, mean, span = samples.copy(), float(np.nanmean(samples)), max(round(NEIGHBOUR_SPAN / sampling_period), 4)
-    stride = max(2 * span // MOST_NEIGHBOURS, 1)
+    stride = max(2 * span // NEIGHBOUR_COUNT_LIMIT, 1)
     law = autocovariance(samples - mean, 2 * span + round(longest_gap / sampling_period) + 2)
     gaps = []
     for first, end in lost:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.measured.timing import EVEN_CLOCK_SHARE, GAP_PERIODS
+from models.measured.timing import EVEN_CLOCK_DEVIATION_SHARE, LEAST_GAP_PERIODS
 
 PASS_BAND, STOP_BAND, STOP_ATTENUATION = 0.4, 0.5, 60.0
 """Edges of the low-pass in ratio to the new sampling rate: passed up to the first, attenuated (dB) from the second
@@ -35,9 +35,9 @@ def _unknown_points(times: np.ndarray, source_period: float, new_times: np.ndarr
     right = np.clip(np.searchsorted(times, new_times), 1, len(times) - 1)
     near = (
         np.minimum(np.abs(new_times - times[right - 1]), np.abs(times[right] - new_times))
-        <= EVEN_CLOCK_SHARE * source_period
+        <= EVEN_CLOCK_DEVIATION_SHARE * source_period
     )
-    wide = times[right] - times[right - 1] > GAP_PERIODS * source_period
+    wide = times[right] - times[right - 1] > LEAST_GAP_PERIODS * source_period
     return ((new_times < times[0]) | (new_times > times[-1]) | wide) & ~near
 
 

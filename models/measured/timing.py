@@ -8,11 +8,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 
-GAP_PERIODS = 1.5
+LEAST_GAP_PERIODS = 1.5
 """Distance of two samples, in periods, above which there is a gap between them."""
 SHUFFLED_PERIODS = 10.0
 """Lateness of a sample, in periods, up to which it was only written late; a clock that goes back farther began anew."""
-EVEN_CLOCK_SHARE = 0.01
+EVEN_CLOCK_DEVIATION_SHARE = 0.01
 """Deviation from an even clock, in periods, up to which samples lie on it; beyond, the clock jitters."""
 JITTER_SHARE = 0.1
 """Standard deviation of the steps, in periods, above which jitter is a doubt."""
@@ -20,7 +20,7 @@ JITTER_SHARE = 0.1
 
 ROUNDING_SHARE = 1e-9
 """Rounding of a time by double precision, in periods, that is not reported."""
-LEAST_SLIPS = 5
+LEAST_SLIP_COUNT = 5
 """Number of repeated times, or of steps that deviate, above which rounding may be their cause: one is a row written
 twice."""
 RATE_DIGITS = range(1, 9)
@@ -217,22 +217,24 @@ def _rounding_spacing(times: np.ndarray) -> float | None:
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps < 0).any():
         return None
-    if np.count_nonzero(steps == 0) >= LEAST_SLIPS:
+    if np.count_nonzero(steps == 0) >= LEAST_SLIP_COUNT:
         return float(np.median(steps[steps > 0]))
     middle = float(np.median(steps))
-    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN_CLOCK_SHARE * middle) < LEAST_SLIPS:
+    if (steps == 0).any() or np.count_nonzero(
+        np.abs(steps - middle) > EVEN_CLOCK_DEVIATION_SHARE * middle
+    ) < LEAST_SLIP_COUNT:
         return None
     for digits in range(7):
         scaled_times = times * 10.0**digits
         if (np.abs(scaled_times - np.rint(scaled_times)) < 1e-6).all():
-            return 10.0**-digits if 10.0**-digits > EVEN_CLOCK_SHARE * middle else None
+            return 10.0**-digits if 10.0**-digits > EVEN_CLOCK_DEVIATION_SHARE * middle else None
     return None
 
 
 def _report_gaps(times: np.ndarray, sampling_period: float, report_finding: ReportFinding) -> None:
     """Report a finding on the gaps of a clock, with the longest one."""
     steps = np.diff(times)
-    wide = np.flatnonzero(steps > GAP_PERIODS * sampling_period)
+    wide = np.flatnonzero(steps > LEAST_GAP_PERIODS * sampling_period)
     if len(wide):
         longest = wide[np.argmax(steps[wide])]
         lost = float(np.sum(steps[wide] - sampling_period))
@@ -250,9 +252,9 @@ def _report_gaps(times: np.ndarray, sampling_period: float, report_finding: Repo
 def _report_jitter(times: np.ndarray, sampling_period: float, report_finding: ReportFinding) -> None:
     """Report a finding on the jitter of a clock, if there is any."""
     steps = np.diff(times)
-    deviations = steps[steps <= GAP_PERIODS * sampling_period] - sampling_period
+    deviations = steps[steps <= LEAST_GAP_PERIODS * sampling_period] - sampling_period
     spread = float(deviations.std())
-    if spread > EVEN_CLOCK_SHARE * sampling_period:
+    if spread > EVEN_CLOCK_DEVIATION_SHARE * sampling_period:
         weight: Weight = "doubt" if spread > JITTER_SHARE * sampling_period else "note"
         report_finding(
             "jitter",

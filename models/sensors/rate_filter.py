@@ -12,7 +12,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from models.core.errors import InputError
 from models.sensors.rigid_body_motion import BodyRotation, array_angular_acceleration
 
-SYMMETRIC_ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
+SYMMETRIC_ENTRY_INDICES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
 """Index pairs of the entries of a symmetric (3, 3) matrix; for sensors in a plane only the first three are known."""
 UNIT_MATRIX = np.eye(3)
 
@@ -46,7 +46,7 @@ def filter_rates(
         )
         raise InputError("", "noise", reading_deviation, allowed)
     frame, planar = rotation.sensors.principal_axes, rotation.sensors.is_planar
-    pairs = SYMMETRIC_ENTRIES[: 3 if planar else 6]
+    pairs = SYMMETRIC_ENTRY_INDICES[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)
     filter_ = _RateFilter(3, len(pairs))
     filter_.x, filter_.P = np.asarray(start_rates) @ frame, start_deviation**2 * UNIT_MATRIX

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.advice.price import runner
-from models.advice.price.curves import UNCERTAINTY_FACTOR, ToleranceCost
+from models.advice.price.curves import RESOLVED_ERROR_FACTOR, ToleranceCost
 from models.advice.price.runner import CostsAtTolerance, LossByDefault, WorkPrecisionPoint, WorkPrecisionPoints
 from models.drawing.figures import LABELS
 from models.machine.timing import describe
@@ -181,7 +181,7 @@ def curve_table(measured_points: WorkPrecisionPoints) -> Table:
     )
     note = (
         "Order: slope of the error over the step on the three finest settings whose error exceeds "
-        f"{UNCERTAINTY_FACTOR:g} "
+        f"{RESOLVED_ERROR_FACTOR:g} "
         "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
         "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
         "setting. ~: seconds of one run."

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-UNCERTAINTY_FACTOR = 10.0
+RESOLVED_ERROR_FACTOR = 10.0
 """Ratio of an error to the uncertainty of the reference below which the point is drawn hollow."""
-FITTED_POINTS = 3
+FITTED_POINT_COUNT = 3
 """Number of the finest points to which an observed order is fitted, as the coarse ones are not yet asymptotic."""
 EQUAL_ERROR_SHARE = 0.01
 """Relative difference up to which two errors count as equal."""
@@ -29,7 +29,7 @@ def observed_order(step_sizes: Sequence[float], errors: Sequence[float], error_f
     """Observed order of convergence: slope of log error over log step size, at the finest points whose errors are above
     ``error_floor``.
     """
-    clear = sorted((h, e) for h, e in zip(step_sizes, errors, strict=True) if e >= error_floor)[:FITTED_POINTS]
+    clear = sorted((h, e) for h, e in zip(step_sizes, errors, strict=True) if e >= error_floor)[:FITTED_POINT_COUNT]
     return log_log_slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from models.advice.price.curves import (
-    UNCERTAINTY_FACTOR,
+    RESOLVED_ERROR_FACTOR,
     ToleranceCost,
     coinciding_curves,
     cost_at_tolerance,
@@ -31,7 +31,7 @@ from models.machine.timing import interleave, interval, resamples
 
 PointStatus = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 CostsAtTolerance = dict[str, ToleranceCost]
-WORK_COUNTS = ("contact cells", "force calls")
+WORK_COUNT_NAMES = ("contact cells", "force calls")
 """Names of the counts that can measure work; the first one that a problem's points have is used."""
 COMPARED_ENGINES = ("exudyn", "mujoco")
 """Engines whose cheapest settings are reported, where a problem has them."""
@@ -127,7 +127,7 @@ class WorkPrecisionPoints:
     @property
     def cost_kinds(self) -> tuple[str, str]:
         """Names of the two kinds of cost: the count that measures the work, and "seconds"."""
-        return next(kind for kind in WORK_COUNTS if any(kind in p.counts for p in self.points)), "seconds"
+        return next(kind for kind in WORK_COUNT_NAMES if any(kind in p.counts for p in self.points)), "seconds"
 
     @property
     def defaults(self) -> dict[str, WorkPrecisionPoint]:
@@ -140,7 +140,7 @@ class WorkPrecisionPoints:
 
     def judging_floor(self, quantity: str = "") -> float:
         """Error of a quantity, in its unit, below which the reference is too uncertain to judge a setting."""
-        return UNCERTAINTY_FACTOR * self.uncertainty[quantity or self.quantity]
+        return RESOLVED_ERROR_FACTOR * self.uncertainty[quantity or self.quantity]
 
     def curves(self, point_status: PointStatus | None = "ok") -> dict[str, list[WorkPrecisionPoint]]:
         """Points of each work-precision curve with this status, from coarse to fine; None means any status."""

@@ -17,13 +17,13 @@ from models.core.assumptions import BrokenAssumption, collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 
-AGREEMENT_FACTOR = 4.0
+AGREEMENT_TOLERANCE_DIVISOR = 4.0
 """Divisor of the tolerance that gives the largest difference allowed between the reference and a solver of another
 family.
 """
 ROW_TIME_ROUNDING = 1e-3
 """Distance from an output time, as a share of the output step, up to which a time counts as this output time."""
-MOST_ROWS = 4_000_000
+OUTPUT_ROW_LIMIT = 4_000_000
 """Largest number of output rows of a reference run; more would take gigabytes."""
 
 
@@ -114,7 +114,7 @@ def refined_reference(
         return truth_of_halving
     differs = truth_of_halving.error(scene.priced_run(scene.solve(second_setting, duration)))
     both_settings = f"{change_text} and {_setting_text(second_setting)}"
-    if differs > tolerance / AGREEMENT_FACTOR:
+    if differs > tolerance / AGREEMENT_TOLERANCE_DIVISOR:
         raise RunFailed(
             "reference", f"{both_settings} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged"
         )
@@ -168,7 +168,7 @@ def _settled_answer(
     """
     coarser_run: PricedRun | None = None
     change, failure = float("inf"), ""
-    rungs = [i for i in range(first_rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
+    rungs = [i for i in range(first_rung, len(ladder.values)) if duration / ladder.values[i] <= OUTPUT_ROW_LIMIT]
     job = partial(_reference_on_rung, scene, duration)
     together = [ladder.setting(i) for i in rungs[:2]] if executor is not None else []
     ready = dict(zip(rungs, block_results(job, together, executor), strict=False))

@@ -26,7 +26,7 @@ HIGHEST_LINES_SHARE = 0.7, 0.95
 converters."""
 PIECE_LENGTH, MOST_PIECES = 1024, 40
 """Number of samples of a piece for the noise estimate, and most pieces, spread evenly."""
-SIDE_LINES = range(2, 5)
+SIDE_LINE_RANGE = range(2, 5)
 """Spectral lines beside the main lobe of the window, whose power is taken for that at 0 Hz."""
 
 
@@ -109,7 +109,7 @@ def windowed_means(column_readers: Sequence[Callable[[], np.ndarray]]) -> tuple[
     n = len(good)
     window = np.where(good, np.hanning(n + 2)[1:-1], 0.0)
     window = window / window.sum() if good.any() else np.full(n, np.nan)
-    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in SIDE_LINES]
+    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in SIDE_LINE_RANGE]
     centre, lines = np.empty(len(column_readers)), np.empty((len(waves), len(column_readers)), complex)
     for i, read in enumerate(column_readers):
         values = np.where(good, read(), 0.0)

@@ -34,7 +34,7 @@ FIRST_ROWS_LINES = 2000
 """Number of lines at the beginning of a file that must contain the first rows of numbers."""
 TIME_COLUMN_NAMES = ("time", "zeit", "t")
 """Usual names of the column of time."""
-OTHER_CLOCKS = (
+OTHER_TIME_COLUMN_NAMES = (
     "timestamp",
     "timestamps",
     "time stamp",
@@ -82,7 +82,7 @@ _DATE_PATTERN = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _NUMBER_START_PATTERN = re.compile(r"[+-]?[.,]?\d")
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
 """Byte-order marks with which text begins, and the encoding that each shows."""
-NEEDED_HEADER_TEXT = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
+NEEDED_HEADINGS_TEXT = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
 
 @dataclass
@@ -161,7 +161,7 @@ def read_first_lines(csv_path: Path) -> FirstLines:
             csv_path,
             f"line {first_lines.unreadable_line or len(first_lines.comment_lines) + 1}",
             None,
-            NEEDED_HEADER_TEXT + hint,
+            NEEDED_HEADINGS_TEXT + hint,
         )
     return first_lines
 
@@ -263,7 +263,7 @@ def _no_clock_error(csv_path: Path, first_lines: FirstLines, tried_signs: tuple[
         )
     elif not any(sign in first.text for sign in tried_signs):
         needed = (
-            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED_HEADER_TEXT}"
+            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED_HEADINGS_TEXT}"
         )
     elif any(all(map(is_number, cells)) for sign in tried_signs if len(cells := split_cells(text, sign)) > 1):
         needed = "the file begins with numbers: write a header line time [s], name [unit], ... above them"
@@ -291,7 +291,7 @@ def is_other_clock(heading: str) -> bool:
     """Whether a heading can mean the column of time, in a file where no heading is a usual name of it."""
     name = clock_heading(heading)[0]
     parted = (name, re.sub(r"([a-z])([A-Z])", r"\1 \2", name))
-    return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
+    return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_TIME_COLUMN_NAMES for words in parted)
 
 
 def first_cells(first_lines: FirstLines, table_head: TableHead) -> list[list[str]]:

@@ -17,7 +17,7 @@ from models.measured.channel import SAMPLES_PER_BLOCK, FileChannel, SampleBlock
 
 SampleSpan = tuple[int, int]
 """First sample and number of samples."""
-MOST_SHOWN_NAMES = 5
+SHOWN_NAME_COUNT = 5
 """Most names of skipped channels that a finding lists."""
 START_EXAMPLE = "2026-11-21T08:00:00+00:00"
 """Example of a start time, for messages."""
@@ -123,11 +123,11 @@ class SkippedChannels:
     def findings(self, measurement_path: Path) -> list[Finding]:
         """One finding per reason, with the names of the skipped channels."""
         more = {
-            why: f" and {len(names) - MOST_SHOWN_NAMES} more"
+            why: f" and {len(names) - SHOWN_NAME_COUNT} more"
             for why, names in self.names.items()
-            if len(names) > MOST_SHOWN_NAMES
+            if len(names) > SHOWN_NAME_COUNT
         }
-        texts = {why: f"{', '.join(names[:MOST_SHOWN_NAMES])}{more.get(why, '')}" for why, names in self.names.items()}
+        texts = {why: f"{', '.join(names[:SHOWN_NAME_COUNT])}{more.get(why, '')}" for why, names in self.names.items()}
         return [flaw_finding(measurement_path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
 
 

@@ -25,7 +25,7 @@ from models.measured.gaps import without_impossible_values
 from models.measured.recording import Progress, Recording, report_no_progress
 from models.measured.resampling import EQUAL_RATE_RATIO, resample_to
 from models.measured.signal import MeasuredSignal
-from models.measured.timing import EVEN_CLOCK_SHARE, SampleTiming, sample_timing
+from models.measured.timing import EVEN_CLOCK_DEVIATION_SHARE, SampleTiming, sample_timing
 from models.systems.measured.scene import MeasuredScene
 
 COLUMNS_FILE, RAW_COLUMNS_FILE, SOURCES_FILE, ABSURD_VALUES_FILE = (
@@ -229,10 +229,10 @@ def _clock_grid(scene: MeasuredScene, wheel_force_groups: list[ClockGroup]) -> C
         raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
     times = fastest.times
     start = float(
-        times[min(np.searchsorted(times, first + settings.start - EVEN_CLOCK_SHARE * period), len(times) - 1)]
+        times[min(np.searchsorted(times, first + settings.start - EVEN_CLOCK_DEVIATION_SHARE * period), len(times) - 1)]
     )
     end = last if settings.duration is None else min(last, start + settings.duration)
-    count = int(np.floor((end - start) / period + EVEN_CLOCK_SHARE)) + 1
+    count = int(np.floor((end - start) / period + EVEN_CLOCK_DEVIATION_SHARE)) + 1
     if settings.duration is not None and start + settings.duration > last + period:
         raise InputError(file, "clock.duration", settings.duration, f"the wheel forces last {last - start:.6g} s")
     if count < FEWEST_SAMPLES:
@@ -288,8 +288,8 @@ def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
     deviations = np.abs(clock.times[inside] - grid.start - grid.period * indices[inside])
     return (
         clock.order is None
-        and abs(clock.period / grid.period - 1) <= EVEN_CLOCK_SHARE
-        and bool((deviations <= EVEN_CLOCK_SHARE * grid.period).all())
+        and abs(clock.period / grid.period - 1) <= EVEN_CLOCK_DEVIATION_SHARE
+        and bool((deviations <= EVEN_CLOCK_DEVIATION_SHARE * grid.period).all())
     )
 
 
