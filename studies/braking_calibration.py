@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
@@ -136,7 +136,7 @@ def _means_of_stops(
         options.speed_spread,
         options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, blocks=Blocks(STOPS_PER_BLOCK))
+    stops = run_paths(job, runs, executor=pool, path_blocks=PathBlocks(STOPS_PER_BLOCK))
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 

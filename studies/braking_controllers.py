@@ -189,7 +189,7 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                 ylabel=quantity if column == 0 else "",
             )
     if stops:
-        legend_below(figure, axes[0, 0], columns=max(len(kinds) // controllers_per_group, 1))
+        legend_below(figure, axes[0, 0], column_count=max(len(kinds) // controllers_per_group, 1))
     add_heading(figure, scene.title, results)
     save(figure, file)
 

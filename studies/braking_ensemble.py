@@ -12,8 +12,8 @@ from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results, joined_result
-from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.braking.of_scene import merged_tables
 from models.systems.braking.plan import check_reference
@@ -65,7 +65,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged_tables(scene.table(), options.other)][: 2 if options.other else 1]
-    ensembles, results, blocks = [], dict[str, Result](), Blocks(RUNS_PER_BLOCK)
+    ensembles, results, blocks = [], dict[str, Result](), PathBlocks(RUNS_PER_BLOCK)
     progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
     singles = [drive(scene_of_ensemble, procedure=options.procedure, error=scene.error) for scene_of_ensemble in scenes]
@@ -164,7 +164,7 @@ def _figure(
     test_text = f"; Welch's test of the means: p = {tests['distance'].p_value:.2g}" if tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
-    legend_below(figure, histogram, cloud, columns=2)
+    legend_below(figure, histogram, cloud, column_count=2)
     add_heading(figure, f"{scene.title}: {options.runs} stops each{test_text}", results)
     save(figure, folder / "ensemble.png")
 

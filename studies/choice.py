@@ -11,14 +11,14 @@ import numpy as np
 from pydantic import Field
 
 from models.advice.choice.choose import (
-    MOST_CONFIRMATIONS,
-    PAIRS_IN_ADVANCE,
-    PREDICTION_SHARE,
-    RUN_BUDGET,
-    Choice,
-    Chooser,
+    CONFIRMATION_LIMIT,
+    PAIRS_COMPUTED_IN_ADVANCE,
+    SEARCH_BUDGET_IN_RUNS,
+    TOLERANCE_SHARE_OF_PREDICTION,
+    EffectChoice,
+    EffectChooser,
 )
-from models.advice.choice.variants import Variants, system_of
+from models.advice.choice.variants import Variants, module_of_system
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
@@ -60,7 +60,7 @@ class SceneChoice:
 
     scene: Any
     engine: str
-    choice: Choice
+    choice: EffectChoice
     single_effects: list[SingleEffect]
     further_tolerances: dict[str, float]
     activity_of_element: dict[str, float]
@@ -74,7 +74,7 @@ class SceneChoice:
 
 def check(scene: Any, engines: tuple[str, ...]) -> None:
     """Raise InputError for further scenes of the option "beside" that ask for no choice of effects."""
-    system_of(scene)
+    module_of_system(scene)
     for name in read(Options, scene.options, scene.file, "options").beside:
         other_scene = load_scene(name, None)
         if other_scene.tolerance is None:
@@ -96,7 +96,7 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
         plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),))
         report_share = partial(
-            _pass_progress, progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
+            _pass_progress, progress, f"{chosen_scene.title}, of at most {SEARCH_BUDGET_IN_RUNS} runs", i, len(scenes)
         )
         choices.append(
             _linear_ride_choice(chosen_scene) if linear else choice_of_scene(chosen_scene, engines_asked, report_share)
@@ -147,7 +147,7 @@ def has_closed_form(scene: Any) -> bool:
 def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:
     """Engine for the choice: the system's usual engine if it is requested or none is; else the first requested
     engine."""
-    usual: str = system_of(scene).ENGINE
+    usual: str = module_of_system(scene).DEFAULT_ENGINE
     return usual if not engines or usual in engines else engines[0]
 
 
@@ -164,8 +164,9 @@ def search_text(scene: Any) -> str:
         )
     runs = Variants(scene, engine_for_choice(scene, ()))
     return (
-        f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUN_BUDGET} runs of the "
-        f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {MOST_CONFIRMATIONS} sets at most"
+        f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {SEARCH_BUDGET_IN_RUNS} "
+        f"runs of the scene, of {runs.system.step_count(runs.scene):,} steps each, and confirms "
+        f"{CONFIRMATION_LIMIT} sets at most"
     )
 
 
@@ -174,9 +175,11 @@ def choice_of_scene(
 ) -> SceneChoice:
     """The choice of effects for a scene by runs in one engine."""
     engine = engine_for_choice(scene, engines)
-    with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *folders_for_workers(scene)) as pool:
-        chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
-        choice, full_work = chooser.choose(), chooser.work(frozenset())
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_COMPUTED_IN_ADVANCE, *folders_for_workers(scene)) as pool:
+        chooser = EffectChooser(
+            scene, engine, scene.quantities, scene.tolerance, report_progress=progress, executor=pool
+        )
+        choice, full_work = chooser.choose(), chooser.predicted_work(frozenset())
     results = (
         chooser.whole.variants.results_with_errors(frozenset(choice.left_out), choice.step_factor)
         if scene.error
@@ -186,7 +189,7 @@ def choice_of_scene(
         SingleEffect(
             effect,
             chooser.reporting_screen.predicted_change(frozenset([effect])),
-            full_work / chooser.work(frozenset([effect])),
+            full_work / chooser.predicted_work(frozenset([effect])),
         )
         for effect in chooser.effects
     ]
@@ -219,7 +222,7 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     calls_before, calls_after = round(linear.cost_before.calls), round(linear.cost_after.calls)
     work = tuple(cost.work for cost in (linear.cost_before, linear.cost_before, linear.cost_after))
-    choice = Choice(
+    choice = EffectChoice(
         tuple(effect_set.name for effect_set in linear.candidates),
         tuple(effect_set.name for effect_set in linear.left_out),
         1,
@@ -292,7 +295,7 @@ def _change_text(relative_change: float, uncertainty: float) -> str:
 def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
     """Text on why an effect stays: how much the quantities would change if it were left out, too."""
     if (
-        relative_change > PREDICTION_SHARE * scene_choice.scene.tolerance
+        relative_change > TOLERANCE_SHARE_OF_PREDICTION * scene_choice.scene.tolerance
         or scene_choice.activity_of_element
         or scene_choice.choice.ended_early
     ):
@@ -338,7 +341,10 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
         for breach in breaches
     ]
     if choice.ended_early:
-        rows.append(f"    the search ended at the calls of {RUN_BUDGET} runs of the scene: larger sets were not tried")
+        rows.append(
+            f"    the search ended at the calls of {SEARCH_BUDGET_IN_RUNS} runs of the scene: "
+            "larger sets were not tried"
+        )
     if choice.sample_factor:
         rows.append(
             f"    chance alone stands in the way of more: {choice.sample_factor:.2g} times as many samples would tell"

@@ -24,7 +24,7 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
-from models.ensemble.runner import PATHS_PER_BLOCK, Blocks, each_block, run_paths
+from models.ensemble.runner import PATHS_PER_BLOCK, PathBlocks, arrays_by_block, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright_assumption
@@ -90,14 +90,16 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     def tell(finished: Done) -> None:
         progress(f"reference: {finished}", finished.done / finished.paths)
 
-    crew, cut = Crew.of(scene), Blocks(options.block)
+    crew, cut = Crew.of(scene), PathBlocks(options.block)
     with TemporaryDirectory() as name, crew.at_work(cut.count(options.paths)) as pool:
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower_builder(scene, Path(name))({}, {"force_noise": noise})
         first = run_with_drift(noisy, "reference", scene.error)
         path_arguments = (noisy, row_times, measured["pitch"], options.threshold)
-        for block in each_block(noise_paths(*path_arguments), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell):
+        for block in arrays_by_block(
+            noise_paths(*path_arguments), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell
+        ):
             statistics.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
@@ -106,7 +108,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                 repeated = run_paths(mujoco_threads(*path_arguments, crew.workers), options.engine_paths)
             else:
                 repeated = run_paths(
-                    noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, blocks=Blocks(1)
+                    noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, path_blocks=PathBlocks(1)
                 )
             gaps[engine] = largest_difference(statistics.first, repeated, row_times)
     write_measurement(measured, folder, period)

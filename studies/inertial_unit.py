@@ -255,7 +255,7 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
     axes[1].set(
         title=f"Damage error that {SUFFICIENT_SHARE:.0%} of all units keep [%]", xlabel="length of the drive [min]"
     )
-    legend_below(figure, axes[1], columns=len(options.grades) + 1)
+    legend_below(figure, axes[1], column_count=len(options.grades) + 1)
     add_heading(figure, "What the grade of a gyro does to angle and damage", results)
     return figure
 

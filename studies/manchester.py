@@ -134,7 +134,7 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
                 axis.set_ylabel(label)
         axes[0, column].set_title(f"{wheel.capitalize()} wheel")
         axes[-1, column].set_xlabel("displacement of the wheelset to the right [mm]")
-    legend_below(drawn, axes[0, 0], columns=2)
+    legend_below(drawn, axes[0, 0], column_count=2)
     title = f"{scene.title}\nEvery patch; bars in the first row are its width"
     add_heading(drawn, title, results)
     save(drawn, path)

@@ -24,18 +24,18 @@ from models.core.time_series import read_time_series, write_time_series
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.score import root_mean_square
-from models.sensors.motion_assumptions import Record, assumptions
+from models.sensors.motion_assumptions import AccelerometerRecord, assumptions_of_motion
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
     UNEXPLAINED_SHARE_LIMIT,
-    CutOffs,
-    Quality,
+    BodyStartState,
+    CutOffFrequencies,
     RecoveredMotion,
-    StartState,
+    RigidFitQuality,
+    body_rotation_from_readings,
     check_cut_off,
     fit_quality,
     recovered_motion,
-    spin_from_readings,
     tilt_displacement,
 )
 from models.sensors.rotations import GimbalLock
@@ -72,15 +72,15 @@ class Source:
     period: float
     truth: dict[str, np.ndarray] = field(default_factory=dict)
     gyro: np.ndarray | None = None
-    quality: Quality | None = None
+    quality: RigidFitQuality | None = None
     recovered_motions: dict[str, RecoveredMotion] = field(default_factory=dict)
     run: Result | None = None
 
     @property
-    def start(self) -> StartState:
+    def start(self) -> BodyStartState:
         """Initial state of the recovered motion: that of the run, or level and at rest."""
         first = (float(self.truth[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.truth)
-        return StartState.pitched(*first) if self.truth else StartState()
+        return BodyStartState.pitched(*first) if self.truth else BodyStartState()
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         results |= {} if source.run is None else {name: source.run}
         results[f"{name}: motion"] = _save_motions(scene, source, folder, options)
         sources.append(source)
-    arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
+    arranged = ["  The sensors", *(f"    {line}" for line in array.description_sentences())]
     table = [*arranged, *(line for source in sources for line in _screen_lines(source, p)), *_closing_lines(options)]
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 1.0)
@@ -184,7 +184,7 @@ def _recover_motions(readings_source: Source, array: SensorArray, options: Optio
     """Recover the motion from the readings by every method, and store it in the source. A suspect sensor, whose
     readings do not fit a rigid body, is used by the first method only."""
     readings_source.quality = fit_quality(array, readings_source.readings, parameters.deviation)
-    suspect, readings = readings_source.quality.suspect, readings_source.readings
+    suspect, readings = readings_source.quality.suspect_sensor, readings_source.readings
     recover = partial(
         recovered_motion,
         sample_period=readings_source.period,
@@ -200,7 +200,7 @@ def _recover_motions(readings_source: Source, array: SensorArray, options: Optio
     readings_source.recovered_motions["integrated"] = recover(array, readings)
     if parameters.deviation > 0:
         filtered_rates, _ = filter_rates(
-            spin_from_readings(array, readings),
+            body_rotation_from_readings(array, readings),
             readings_source.period,
             np.array(readings_source.start.rates),
             parameters.deviation,
@@ -213,7 +213,7 @@ def _recover_motions(readings_source: Source, array: SensorArray, options: Optio
             0.0,
         ]  # it reads the pitch rate; the vehicle does nothing else
         readings_source.recovered_motions["rates from the gyro"] = recover(array, readings, rates=turning)
-    cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
+    cut_offs = CutOffFrequencies(options.turning_cut_off, options.position_cut_off)
     readings_source.recovered_motions["high-passed"] = recover(array, readings, cut_offs=cut_offs)
 
 
@@ -240,13 +240,13 @@ def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: 
     axes = {"way": Channel("way", list(values_of_methods)), "time": Channel("time", reading_times, "s")}
     saved = result(scene, channels, axes, engine=readings_source.name)
     assert readings_source.quality is not None
-    record = Record(
+    record = AccelerometerRecord(
         readings_source.quality,
         readings_source.readings,
         readings_source.period,
         not readings_source.truth and not options.zeroed,
     )
-    with_assumptions(saved, assumptions(record, readings_source.recovered_motions["integrated"]))
+    with_assumptions(saved, assumptions_of_motion(record, readings_source.recovered_motions["integrated"]))
     if scene.error:
         truth_text = (
             "the table has the error of each way beside the run" if readings_source.truth else "no truth is known"
@@ -293,19 +293,19 @@ def _screen_lines(readings_source: Source, parameters: Parameters) -> list[str]:
     return lines
 
 
-def _rigidity_text(quality: Quality) -> str:
+def _rigidity_text(quality: RigidFitQuality) -> str:
     """Sentence on the consistency of the readings with rigid-body motion."""
     if quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
-    share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
+    share = f"{100 * quality.unexplained_share:.2g} % of the relative accelerations fit no rigid body"
     if quality.rigid:
         return (
             f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %, or what the noise leaves): the mounts "
             "pass for rigid"
         )
-    if quality.suspect:
+    if quality.suspect_sensor:
         return (
-            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {quality.suspect!r} does not move "
+            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {quality.suspect_sensor!r} does not move "
             "with the body and is left out"
         )
     return (
@@ -367,12 +367,12 @@ def _figure(readings_source: Source, results: Results, path: Path) -> None:
                 errors,
                 f"Largest error of the {name} so far {label[label.index('[') :]}",
             )
-    axes["misfit"].plot(reading_times, readings_source.quality.misfit, color=GREY, linewidth=0.4)
+    axes["misfit"].plot(reading_times, readings_source.quality.unexplained_rms, color=GREY, linewidth=0.4)
     axes["misfit"].set_title(
-        f"Readings that no rigid motion explains, {100 * readings_source.quality.share:.2g} % [m/s²]"
+        f"Readings that no rigid motion explains, {100 * readings_source.quality.unexplained_share:.2g} % [m/s²]"
     )
     axes["misfit"].set_xlabel("time [s]")
-    legend_below(figure, axes["pitch error" if readings_source.truth else "pitch"], columns=3)
+    legend_below(figure, axes["pitch error" if readings_source.truth else "pitch"], column_count=3)
     add_heading(figure, f"Pitch and heave from accelerometers, {readings_source.name}: what each way errs by", results)
     save(figure, path)
 

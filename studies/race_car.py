@@ -186,7 +186,7 @@ def error_ratios(identification: IdentifiedVehicle) -> dict[str, Any]:
     crossed = np.sqrt(np.mean(identification.cross_validation_errors**2, axis=1)) / sizes
     share_inside, width, relative = (
         identification.bands.share_inside(),
-        identification.bands.width(),
+        identification.bands.relative_width(),
         identification.bands.relative_error(),
     )
     return {

@@ -23,8 +23,8 @@ from models.drawing.figures import (
 )
 from models.fatigue.counting import CountedLoad
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
-from models.measured.checks.evidence import Evidence
-from models.measured.signal import UNIT_OF_QUANTITY, Signal
+from models.measured.checks.evidence import CheckedRecording
+from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal
 from models.systems.measured.holds import FREE_RUN
 from models.systems.measured.run import RecordingAnalysis
 from models.systems.measured.section_run import SectionOutcome
@@ -54,14 +54,14 @@ CHECKS_OF_FAULT = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swap
 """Names of the checks that detect each kind of measurement fault."""
 
 
-def figure_of_finding(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
+def figure_of_finding(finding: Finding, evidence: CheckedRecording, path: Path) -> Path | None:
     """Save the figure that illustrates a finding; returns its path, or None if there is nothing to draw."""
     telling = (f for f in evidence.faults if finding.check in CHECKS_OF_FAULT.get(f.kind, ()))
     fault = next((f for f in telling if set(f.names) == set(finding.signals)), None)
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
     if not signals:
         return None
-    vertical, hubs = evidence.vertical(), evidence.vehicle.hubs if evidence.vehicle else ()
+    vertical, hubs = evidence.vertical_force_signals(), evidence.vehicle.hubs if evidence.vehicle else ()
     loads = len(vertical) == len(hubs) > 0 and set(signals) <= set(vertical.values())
     if finding.check in ("weight", "gain", "sign", "unit") and loads:
         return _plot_mean_forces(evidence, path)
@@ -85,7 +85,9 @@ def _save_titled(
     return save(figure, path)
 
 
-def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
+def _plot_signals(
+    finding: Finding, evidence: CheckedRecording, signals: tuple[MeasuredSignal, ...], path: Path
+) -> Path:
     """Save a figure of the signals of a finding over time, with the time span of the finding marked."""
     recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
@@ -115,11 +117,11 @@ def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, .
     )
 
 
-def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
+def _plot_mean_forces(evidence: CheckedRecording, path: Path) -> Path:
     """Save a bar chart of each hub's mean measured vertical force beside its static load by the vehicle file."""
     assert evidence.vehicle is not None
-    hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
-    means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
+    hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical_force_signals()
+    means = np.array([evidence.mean_of_signal(vertical[hub]) for hub in hubs])
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
     bar_positions = np.arange(len(hubs))
     axis.bar(bar_positions - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
@@ -136,18 +138,22 @@ def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
     return _save_titled(drawn, "Mean vertical forces", path, axis)
 
 
-def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
+def _plot_ratio(evidence: CheckedRecording, fault: MeasurementFault, path: Path) -> Path:
     """Save a figure of the ratio of a channel's reading to its expected value over frequency; a delay shows as a slope
     of the phase, a wrong factor as a constant magnitude."""
     agreement = evidence.agreement
     assert agreement is not None
     for earlier_fault in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
-        agreement = agreement.without(earlier_fault)
-    group_channels = agreement.inputs if fault.signals[0] in agreement.inputs else agreement.outputs
-    group = SignalGroup(
-        fault.name, group_channels is agreement.inputs, tuple(group_channels.index(s) for s in fault.signals)
+        agreement = agreement.corrected_for(earlier_fault)
+    group_channels = (
+        agreement.force_signals if fault.signals[0] in agreement.force_signals else agreement.reading_signals
     )
-    line, size = ((agreement.weights * part_of_weights).sum(axis=1) for part_of_weights in agreement.share(group))
+    group = SignalGroup(
+        fault.name, group_channels is agreement.force_signals, tuple(group_channels.index(s) for s in fault.signals)
+    )
+    line, size = (
+        (agreement.weights * part_of_weights).sum(axis=1) for part_of_weights in agreement.cross_and_own_power(group)
+    )
     f, ratio, sure = agreement.frequencies, size / line if group.forces else line / size, size / size.max()
     late, factor = (fault.size, 1.0) if fault.kind == "late" else (0.0, fault.size)
     size_text = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
@@ -169,18 +175,18 @@ def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path
     return _save_titled(drawn, title, path, axes[0], "outside lower center")
 
 
-def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
+def _plot_exchange(evidence: CheckedRecording, fault: MeasurementFault, path: Path) -> Path:
     """Save a bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
     with two of them exchanged."""
     agreement = evidence.agreement
     assert agreement is not None
-    names = [s.name for s in agreement.outputs]
+    names = [s.name for s in agreement.reading_signals]
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 1.4 + 0.24 * len(names)))
     bar_positions = np.arange(len(names))
-    axis.barh(bar_positions - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD_COLOUR, label="as mapped")
+    axis.barh(bar_positions - 0.2, 100 * agreement.unexplained_shares, 0.38, color=LOUD_COLOUR, label="as mapped")
     axis.barh(
         bar_positions + 0.2,
-        100 * agreement.without(fault).unexplained,
+        100 * agreement.corrected_for(fault).unexplained_shares,
         0.38,
         color=QUIET_COLOUR,
         label=f"{fault.name} exchanged",
@@ -191,7 +197,7 @@ def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> P
     return _save_titled(drawn, "Exchanged hubs", path, axis)
 
 
-def _plot_spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
+def _plot_spectrum(evidence: CheckedRecording, signals: tuple[MeasuredSignal, ...], path: Path) -> Path:
     """Save a figure of the spectral density of signals, and of the noise density that is stated for them."""
     from scipy.signal import welch
 
@@ -238,12 +244,15 @@ def _panels_over_time(row_count: int, height: float, **options_of_panels: Any) -
 
 def inputs_figure(examination: RecordingAnalysis, path: Path) -> Path:
     """Save a figure of the measured forces at all hubs along each axis over time."""
-    recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
+    recording, axes = (
+        examination.recording,
+        [a for a in "zxy" if examination.recording.find_signals("force", component=a)],
+    )
     drawn, panels = _panels_over_time(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     sample_times = recording.period * np.arange(recording.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
         for i, hub in enumerate(examination.rig.hubs):
-            for signal in (s for s in recording.find("force", hub, axis) if not s.check):
+            for signal in (s for s in recording.find_signals("force", hub, axis) if not s.check):
                 panel.plot(
                     *thinned_curve(sample_times, recording.samples(signal) / 1e3),
                     color=WHEEL_COLOURS[i % len(WHEEL_COLOURS)],
@@ -282,7 +291,7 @@ def _angles_of_runs(examination: RecordingAnalysis, angle: str) -> dict[str, tup
     """Times (s) and values (rad) of an angle by name: measured, of every run, and true for a virtual measurement."""
     recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
-    for signal in recording.find("angle", chassis, angle)[:1]:
+    for signal in recording.find_signals("angle", chassis, angle)[:1]:
         curves["measured"] = recording.period * np.arange(recording.count), recording.samples(signal)
     for name, run in examination.runs.items():
         curves[name] = run.period * np.arange(run.done), run.samples(f"{chassis} {angle}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.systems.ride import opened
+from models.advice.choice.systems.ride import copies_of_scene
 from models.advice.ride_choice.activity import activity_by_element
 from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.in_time import Samples
@@ -52,7 +52,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     """Raise InputError for scenes without a choice of effects, and for options of copies if the vehicle is linear."""
     read(Options, scene.options, scene.file, "options")
     if needs_run_in_time(scene):
-        opened(scene)
+        copies_of_scene(scene)
     elif scene.options:
         option_name, value = next(iter(scene.options.items()))
         raise InputError(

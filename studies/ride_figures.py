@@ -86,7 +86,7 @@ def body_acceleration_figure(
     for axis in (left, right):
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
         _note_if_no_finite_curve(axis)
-    legend_below(figure, left, columns=2)
+    legend_below(figure, left, column_count=2)
     _save_figure(figure, heading, ": which correlations of the road matter where", path)
 
 
@@ -222,7 +222,7 @@ def road_figure(
         )
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
-    legend_below(figure, left, right, columns=3)
+    legend_below(figure, left, right, column_count=3)
     _save_figure(figure, heading, ": the road", path)
 
 
@@ -351,7 +351,7 @@ def nonlinear_figure(nonlinear: NonlinearRide, heading: Heading, path: Path) -> 
         axis.set(
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
         )
-    legend_below(figure, *axes, columns=2)
+    legend_below(figure, *axes, column_count=2)
     _save_figure(figure, heading, "\nStandard deviations over speed", path)
 
 
@@ -379,7 +379,7 @@ def engine_spectra_figure(
         output, top = linear_vehicle.outputs[i], expected[:, i].max()
         unit = f"one-sided density [{_squared_unit(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
-    legend_below(figure, axes[0], columns=3)
+    legend_below(figure, axes[0], column_count=3)
     _save_figure(figure, heading, f"\nSpectra at {speed:g} m/s", path)
 
 

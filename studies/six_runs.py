@@ -169,7 +169,7 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
         pitch.plot(run.times, run["pitch"], label=name, color=f"C{i}")
     heave.set(title="Error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
     pitch.set(title="Pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")
-    legend_below(figure, pitch, columns=6)
+    legend_below(figure, pitch, column_count=6)
     add_heading(figure, title, results)
     return figure
 

@@ -22,7 +22,7 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.statistics import STANDARD_ERRORS_95, quantile_with_interval
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.noise_paths import noise_paths
@@ -152,7 +152,7 @@ def _ensemble_of_paths(
     noisy = changed_scene(base_scene, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
     rows = np.arange(0, len(quiet_run.times), max(1, round(ROW_SPACING / base_scene.run.step)))
     row_times, true = quiet_run.times[rows], quiet_run["pitch"]
-    with worker_crew.at_work(Blocks().count(options.paths)) as pool:
+    with worker_crew.at_work(PathBlocks().count(options.paths)) as pool:
         paths = run_paths(noise_paths(noisy, row_times, true, options.angle, engine), options.paths, executor=pool)
     errors = np.abs(paths["states"][:, :, 3] - true[rows])
     return {"times": row_times, "drift_off": paths["drift_off"], "errors": errors}

@@ -38,6 +38,6 @@ def tyre_figure(
         row[2].set(
             xlabel="μx [-]", ylabel="μy [-]", xlim=(0, top), ylim=(0, top), aspect="equal", title="Both, slip 0 to 1"
         )
-    legend_below(figure, axes[0, 0], columns=len(angles))
+    legend_below(figure, axes[0, 0], column_count=len(angles))
     add_heading(figure, f"{title}: friction under {load / 1e3:.4g} kN, by slip angle", results)
     save(figure, path)

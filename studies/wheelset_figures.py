@@ -191,7 +191,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
     )
     left.set_title("Amplitude")
     right.set(ylabel="frequency [Hz]", title="Frequency")
-    legend_below(figure, left, right, columns=3)
+    legend_below(figure, left, right, column_count=3)
     add_heading(figure, title, {"branch": branch})
     save(figure, path)
 

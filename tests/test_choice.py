@@ -13,12 +13,12 @@ from models.advice.choice.answer import (
     RunQuantities,
     difference_of_runs,
     largest_relative_change,
+    reference_sizes_of_cases,
     rounding_floor,
-    scale_of_cases,
     sum_of_differences,
 )
-from models.advice.choice.choose import Chooser
-from models.advice.choice.screen import Screen
+from models.advice.choice.choose import EffectChooser
+from models.advice.choice.screen import EffectScreen
 from models.advice.choice.variants import Variants
 from models.advice.price.effects import price_list
 from models.advice.price.effects_text import as_dict, price_list_lines
@@ -48,7 +48,7 @@ def test_paths_are_compared_where_both_have_a_row_and_by_their_deviation():
     full, half = np.array([0.0, 2.0, 4.0, 6.0, 8.0]), np.array([0.0, 4.0, 9.0])
     change = difference_of_runs((half,), (full,))
     assert change[0].tolist() == [0.0, 0.0, 1.0]
-    assert largest_relative_change(change, scale_of_cases((full,))) == pytest.approx(
+    assert largest_relative_change(change, reference_sizes_of_cases((full,))) == pytest.approx(
         np.sqrt(1.0 / 3.0) / np.sqrt(8.0)
     )  # its deviation
     assert sum_of_differences(change, (np.ones(5),))[0].tolist() == [1.0, 1.0, 2.0]
@@ -57,7 +57,7 @@ def test_paths_are_compared_where_both_have_a_row_and_by_their_deviation():
 
 
 def test_a_case_that_does_not_move_is_held_to_a_share_of_the_others():
-    assert scale_of_cases((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
+    assert reference_sizes_of_cases((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
 
 
 class Made(Variants):
@@ -78,9 +78,9 @@ class Made(Variants):
             "System",
             (),
             {
-                "WINDOWED": False,
-                "divisible_steps": staticmethod(lambda scene: 4),
-                "steps": staticmethod(lambda scene: 4),
+                "PART_REPRESENTS_RUN": False,
+                "divisible_step_count": staticmethod(lambda scene: 4),
+                "step_count": staticmethod(lambda scene: 4),
             },
         )
 
@@ -98,7 +98,7 @@ class Made(Variants):
 
 def chooser(monkeypatch, function, effects, tolerance=0.05):
     monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: Made(function, effects))
-    return Chooser(None, "", ["q"], tolerance)
+    return EffectChooser(None, "", ["q"], tolerance)
 
 
 def test_the_second_order_is_exact_for_a_quadratic_and_tells_what_it_leaves_out():
@@ -106,7 +106,7 @@ def test_the_second_order_is_exact_for_a_quadratic_and_tells_what_it_leaves_out(
         x = sum({"a": 1.0, "b": 2.0, "c": 3.0}[name] for name in left_out)
         return 100.0 + x + 0.1 * x**2
 
-    screen = Screen(Made(quantity, ("a", "b", "c")), ["q"])
+    screen = EffectScreen(Made(quantity, ("a", "b", "c")), ["q"])
     assert screen.predicted_change(frozenset("abc"))[0] == pytest.approx((6.0 + 3.6) / 100.0)
     assert screen.higher_order_estimate(frozenset("ab"))[0] == 0.0  # run itself
     second, first = 0.2 * (2.0 + 3.0 + 6.0), 6.0 + 0.1 * 14.0
@@ -133,7 +133,10 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     choice = found.choose()
     own = found.whole.variants.quantities_of_run().counts["calls"]
     assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
-    assert choose.RUN_BUDGET * own < choice.calls_of_search < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
+    assert (
+        choose.SEARCH_BUDGET_IN_RUNS * own < choice.calls_of_search < (choose.SEARCH_BUDGET_IN_RUNS + 10) * own
+        and max(shares) == 1.0
+    )
     assert not chooser(monkeypatch, quantity, names[:5]).choose().ended_early
 
 
@@ -168,11 +171,11 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     run, own._run = own._run, lambda left_out, times: None if times > 2 else run(left_out, times)
     part = Made(own.function, ("a",))
     monkeypatch.setattr(own, "window", lambda steps: part)
-    own.system.WINDOWED = True
+    own.system.PART_REPRESENTS_RUN = True
     monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: own)
-    found = Chooser(None, "", ["q"], 0.05)
+    found = EffectChooser(None, "", ["q"], 0.05)
     assert (
-        found._longest_allowed(Screen(part, ["q"]), frozenset(), part.step_factors(), 0.05)[0] == 4
+        found._longest_allowed_step(EffectScreen(part, ["q"]), frozenset(), part.step_factors(), 0.05)[0] == 4
         and found.step_factor == 2
     )
 
@@ -195,8 +198,10 @@ def hub_forces(**more):
 def test_a_part_of_a_run_has_a_length_that_the_scene_may_have():
     """125 steps of 500 are whole steps of the run, and no whole samples of 2 ms."""
     variants = Variants(hub_forces(), "mujoco")
-    assert variants.system.steps(variants.window(125).scene) == 180
-    assert variants.system.steps(Variants(hub_forces(forces={"sampling_rate": 1000.0}), "").window(125).scene) == 125
+    assert variants.system.step_count(variants.window(125).scene) == 180
+    assert (
+        variants.system.step_count(Variants(hub_forces(forces={"sampling_rate": 1000.0}), "").window(125).scene) == 125
+    )
 
 
 def test_the_study_chooses_where_a_plan_must_know_the_engine(tmp_path, monkeypatch):
@@ -210,17 +215,17 @@ def test_the_study_chooses_where_a_plan_must_know_the_engine(tmp_path, monkeypat
 def test_what_only_rounds_does_not_move():
     scene = half_car(effects={}, quantities=["z1_rate"])  # 2e-17 m/s at rest
     with pytest.raises(InputError, match="does not move"):
-        Chooser(scene, "reference", scene.quantities, scene.tolerance)
+        EffectChooser(scene, "reference", scene.quantities, scene.tolerance)
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert scale_of_cases(answer.quantity("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert reference_sizes_of_cases(answer.quantity("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
     assert rounding_floor(answer, "m") == 1e-15
 
 
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
     asked = draw_scene("pitch-plane", 3)
-    choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
+    choice = EffectChooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
     assert (
         choice.within_tolerance
         and (choice.confirmed_change <= asked.tolerance).all()
@@ -230,8 +235,8 @@ def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
 
 def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():
     scene = half_car()
-    own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    assert own.share(frozenset(["pitch_spring"])) < 1.0 < own.share(frozenset(["road"]))
+    own = EffectChooser(scene, "reference", scene.quantities, scene.tolerance)
+    assert own.tolerance_share(frozenset(["pitch_spring"])) < 1.0 < own.tolerance_share(frozenset(["road"]))
     assert "road" not in own.choose().left_out
 
 
@@ -274,7 +279,7 @@ def test_seconds_have_no_say_in_what_is_chosen(monkeypatch):
     asked, draw, found = draw_scene("pitch-plane", 4), np.random.default_rng(1), []
     for clock in (time.process_time, lambda: float(draw.exponential(1e3))):
         monkeypatch.setattr("time.process_time", clock)
-        found.append(Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())
+        found.append(EffectChooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())
     one, two = (
         replace(choice, seconds=(), predicted_change=0, prediction_remainder=0, confirmed_change=0, statistical_error=0)
         for choice in found
@@ -291,7 +296,7 @@ def test_work_is_calls_times_what_each_goes_through():
 def test_unknown_quantities_and_systems_without_runs_are_refused():
     scene = half_car(quantities=["yaw"])
     with pytest.raises(InputError, match="yaw"):
-        Chooser(scene, "reference", scene.quantities, scene.tolerance)
+        EffectChooser(scene, "reference", scene.quantities, scene.tolerance)
     with pytest.raises(InputError, match="pictures"):
         Variants(type("Other", (), {"system": "pictures", "file": "t"}), "reference")
     assert "pictures" in KNOWN_SYSTEMS

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.workers import Crew, dask_workers
 
 ROOT = Path(__file__).parents[1]
@@ -127,7 +127,7 @@ def test_a_cluster_with_tls_gives_the_same_bits_and_outlives_a_killed_worker(sec
                 killed.append(int(next((tmp_path / "a").iterdir()).name.partition("-")[2]))
                 os.kill(killed[0], signal.SIGKILL)
 
-        found = run_paths(one, 30, executor=pool, blocks=Blocks(3), progress=kill)["x"]
+        found = run_paths(one, 30, executor=pool, path_blocks=PathBlocks(3), report_progress=kill)["x"]
     assert killed and np.array_equal(found, expected)
     names = {path.name.partition("-")[2] for path in (tmp_path / "a").iterdir()}
     assert len(names) >= 3
@@ -152,7 +152,7 @@ class FreshPages:
 def test_workers_of_a_cluster_keep_freed_memory(secure, tmp_path):
     """Dask has its workers return memory, after which 50 arrays of 4 MB take 49,000 fresh pages."""
     with Crew(1, secure[0]).at_work(3, tmp_path) as pool:
-        assert run_paths(FreshPages(), 6, executor=pool, blocks=Blocks(1))["pages"].max() < 2_000
+        assert run_paths(FreshPages(), 6, executor=pool, path_blocks=PathBlocks(1))["pages"].max() < 2_000
 
 
 @pytest.mark.full
@@ -186,8 +186,8 @@ def test_a_killed_scheduler_is_said_and_the_blocks_are_resumed(secure, tmp_path)
             scheduler.send_signal(signal.SIGKILL)
 
     with pytest.raises(RunFailed, match=r"cluster is gone.*finished blocks are kept"), dask_workers(address) as pool:
-        run_paths(job, 60, kept, pool, Blocks(3), kill)
+        run_paths(job, 60, kept, pool, PathBlocks(3), kill)
     assert 3 <= len(list(kept.glob("block*.npz"))) < 20
-    assert np.array_equal(run_paths(job, 60, kept, blocks=Blocks(3))["x"], np.sqrt(np.arange(60)))
+    assert np.array_equal(run_paths(job, 60, kept, path_blocks=PathBlocks(3))["x"], np.sqrt(np.arange(60)))
     with pytest.raises(InputError, match="no Dask scheduler answers"), dask_workers(address):
         pass

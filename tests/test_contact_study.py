@@ -16,7 +16,7 @@ from models.contact.fields import fastsim_fields
 from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.core.tables import NEWTONS, SHARES, read_table, table_blocks
-from models.ensemble.store import Store
+from models.ensemble.store import BlockStore
 from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, OUTPUT_HEADINGS, solve_table
 from models.systems.contact.run import Built, solved_contact
@@ -357,7 +357,7 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
         if rows >= 4:
             raise KeyboardInterrupt
 
-    store, again = Store(tmp_path), Counting()
+    store, again = BlockStore(tmp_path), Counting()
     with pytest.raises(KeyboardInterrupt):
         solve_table(path, resumed, built, ContactMethod(), stop, block_store=store)
     assert not resumed.exists() and store.has(1)

@@ -20,7 +20,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.noise import normal_samples
 from models.engines import protocol
 from models.ensemble import store, workers
-from models.ensemble.runner import Blocks, PathFailed, run_paths
+from models.ensemble.runner import PathBlocks, PathFailed, run_paths
 from models.ensemble.statistics import deviation_with_error, quantile_with_interval
 from models.ensemble.workers import dask_workers, process_pool
 from models.systems.pitch_plane.noise_paths import NoisePaths, largest_difference, mujoco_threads, noise_paths
@@ -98,18 +98,18 @@ def test_drift_off_is_the_first_time_beyond_the_threshold(folder, expected):
 
 @pytest.mark.parametrize("block", [1, BLOCK, 50])
 def test_the_size_of_the_blocks_changes_nothing(folder, expected, block):
-    assert same(run_paths(job(folder), PATHS, blocks=Blocks(block)), expected)
+    assert same(run_paths(job(folder), PATHS, path_blocks=PathBlocks(block)), expected)
 
 
 @pytest.mark.parametrize("make", [lambda: ThreadPoolExecutor(2), Reversed], ids=["threads", "reversed"])
 def test_threads_and_order_change_nothing(folder, expected, make):
     with make() as executor:
-        assert same(run_paths(job(folder), PATHS, executor=executor, blocks=Blocks(BLOCK)), expected)
+        assert same(run_paths(job(folder), PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 def test_processes_change_nothing(folder, expected):
     with process_pool(2) as executor:
-        assert same(run_paths(job(folder), PATHS, executor=executor, blocks=Blocks(BLOCK)), expected)
+        assert same(run_paths(job(folder), PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 def test_a_dask_cluster_changes_nothing(folder, expected):
@@ -117,7 +117,7 @@ def test_a_dask_cluster_changes_nothing(folder, expected):
 
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local:  # noqa: SIM117
         with dask_workers(local.scheduler_address) as executor:
-            assert same(run_paths(job(folder), PATHS, executor=executor, blocks=Blocks(BLOCK)), expected)
+            assert same(run_paths(job(folder), PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 @pytest.mark.parametrize(
@@ -146,15 +146,15 @@ class ByOrder(NoisePaths):
 
 def test_noise_drawn_by_the_order_of_work_is_seen(folder):
     faulty = ByOrder(**vars(job(folder)))
-    one = run_paths(faulty, PATHS, blocks=Blocks(BLOCK))
+    one = run_paths(faulty, PATHS, path_blocks=PathBlocks(BLOCK))
     ByOrder.drawn = 0
     with Reversed() as executor:
-        assert not same(run_paths(faulty, PATHS, executor=executor, blocks=Blocks(BLOCK)), one)
+        assert not same(run_paths(faulty, PATHS, executor=executor, path_blocks=PathBlocks(BLOCK)), one)
 
 
 def test_progress_counts_paths_and_tells_the_time_left(folder):
     told = []
-    run_paths(job(folder), PATHS, blocks=Blocks(BLOCK), progress=told.append)
+    run_paths(job(folder), PATHS, path_blocks=PathBlocks(BLOCK), report_progress=told.append)
     assert [state.done for state in told] == [0, 3, 6, 9, 10]
     assert all(state.seconds_left == pytest.approx((10 - state.done) / state.rate) for state in told[1:])
     assert str(told[-1]).startswith("10 of 10 paths")
@@ -164,8 +164,9 @@ KILLED = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from test_ensemble import BLOCK, PATHS, Blocks, job, run_paths
-run_paths(job(Path({forces!r})), PATHS, Path({blocks!r}), blocks=Blocks(BLOCK), progress=lambda state: time.sleep(0.3))
+from test_ensemble import BLOCK, PATHS, PathBlocks, job, run_paths
+run_paths(job(Path({forces!r})), PATHS, Path({blocks!r}), blocks=PathBlocks(BLOCK), report_progress=lambda state:
+time.sleep(0.3))
 """
 
 
@@ -180,7 +181,9 @@ def test_a_killed_run_resumes_without_losing_a_block(folder, expected, tmp_path)
     kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("block*.npz")}
     assert 2 <= len(kept) < 4
     told = []
-    assert same(run_paths(job(folder), PATHS, tmp_path, blocks=Blocks(BLOCK), progress=told.append), expected)
+    assert same(
+        run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(BLOCK), report_progress=told.append), expected
+    )
     assert told[0].done == BLOCK * len(kept)
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
 
@@ -202,9 +205,9 @@ def test_an_interrupt_leaves_the_finished_blocks_and_begins_no_others(folder, ex
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), ThreadPoolExecutor(1) as executor:
-        run_paths(Counted(**vars(job(folder))), PATHS, tmp_path, executor, Blocks(1), stop)
+        run_paths(Counted(**vars(job(folder))), PATHS, tmp_path, executor, PathBlocks(1), stop)
     assert len(list(tmp_path.glob("block*.npz"))) == 2 and Counted.calls < PATHS / 2
-    assert same(run_paths(job(folder), PATHS, tmp_path, blocks=Blocks(1)), expected)
+    assert same(run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(1)), expected)
 
 
 def test_an_interrupt_while_workers_start_reaches_none_of_them():
@@ -220,11 +223,11 @@ def test_a_full_disk_ends_the_run_at_once_and_keeps_what_is_finished(folder, exp
     """What was half written is not there; with room again, the run goes on."""
     monkeypatch.setattr(whole_files.os, "fsync", _full_after(3))  # the note and two blocks
     with pytest.raises(RunFailed, match=r"the disk is full.*finished blocks are kept.*make room and resume"):
-        run_paths(job(folder), PATHS, tmp_path, blocks=Blocks(BLOCK))
+        run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(BLOCK))
     monkeypatch.undo()
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     assert {*kept} == {"job.json", ".lock", "block 000000.npz", "block 000001.npz"}
-    assert same(run_paths(job(folder), PATHS, tmp_path, blocks=Blocks(BLOCK)), expected)
+    assert same(run_paths(job(folder), PATHS, tmp_path, path_blocks=PathBlocks(BLOCK)), expected)
     assert all((tmp_path / name).stat().st_mtime_ns == when for name, when in kept.items() if name != ".lock")
 
 
@@ -288,13 +291,13 @@ def test_other_forces_other_equations_and_other_counts_are_refused(folder, tmp_p
 
 
 def test_a_damaged_block_is_named(folder, tmp_path):
-    run_paths(job(folder), 4, tmp_path, blocks=Blocks(2))
-    damaged = store.Store(tmp_path).path(1)
+    run_paths(job(folder), 4, tmp_path, path_blocks=PathBlocks(2))
+    damaged = store.BlockStore(tmp_path).path(1)
     content = bytearray(damaged.read_bytes())
     content[200] ^= 1
     damaged.write_bytes(content)
     with pytest.raises(InputError, match=r"block 000001\.npz: is damaged"):
-        run_paths(job(folder), 4, tmp_path, blocks=Blocks(2))
+        run_paths(job(folder), 4, tmp_path, path_blocks=PathBlocks(2))
 
 
 class Broken(NoisePaths):
@@ -311,11 +314,11 @@ class Broken(NoisePaths):
 def test_a_failure_names_path_and_block_and_loses_no_other(folder, expected, tmp_path):
     faulty = Broken(**vars(job(folder)))
     with ThreadPoolExecutor(2) as executor, pytest.raises(RunFailed) as caught:
-        run_paths(faulty, PATHS, tmp_path, executor, Blocks(BLOCK))
+        run_paths(faulty, PATHS, tmp_path, executor, PathBlocks(BLOCK))
     assert "block 1 (paths 3 to 5): path 4: ZeroDivisionError: a fault" in str(caught.value)
     assert len(list(tmp_path.glob("block*.npz"))) == 3
     Broken.broken = False
-    assert same(run_paths(faulty, PATHS, tmp_path, blocks=Blocks(BLOCK)), expected)
+    assert same(run_paths(faulty, PATHS, tmp_path, path_blocks=PathBlocks(BLOCK)), expected)
 
 
 def test_path_failures_survive_the_way_between_processes():

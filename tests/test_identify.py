@@ -12,8 +12,8 @@ from models.core.systems import load
 from models.core.tables import write_table
 from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
-from models.identification.of_scene import parameter_of_scene, problem_of
-from models.identification.problem import FitClock, Parameter, Problem, measured_channel
+from models.identification.of_scene import identification_problem_of, parameter_of_scene
+from models.identification.problem import FitClock, IdentificationProblem, IdentifiedParameter, measured_channel
 from models.identification.uncertainty import likelihood_profile, uncertainty
 from models.measured.drive import read_drive
 from models.measured.outliers import without_outliers
@@ -107,21 +107,23 @@ def test_estimates_are_the_truth_within_their_errors(scene: SingleTrackScene) ->
     """Over several noises the squared distances by their covariance are those of chi-square: not too small, either."""
     distances, inside = [], []
     for seed in range(6):
-        known = uncertainty(fit(problem_of(begun(scene), measured(scene, seed), KEYS, low_pass=5.0)))
+        known = uncertainty(
+            fit(identification_problem_of(begun(scene), measured(scene, seed), KEYS, low_pass_edge=5.0))
+        )
         assert known.fit.converged
-        off = (known.fit.values - TRUTH) / known.fit.problem.scale
+        off = (known.fit.values - TRUTH) / known.fit.problem.scales
         distances.append(float(off @ np.linalg.solve(known.covariance, off)))
         inside.append(np.abs(known.fit.values - TRUTH) < 2.0 * known.deviations)
     total = sum(distances)  # of chi-square with 24 freedoms 99.9 % lie below 52; errors are the larger of two estimates
     assert 3.0 < total < 52.0
     assert np.mean(inside) > 0.75
-    with_fault = (known.fit.values * 1.05 - TRUTH) / known.fit.problem.scale
+    with_fault = (known.fit.values * 1.05 - TRUTH) / known.fit.problem.scales
     assert with_fault @ np.linalg.solve(known.covariance, with_fault) > 52.0  # estimates 5 % off are seen
 
 
 def test_noise_that_stays_widens_errors(scene: SingleTrackScene) -> None:
     """Standard errors from coloured residuals are larger than those of white ones of the same size."""
-    problem = problem_of(scene, measured(scene), KEYS)
+    problem = identification_problem_of(scene, measured(scene), KEYS)
     white = uncertainty(fit(problem))
     random, coloured = np.random.default_rng(3), []
     for channel in problem.channels:
@@ -136,7 +138,7 @@ def test_what_data_do_not_determine_is_said(scene: SingleTrackScene) -> None:
     """Drag acts through the friction ellipse alone: the worst combination is its, and it is not determined."""
     keys = ["vehicle.mass", "vehicle.yaw_inertia", "vehicle.drag=-0.0:10.0"]
     blind = build(table(vehicle={**table()["vehicle"], "drag": 1.0}), "car.toml", Path(scene.folder))
-    known = uncertainty(fit(problem_of(blind, measured(scene), keys)))
+    known = uncertainty(fit(identification_problem_of(blind, measured(scene), keys)))
     error, direction = known.combinations()[-1]
     assert np.argmax(np.abs(direction)) == 2 or error > 1.0
     assert not known.is_determined[2]
@@ -148,18 +150,20 @@ def test_a_clock_that_is_late_is_told(scene: SingleTrackScene, late: float) -> N
     driven = run(scene)
     columns = {name: (UNITS[name], np.interp(TIMES - late, TIMES, driven[name])) for name in NOISE}
     write_table(Path(scene.folder) / "late.csv", {"time": ("s", TIMES), **columns})
-    known = uncertainty(fit(problem_of(begun(scene), Path(scene.folder) / "late.csv", ["vehicle.yaw_inertia"])))
+    known = uncertainty(
+        fit(identification_problem_of(begun(scene), Path(scene.folder) / "late.csv", ["vehicle.yaw_inertia"]))
+    )
     assert clock_delay(known) == pytest.approx(late, abs=0.1)  # the start has other tyres, which move the phase
     assert any("the measurement's clock seems" in line for line in identification_lines(known)) == (late > 0.0)
 
 
 def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
     """Another noise over the same drive lies inside of 95 % bands; bands of a quarter of the width do not hold it."""
-    known = uncertainty(fit(problem_of(begun(scene), measured(scene), KEYS, low_pass=5.0)))
+    known = uncertainty(fit(identification_problem_of(begun(scene), measured(scene), KEYS, low_pass_edge=5.0)))
     problem = known.fit.problem
     predicted = problem.predicted(known.fit.values)
     errors = [error_model(row - channel.values, row) for row, channel in zip(predicted, problem.channels, strict=True)]
-    fresh = problem_of(begun(scene), measured(scene, 7), KEYS, low_pass=5.0)
+    fresh = identification_problem_of(begun(scene), measured(scene, 7), KEYS, low_pass_edge=5.0)
     answer = error_bands(fresh, known, errors)
     assert np.all(answer.share_inside() > 0.9) and np.all(answer.share_inside() <= 0.995)
     assert np.all(answer.width() < 2.5)
@@ -187,12 +191,18 @@ def test_profile_of_a_straight_problem_is_a_parabola() -> None:
         return {"y": (times, values[0] + values[1] * times)}
 
     channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(400)), clock)
-    known = uncertainty(fit(Problem(model, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
+    known = uncertainty(
+        fit(
+            IdentificationProblem(
+                model, [IdentifiedParameter("a", 0.5), IdentifiedParameter("b", 1.0)], [channel], clock
+            )
+        )
+    )
     closed = np.linalg.inv(np.array([[400.0, times.sum()], [times.sum(), (times**2).sum()]])) * 0.01
     assert known.deviations == pytest.approx(np.sqrt(np.diag(closed)), rel=0.4)  # long-run scores scatter
     rises = likelihood_profile(known, 1)
     assert rises.is_quadratic
-    assert rises.rise == pytest.approx(rises.parabola, rel=0.02)
+    assert rises.misfit_rise == pytest.approx(rises.parabolic_rise, rel=0.02)
 
 
 def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
@@ -235,7 +245,7 @@ def test_a_measurement_of_other_channels_is_refused_before_the_long_run(tmp_path
     monkeypatch.setattr(wheelset_run, "run", counted)
     write_table(tmp_path / "other.csv", {"time": ("s", TIMES), "yaw rate of another": ("rad/s", TIMES)})
     with pytest.raises(InputError, match="no channel has the name"):
-        problem_of(scene, tmp_path / "other.csv", ["run.displacement"], "reference")
+        identification_problem_of(scene, tmp_path / "other.csv", ["run.displacement"], "reference")
     assert seconds and max(seconds) <= scene.run.duration / 50.0
 
 
@@ -244,11 +254,11 @@ def test_files_are_refused(scene: SingleTrackScene, tmp_path: Path) -> None:
     other = tmp_path / "other.csv"
     write_table(other, {"time": ("s", TIMES), "yaw": ("rad/s", TIMES)})
     with pytest.raises(InputError, match="no channel has the name"):
-        problem_of(scene, other, KEYS)
+        identification_problem_of(scene, other, KEYS)
     write_table(tmp_path / "late.csv", {"time": ("s", TIMES + 100.0), "yaw rate": ("rad/s", np.sin(TIMES))})
     with pytest.raises(InputError, match="share no time"):
-        problem_of(scene, tmp_path / "late.csv", KEYS)
+        identification_problem_of(scene, tmp_path / "late.csv", KEYS)
     with pytest.raises(InputError, match="half the sampling rate"):
-        problem_of(scene, measured(scene), KEYS, low_pass=30.0)
+        identification_problem_of(scene, measured(scene), KEYS, low_pass_edge=30.0)
     with pytest.raises(InputError, match="named twice"):
-        problem_of(scene, measured(scene), [KEYS[0], KEYS[0]])
+        identification_problem_of(scene, measured(scene), [KEYS[0], KEYS[0]])

@@ -21,7 +21,9 @@ def test_matrix_law_solves_its_differential_equation():
     """E[E]' = E[E] S (1/2 sum s^2 G^2) S^T, by central differences of the law between two periods."""
     walks, period, count = np.array([0.2, 0.5, 0.9]), 1e-4, 4000
     rates = turning_rates(count + 1, period)
-    before, middle, after = (unit.mean_error(walks, rates[: count + i], period, START_ATTITUDE) for i in (-1, 0, 1))
+    before, middle, after = (
+        unit.mean_error_rotation(walks, rates[: count + i], period, START_ATTITUDE) for i in (-1, 0, 1)
+    )
     true = rotation_matrix(unit.true_attitude(rates[:count], period, START_ATTITUDE)[-1])
     slope = middle @ true @ unit.noise_decay_matrix(walks) @ true.T
     # central differences: h^2 / 6 times the third derivative, and a rate that changes by 1e-4 from period to period
@@ -30,16 +32,16 @@ def test_matrix_law_solves_its_differential_equation():
 
 def test_matrix_law_at_rest_is_the_law_of_each_axis():
     """One noisy axis: cos of a normal angle, exp(-s^2 t / 2), across it and 1 along it."""
-    law = unit.mean_error(np.array([0.0, 0.7, 0.0]), np.zeros((50, 3)), 0.02, START_ATTITUDE)
+    law = unit.mean_error_rotation(np.array([0.0, 0.7, 0.0]), np.zeros((50, 3)), 0.02, START_ATTITUDE)
     across = np.exp(-0.49 / 2)
     assert law == pytest.approx(np.diag([across, 1.0, across]), abs=1e-14)
 
 
 def test_turning_matters_for_unequal_noise_only():
     walks, rates = np.array([0.1, 0.3, 0.6]), turning_rates(400, 5e-3)
-    resting, moving = (unit.mean_error(walks, own, 5e-3, START_ATTITUDE) for own in (0 * rates, rates))
+    resting, moving = (unit.mean_error_rotation(walks, own, 5e-3, START_ATTITUDE) for own in (0 * rates, rates))
     assert np.abs(moving - resting).max() > 0.05  # the noisy axis turns by a radian
-    equal = unit.mean_error(np.full(3, 0.4), rates, 5e-3, START_ATTITUDE)
+    equal = unit.mean_error_rotation(np.full(3, 0.4), rates, 5e-3, START_ATTITUDE)
     assert equal == pytest.approx(np.exp(-0.16 * 2.0) * np.eye(3), abs=1e-13)
 
 

@@ -12,7 +12,7 @@ from models.core.finding import Finding
 from models.core.tables import has_line_end
 from models.core.time_series import read_time_series, write_time_series
 from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.plausible import plausible
@@ -25,7 +25,7 @@ TWIN, DURATION, PERIOD = asymmetric_twin.PARAMETERS, 20.0, 1e-3
 WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
 LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEELS
 SIGNALS = tuple(
-    (Signal(axle, "f.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0),) for axle in ("front", "rear")
+    (MeasuredSignal(axle, "f.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0),) for axle in ("front", "rear")
 )
 
 

@@ -309,12 +309,12 @@ def test_a_measurement_that_contradicts_the_forces_is_refused(folder, wrong):
 
 def test_right_innovations_are_called_wrong_as_seldom_as_stated():
     rng, runs = np.random.default_rng(7), 3000
-    wrong = sum(not consistency(rng.standard_normal((400, 2)), ("pitch", "rate")).consistent for _ in range(runs))
+    wrong = sum(not consistency(rng.standard_normal((400, 2)), ("pitch", "rate")).is_consistent for _ in range(runs))
     # 3 of 3000 are expected; the tests of a run hang together a little; Poisson: more than 10 are seen once in 3000
     assert wrong <= 10 and FALSE_ALARM_SHARE == 1e-3
     gaps = rng.standard_normal((4000, 1))
     gaps[rng.random(4000) < 0.3] = np.nan
-    assert consistency(gaps, ("pitch",)).consistent
+    assert consistency(gaps, ("pitch",)).is_consistent
 
 
 @pytest.mark.parametrize(
@@ -328,7 +328,7 @@ def test_right_innovations_are_called_wrong_as_seldom_as_stated():
 )
 def test_wrong_innovations_are_named(plant, named):
     found = consistency(plant(np.random.default_rng(8).standard_normal((2000, 1))), ("pitch",))
-    assert not found.consistent and named in str(found)
+    assert not found.is_consistent and named in str(found)
 
 
 def measured_pitch(folder, bias=0.0):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.advice.choice.systems.ride import opened
+from models.advice.choice.systems.ride import copies_of_scene
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import scene_without
 from models.engines import reference
@@ -328,7 +328,7 @@ def test_the_answer_of_a_ride_that_lifts_is_that_of_its_copies(tmp_path):
 
 
 def test_a_choice_of_effects_runs_in_time_and_may_leave_it_out():
-    whole = opened(ride_scene("half_car", options={"copies": 12, "lasting": 1.0}))
+    whole = copies_of_scene(ride_scene("half_car", options={"copies": 12, "lasting": 1.0}))
     assert "lift_off" in whole.effect_names
     pace = whole.steps_at_speeds[0]
     assert whole.vehicle(pace).lifts and not whole.without(["lift_off"]).vehicle(pace).lifts

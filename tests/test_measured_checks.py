@@ -20,11 +20,11 @@ from models.measured.checks import (
     turning,
     weight,
 )
-from models.measured.checks.evidence import Evidence
+from models.measured.checks.evidence import CheckedRecording
 from models.measured.checks.response import SensorResponse
 from models.measured.checks.spectra import windowed_means
-from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults
+from models.measured.columns import SampleFile
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal, TransducerPlace
@@ -52,18 +52,18 @@ def made(folder: Path, **columns: np.ndarray) -> Recording:
     """A recording of nothing but these columns, named quantity_component."""
     kinds: dict[str, Quantity] = {"acc": "acceleration", "angle": "angle", "rate": "angular rate", "force": "force"}
     signals = tuple(
-        Signal(name, "", name, kinds[name.split("_")[0]], "body", name.split("_")[1], "body", 1, "", 1.0)
+        MeasuredSignal(name, "", name, kinds[name.split("_")[0]], "body", name.split("_")[1], "body", 1, "", 1.0)
         for name in columns
     )
     values = np.column_stack(list(columns.values()))
-    own = Columns(folder / "made.columns", tuple(columns), len(values))
+    own = SampleFile(folder / "made.columns", tuple(columns), len(values))
     own.write(0, values)
     return Recording(signals, own, PERIOD)
 
 
 def said(check_one, recording: Recording, **claimed: float) -> list[Finding]:
     """What one check finds without a vehicle, notes left out."""
-    return [one for one in check_one(Evidence(recording, None, {}, claimed)) if one.weight != "note"]
+    return [one for one in check_one(CheckedRecording(recording, None, {}, claimed)) if one.weight != "note"]
 
 
 def white(count: int = 5000, seed: int = 3) -> np.ndarray:
@@ -73,7 +73,7 @@ def white(count: int = 5000, seed: int = 3) -> np.ndarray:
 
 @pytest.mark.parametrize("seconds", [1.0, 1.5, 3.0])
 def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=bench.NOISE), 3)[: round(seconds / PERIOD)]
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE), 3)[: round(seconds / PERIOD)]
     turning_alone = [i for i, s in enumerate(ridden.signals) if s.quantity != "acceleration"]
     few = replace(ridden, signals=tuple(ridden.signals[i] for i in turning_alone))
     assert not bench.errors_and_doubts(few, samples[:, turning_alone], tmp_path)
@@ -95,7 +95,7 @@ def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
 
 
 def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
-    assert not bench.errors_and_doubts(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path)
+    assert not bench.errors_and_doubts(ridden, ridden.samples(SimulatedFaults(noise=bench.NOISE), 5), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
 )
 def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, tmp_path):
     # the mean moment of the hub forces is what the gyros say that it must be
-    (found,) = bench.errors_and_doubts(ridden, ridden.samples(Faults(noise=bench.NOISE, **fault), 5), tmp_path)
+    (found,) = bench.errors_and_doubts(ridden, ridden.samples(SimulatedFaults(noise=bench.NOISE, **fault), 5), tmp_path)
     assert found.check == check_name and found.size == pytest.approx(size, rel=0.2) and "offset of" in found.text
 
 
@@ -113,7 +113,7 @@ def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, t
 )
 def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
     """Hubs as a whole were looked for, and a sign, or a delay, that would not have helped was named instead."""
-    samples = ridden.samples(Faults(noise=bench.NOISE), 5)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE), 5)
     one, other = bench.column_numbers(ridden, *pair)
     samples[:, [one, other]] = samples[:, [other, one]]
     found = bench.errors_and_doubts(ridden, samples, tmp_path)
@@ -129,17 +129,17 @@ def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
 
 def test_an_angle_and_a_rate_of_different_axes_have_no_sign_to_turn(ridden, tmp_path):
     """Their ratio is chance: the sign of one was called wrong, and the run stopped with a remedy that does not help."""
-    samples = ridden.samples(Faults(noise=bench.NOISE), 5)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE), 5)
     one, other = bench.column_numbers(ridden, "roll", "pitch")
     samples[:, [one, other]] = samples[:, [other, one]]
     own = recording_of_samples(ridden, samples, tmp_path / "a.columns")
     for vehicle in (ridden.vehicle, None):
-        found = [f for f in turning.check(Evidence(own, vehicle)) if f.weight != "note"]
+        found = [f for f in turning.check(CheckedRecording(own, vehicle)) if f.weight != "note"]
         assert all(f.weight == "doubt" and "is not the derivative" in f.text for f in found)
 
 
 def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_path):
-    own = recording_of_samples(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path / "a.columns")
+    own = recording_of_samples(ridden, ridden.samples(SimulatedFaults(noise=bench.NOISE), 5), tmp_path / "a.columns")
     notes = [f.text for f in check(own, ridden.vehicle) if f.check == "exchanged"]
     assert len(notes) == 1 and "fl_my with fr_my" in notes[0] and "fl_fz with fr_fz" not in notes[0]
 
@@ -147,7 +147,7 @@ def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_pat
 @pytest.mark.parametrize("count, period", [(200, 2e-6), (1000, 2.0), (110, 1e-3), (100, 5e-4), (300, 1e-3)])
 def test_recordings_with_no_line_or_few_in_the_band_of_the_motion(ridden, tmp_path, count, period):
     """Times of another unit, and short ones: the spectra had no line, which ended in a traceback."""
-    own = recording_of_samples(ridden, ridden.samples(Faults(), 1)[:count], tmp_path / "a.columns")
+    own = recording_of_samples(ridden, ridden.samples(SimulatedFaults(), 1)[:count], tmp_path / "a.columns")
     check(replace(own, period=period), ridden.vehicle)
 
 
@@ -184,9 +184,11 @@ def test_a_clock_that_is_fast_is_named_and_nothing_else(tmp_path):
 
 
 def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
-    values = [ridden.samples(Faults(noise=bench.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
+    values = [ridden.samples(SimulatedFaults(noise=bench.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
     clean, off = (
-        weight.mean_hub_moments(Evidence(recording_of_samples(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
+        weight.mean_hub_moments(
+            CheckedRecording(recording_of_samples(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle)
+        )
         for i, own in enumerate(values)
     )
     arm = rigid_vehicle(ridden.vehicle).arms[0]
@@ -194,12 +196,12 @@ def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
 
 
 def test_hub_forces_explain_the_motion_through_the_vehicle_and_only_with_their_signs(ridden, tmp_path):
-    clean = ridden.samples(Faults(), 1)
+    clean = ridden.samples(SimulatedFaults(), 1)
     share = {}
     for sign in (1, -1):
         clean[:, bench.column_numbers(ridden, "fl_fy", "fr_fy", "rl_fy", "rr_fy")] *= sign
         own = recording_of_samples(ridden, clean, tmp_path / f"{sign}.columns")
-        agreement = Evidence(own, ridden.vehicle).agreement
+        agreement = CheckedRecording(own, ridden.vehicle).agreement
         assert agreement is not None
         share[sign] = agreement.median_unexplained()
     assert share[1] < 0.15 < 0.5 < share[-1]  # what is left: windows cut the spectra, and the vehicle is not linear
@@ -210,9 +212,9 @@ def test_slow_forces_on_a_free_vehicle_are_felt_as_force_by_mass(axis):
     # at 0.01 Hz nothing inside the car moves: 1 N shared out as the loads are makes 1 / m at the centre of mass, along
     # y too, where the vehicle rolls far and what a sensor feels of its weight takes the sideways acceleration back
     car, whole = r19(), rigid_vehicle(r19())
-    felt = Signal("a", "", "a", "acceleration", "body", "xyz"[axis], "body", 1, "m/s^2", 1.0)
+    felt = MeasuredSignal("a", "", "a", "acceleration", "body", "xyz"[axis], "body", 1, "m/s^2", 1.0)
     place = TransducerPlace("body", tuple(whole.centre))
-    response = SensorResponse(car, "hub").at(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]
+    response = SensorResponse(car, "hub").transfer_functions(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]
     assert (response @ car.loads / car.loads.sum()).real == pytest.approx(1 / whole.mass, rel=1e-3)
 
 
@@ -265,7 +267,7 @@ def test_a_spike_is_named_with_its_height_and_noise_is_none(width, tmp_path):
 
 def test_a_spike_does_not_hide_an_error_of_its_channel(ridden, tmp_path):
     """One sample, of which a doubt is told, in a channel in kN that stops the run."""
-    samples = ridden.samples(Faults(noise=bench.NOISE), 5)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE), 5)
     samples[1000, bench.column_numbers(ridden, "rr_fz")] += 5e4
     samples[:, bench.column_numbers(ridden, "rr_fz")] *= 1e-3
     assert {(one.check, one.weight) for one in bench.errors_and_doubts(ridden, samples, tmp_path)} >= {
@@ -323,7 +325,7 @@ def test_the_mean_of_a_windowed_record_is_as_good_as_it_says():
 
 @pytest.mark.parametrize(("ratio", "kind"), [(1.02, "gain"), (1e3, "unit"), (-1.0, "sign"), (0.5, "size")])
 def test_a_ratio_says_what_is_wrong(ratio, kind):
-    own = Signal("fz", "", "fz", "force", "fl", "z", "hub", 1, "kN", 1e3)
+    own = MeasuredSignal("fz", "", "fz", "force", "fl", "z", "hub", 1, "kN", 1e3)
     assert probable_mistake(ratio, own)[0] == kind
     assert kind != "unit" or probable_mistake(ratio, own)[1] == "N taken for kN"
 
@@ -332,10 +334,10 @@ def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp
     pytest.importorskip("matplotlib")
     from studies.recording_figures import figure_of_finding
 
-    samples = ridden.samples(Faults(noise=bench.NOISE, delay={"fl_fz": 3e-3}), 1)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE, delay={"fl_fz": 3e-3}), 1)
     samples[:, bench.column_numbers(ridden, "rr_fz")] *= 1e-3
     samples[500:700, bench.column_numbers(ridden, "rl_mz")] = 0.0
-    evidence = Evidence(recording_of_samples(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
+    evidence = CheckedRecording(recording_of_samples(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
     drawn = {
         one.check
         for i, one in enumerate(findings_of_all_checks(evidence))
@@ -370,7 +372,7 @@ def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden,
 
 @pytest.mark.parametrize("hubs, lever", [(("fl", "fr", "rl", "rr"), -0.3), (("rr",), -0.34), (("fl", "fr"), 0.3)])
 def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=bench.NOISE), bench.SEED)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE), bench.SEED)
     bench.moments_about_point(lever, *hubs)(ridden, samples)
     said = bench.errors_and_doubts(ridden, samples, tmp_path)
     assert [one.check for one in said] == ["lever"]
@@ -384,7 +386,7 @@ def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp
     [({}, ""), ({"pitch_rate": 3e-3}, "innovations of pitch "), ({"roll_rate": -5e-3}, "innovations of roll ")],
 )
 def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=bench.NOISE, bias=bias), bench.SEED)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE, bias=bias), bench.SEED)
     own = recording_of_samples(ridden, samples, tmp_path / "a.columns")
     inputs = RecordingInputs(own, ridden.vehicle)
     forces = np.tile(np.repeat([bench.NOISE["force"], bench.NOISE["moment"]], 3), 4)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from models.core.finding import Finding
-from models.drift.score import Verdict, root_mean_square
+from models.drift.score import StabilisedRunVerdict, root_mean_square
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
-from models.measured.faults_of_measurement import Faults
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.recording import Recording
 from models.systems.measured.consequences import (
     DAMAGE_LIMITS,
@@ -40,7 +40,7 @@ def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> SectionOut
 
 def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path) -> tuple[Consequence, float, float]:
     """The consequence of a finding, and what the planted fault really does to the force of a spring."""
-    samples = [ridden.samples(Faults(**one, noise=bench.NOISE), bench.SEED) for one in (faults, {})]
+    samples = [ridden.samples(SimulatedFaults(**one, noise=bench.NOISE), bench.SEED) for one in (faults, {})]
     own, right = (recording_of_samples(ridden, values, folder / f"{i}.columns") for i, values in enumerate(samples))
     answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
     (found,) = consequences([finding], own, partial(made, ridden), answers, folder / "work")
@@ -74,7 +74,7 @@ def test_a_wrong_factor_is_judged_by_what_it_does(ridden, tmp_path):
 
 
 def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=bench.NOISE), bench.SEED)
+    samples = ridden.samples(SimulatedFaults(noise=bench.NOISE), bench.SEED)
     grades = []
     for length, every in ((2, 1000), (40, 60)):
         lossy = samples.copy()
@@ -92,7 +92,7 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
 
 
 def test_words_follow_the_bounds():
-    finding, good = Finding("shift", "doubt", "fl", ""), Verdict("accepted", "held")
+    finding, good = Finding("shift", "doubt", "fl", ""), StabilisedRunVerdict("accepted", "held")
     one = Consequence(finding, "a", FORCE_LIMITS[0], 1.0 + 0.9 * DAMAGE_LIMITS[0])
     several = (
         one,
@@ -105,5 +105,5 @@ def test_words_follow_the_bounds():
     assert words == ["accepted", "accepted with doubt", "rejected", "rejected", "accepted with doubt"]
     assert (
         verdict_with_consequences(good, []) is good
-        and verdict_with_consequences(Verdict("stabilise", ""), [one]).word == "stabilise"
+        and verdict_with_consequences(StabilisedRunVerdict("stabilise", ""), [one]).word == "stabilise"
     )

@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from models.advice.choice.choose import Chooser
+from models.advice.choice.choose import EffectChooser
 from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
 from models.core.result import load as load_result
 from models.core.scene_effects import absent_effects, named_effects, scene_without, with_effects
 from models.core.systems import load
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.systems import run
 from models.systems.measured.scene import build
 from studies.command.asked import SCENES_FOLDER
@@ -68,7 +68,7 @@ def test_a_recording_is_run_as_every_scene_is_and_its_result_says_where_its_samp
     assert np.array_equal(saved["left seat F"].values, result["left seat F"]) and saved["left seat F"].units == "N"
     assert json.loads(saved.scene_table) == scene.table() and "commit" in json.loads(saved.provenance)
     names = tuple(json.loads(saved.columns_of))
-    columns = Columns(tmp_path / saved.attrs["columns"], names, len(result.times))
+    columns = SampleFile(tmp_path / saved.attrs["columns"], names, len(result.times))
     assert np.array_equal(columns.read("left seat F"), result["left seat F"])
     assert result.counts()["force calls"] == 4 * result.counts()["steps"] == 720
 
@@ -111,7 +111,7 @@ def test_auto_leaves_out_what_the_question_does_not_see():
         tolerance=0.02,
         virtual={"duration": 0.18, "format": "csv", "faults": faults},
     )
-    choice = Chooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
+    choice = EffectChooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
     assert choice.left_out == ("sensor_noise",) and choice.within_tolerance
 
 

@@ -14,7 +14,7 @@ from models.core.signals import Sampled
 from models.fatigue.counting import counted_load
 from models.fatigue.damage import turning_points
 from models.fatigue.rainflow_cycles import rainflow_cycles
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import StatedDeviations, TiltFilter
 from models.systems.measured.hand_on import write_section_forces
@@ -52,7 +52,7 @@ def whole(tmp_path_factory):
 def changed(own: SectionRunSettings, folder, change) -> SectionRunSettings:
     """The run of a recording whose samples (n, signals) are changed."""
     values = own.recording.columns.block(own.recording.columns.names, 0, own.recording.count)
-    columns = Columns(folder / "changed.f64", own.recording.columns.names, own.recording.count)
+    columns = SampleFile(folder / "changed.f64", own.recording.columns.names, own.recording.count)
     columns.write(0, change(values))
     return replace(own, recording=replace(own.recording, columns=columns))
 
@@ -65,7 +65,7 @@ class Killed(BaseException):
 @pytest.mark.parametrize("time", [1, 3])
 def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monkeypatch, moment, time):
     own, _, bits = whole
-    calls, save, write = [0], Checkpoint.save, Columns.write
+    calls, save, write = [0], Checkpoint.save, SampleFile.write
 
     def now(at):
         calls[0] += at == moment
@@ -87,7 +87,7 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
 
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "save", saved)
-        patch.setattr(Columns, "write", written)
+        patch.setattr(SampleFile, "write", written)
         with pytest.raises(Killed):
             run(own, tmp_path / "run", block_duration=0.04)
     told = list[float]()
@@ -176,7 +176,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
     names = [signal.name for signal in signals]
     angles = true[:, [names.index("roll"), names.index("pitch")]]
     made = np.cumsum(RecordingInputs(own.recording, own.vehicle).tilt(0, 201)[:, 2:], axis=0)
-    assert own.recording.find("angular rate", component="roll")[0].frame == "body"
+    assert own.recording.find_signals("angular rate", component="roll")[0].frame == "body"
     assert np.abs(made[-1] * 1e-3 - (angles[200] - angles[0])).max() < 5e-4  # noise of 5e-3 rad/s, 200 samples: 7e-5
 
 
@@ -216,7 +216,7 @@ def test_a_check_channel_with_a_wrong_gain_shows_it(whole):
     signal, answer = next(pair for pair in channels_to_compare(own) if pair[0].name == "front left_force")
     true = outcome.samples(answer)
     names = own.recording.columns.names
-    columns = Columns(outcome.columns.path.with_name("gain.f64"), names, own.recording.count)
+    columns = SampleFile(outcome.columns.path.with_name("gain.f64"), names, own.recording.count)
     values = own.recording.columns.block(names, 0, own.recording.count)
     values[:, names.index(signal.name)] = true / 1.1
     columns.write(0, values)
@@ -242,7 +242,9 @@ def test_sections_are_named_and_their_files_are_not_overwritten(whole, tmp_path)
 
 def test_accelerometers_feel_gravity_and_motion(whole):
     own, outcome, _ = whole
-    signals = tuple(replace(s, at="engine", gravity=False) for s in own.recording.find("acceleration", "acc fl"))
+    signals = tuple(
+        replace(s, at="engine", gravity=False) for s in own.recording.find_signals("acceleration", "acc fl")
+    )
     assert accelerometer_points(own.vehicle, signals, {}) == (
         AccelerometerPoint("engine", "engine", (0.95, 0.0, 0.55), gravity=False),
     )

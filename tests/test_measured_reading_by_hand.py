@@ -9,14 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from models.measured.channel import Channel
+from models.measured.channel import FileChannel
 from models.measured.checks.spectra import white_noise
-from models.measured.columns import Columns, MemoryColumns
-from models.measured.faults_of_measurement import Faults, measured_samples
+from models.measured.columns import SampleFile, SamplesInMemory
+from models.measured.faults_of_measurement import SimulatedFaults, measured_samples
 from models.measured.formats import open_source
 from models.measured.gaps import bridged_signals, filled_samples, without_impossible_values
 from models.measured.recording import Recording
-from models.measured.signal import Signal, TransducerPlace
+from models.measured.signal import MeasuredSignal, TransducerPlace
 from models.measured.timing import sample_timing
 from models.measured.units import factor_to_si
 from models.systems.measured.channel_map import find_channel, mapped_signals
@@ -33,17 +33,17 @@ HUBS = ("fl", "fr", "rl", "rr")
 
 def signal_of(name="fl", quantity="force", at="fl", component="z", frame="inertial", sign=1, factor=1.0, zero=0.0):
     """A signal that a file calls as the recording does."""
-    return Signal(name, "a.csv", name, quantity, at, component, frame, sign, "N", factor, zero=zero)
+    return MeasuredSignal(name, "a.csv", name, quantity, at, component, frame, sign, "N", factor, zero=zero)
 
 
 def recording_of(samples, period=PERIOD):
     """A recording in memory; samples : values (n,) by signal."""
     names = tuple(signal.name for signal in samples)
-    return Recording(tuple(samples), MemoryColumns(names, np.column_stack([*samples.values()])), period)
+    return Recording(tuple(samples), SamplesInMemory(names, np.column_stack([*samples.values()])), period)
 
 
 def test_columns_read_the_doubles_of_their_file(tmp_path):
-    columns = Columns(tmp_path / "c.bin", ("a", "b"), 4)
+    columns = SampleFile(tmp_path / "c.bin", ("a", "b"), 4)
     (tmp_path / "c.bin").write_bytes(struct.pack("<8d", *(k + 0.5 for k in range(8))))
     assert columns.read("a").tolist() == [0.5, 1.5, 2.5, 3.5]
     assert columns.read("b", 1, 2).tolist() == [5.5, 6.5]
@@ -54,7 +54,7 @@ def test_a_recording_hands_on_the_samples_and_the_signals_that_it_has():
     recording = recording_of({force: np.array([1.5, -2.5, 3.5, 0.5]), roll: np.full(4, 0.25)}, 0.25)
     assert recording.duration == 0.75
     assert recording.samples(force).tolist() == [1.5, -2.5, 3.5, 0.5]
-    assert recording.find("force", "fl", "z") == (force,) and recording.find("angle") == (roll,)
+    assert recording.find_signals("force", "fl", "z") == (force,) and recording.find_signals("angle") == (roll,)
 
 
 def test_even_times_have_the_period_of_their_clock():
@@ -94,7 +94,7 @@ def test_whole_numbers_of_an_mdf_file_become_values_by_its_line(tmp_path):
     """Counts k with the conversion 0.25 k - 3.0 kN."""
     asammdf = pytest.importorskip("asammdf")
     times, counts, file = 0.5 + PERIOD * np.arange(50), np.arange(50, dtype=np.uint16), asammdf.MDF(version="4.10")
-    file.append([asammdf.Signal(counts, times, name="fz", unit="kN", conversion={"a": 0.25, "b": -3.0})])
+    file.append([asammdf.MeasuredSignal(counts, times, name="fz", unit="kN", conversion={"a": 0.25, "b": -3.0})])
     file.save(tmp_path / "a.mf4")
     source = open_source(tmp_path / "a.mf4")
     (channel,), (block,) = source.channels, source.blocks(["fz"])
@@ -146,10 +146,13 @@ def test_noise_of_an_impulse_is_that_of_its_flat_spectrum():
 
 def test_noise_that_is_added_has_the_deviation_of_its_fault():
     """Within 4 deviations, 0.45 %, of the deviation of 400,000 numbers."""
-    faults = Faults(noise={"force": 2.0}, gain={"fl": 0.25})
+    faults = SimulatedFaults(noise={"force": 2.0}, gain={"fl": 0.25})
     samples = measured_samples(faults, (signal_of(),), np.zeros((400_000, 1)), 1e-3, 1, 7)
     assert samples.std() == pytest.approx(2.0, rel=0.0045)
-    assert measured_samples(Faults(gain={"fl": 0.25}), (signal_of(),), np.full((9, 1), 2.0), 1e-3, 1, 7)[4, 0] == 2.5
+    assert (
+        measured_samples(SimulatedFaults(gain={"fl": 0.25}), (signal_of(),), np.full((9, 1), 2.0), 1e-3, 1, 7)[4, 0]
+        == 2.5
+    )
 
 
 def mapped(channel, at, quantity="force", component="z", **more):
@@ -163,8 +166,8 @@ def scene_of(folder: Path, *files, **tables):
     return build({**table, "stabilise": {"method": "none"}, **tables}, "scene.toml", folder)
 
 
-CHANNEL = Channel("fl", "kN", "", 0, 10, 0.0625, 0.5)
-SOURCE = SimpleNamespace(path=Path("a.csv"), channels=(CHANNEL, Channel("fr", "kN", "", 0, 10, 0.0625, 0.25)))
+CHANNEL = FileChannel("fl", "kN", "", 0, 10, 0.0625, 0.5)
+SOURCE = SimpleNamespace(path=Path("a.csv"), channels=(CHANNEL, FileChannel("fr", "kN", "", 0, 10, 0.0625, 0.25)))
 
 
 def test_a_channel_is_found_as_its_file_has_it():

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from models.core.strict import read
 from models.fatigue.counting import CountedLoad
-from models.measured.columns import Columns, MemoryColumns
-from models.measured.faults_of_measurement import Faults
+from models.measured.columns import SampleFile, SamplesInMemory
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.recording import Recording
-from models.measured.signal import Signal, TransducerPlace
+from models.measured.signal import MeasuredSignal, TransducerPlace
 from models.multibody.cut_table import joints
 from models.systems.hub_forces.measurement import element_travels
 from models.systems.measured.hand_on import labelled_result
@@ -93,7 +93,7 @@ def test_a_car_that_is_pushed_without_a_turn_moves_along_a_cubic(engine, tmp_pat
 
 def signal_of(name, quantity="force", at="fl", component="z", frame="hub"):
     """A signal in SI units that a file calls as the recording does."""
-    return Signal(name, "a.csv", name, quantity, at, component, frame, 1, "N", 1.5, zero=0.25)
+    return MeasuredSignal(name, "a.csv", name, quantity, at, component, frame, 1, "N", 1.5, zero=0.25)
 
 
 def standing(count=120, **angles):
@@ -104,7 +104,7 @@ def standing(count=120, **angles):
         quantity, frame = ("angular rate", "body") if rate else ("angle", "inertial")
         samples[signal_of(name, quantity, "body", component, frame)] = value
     names = tuple(signal.name for signal in samples)
-    return Recording(tuple(samples), MemoryColumns(names, np.tile([*samples.values()], (count, 1))), PERIOD)
+    return Recording(tuple(samples), SamplesInMemory(names, np.tile([*samples.values()], (count, 1))), PERIOD)
 
 
 def test_a_run_is_held_to_the_angles_that_were_measured(tmp_path):
@@ -169,7 +169,7 @@ def test_behind_a_guide_of_a_car_acts_what_the_guided_body_bears():
 
 def test_a_result_has_the_samples_and_the_counts_of_its_section_forces(tmp_path):
     force, travel = SectionChannel("a F", "N", "", "a"), SectionChannel("a travel", "m", "", "a")
-    columns = Columns(tmp_path / "run.f64", ("a F", "a travel"), 4)
+    columns = SampleFile(tmp_path / "run.f64", ("a F", "a travel"), 4)
     columns.write(0, np.array([[3.5, 0.5], [-4.5, 0.25], [3.5, 0.5], [-4.5, 0.125]]))
     outcome = SectionOutcome(columns, (force, travel), 0.25, 3, np.nan, ())
     no_levels = np.empty(0)
@@ -258,4 +258,4 @@ def test_a_virtual_measurement_begins_at_rest_with_the_weight_on_its_wheels():
     assert first["left seat_force"] == pytest.approx(60.0 * GRAVITY, rel=1e-9)
     assert first["dash_az"] == pytest.approx(GRAVITY, abs=1e-3)  # the road begins gently
     assert (virtual.step, virtual.period, virtual.stride, virtual.errors) == (1e-3, PERIOD, 2, {})
-    assert virtual.samples(Faults(), 1).tolist() == virtual.values[::2].tolist()
+    assert virtual.samples(SimulatedFaults(), 1).tolist() == virtual.values[::2].tolist()

@@ -8,11 +8,11 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.result import load as load_result
-from models.measured.channel import Channel
+from models.measured.channel import FileChannel
 from models.measured.formats import open_source
 from models.measured.gaps import without_impossible_values
 from models.measured.resampling import resample_to
-from models.measured.signal import Places, Signal
+from models.measured.signal import MeasuredSignal, MeasurementPlaces
 from models.measured.timing import sample_timing
 from models.measured.units import factor_to_si
 from models.systems.measured.channel_map import mapped_signals
@@ -24,7 +24,7 @@ from studies.command.summary_numbers import summary_scalars
 from studies.recording import run
 
 HUBS = ("fl", "fr")
-PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))
+PLACES = MeasurementPlaces(HUBS, ("body",), ("front left",), ("dash",))
 
 
 @pytest.mark.parametrize(
@@ -238,7 +238,7 @@ def test_a_wrong_unit_and_a_rough_road_are_no_marks(tmp_path):
     t = np.arange(1000) * 1e-3
     load = 3e3 * (1 + 0.5 * np.sin(20 * t))
     for values in (1e3 * load, np.where(np.arange(1000) == 500, 9e4, load)):
-        signal = Signal("fl", "a.csv", "fl", "force", "fl", "z", "hub", 1, "N", 1.0)
+        signal = MeasuredSignal("fl", "a.csv", "fl", "force", "fl", "z", "hub", 1, "N", 1.0)
         kept, said = without_impossible_values(signal, values, t)
         assert said is None and kept is values
 
@@ -313,7 +313,7 @@ def test_a_missing_wheel_or_angle_is_refused_before_anything_runs(tmp_path):
     ],
 )
 def test_guesses(name, unit, found):
-    own = guess_channel(Channel(name, unit, "", 0, 10, None))
+    own = guess_channel(FileChannel(name, unit, "", 0, 10, None))
     assert (own and (own.quantity, own.at, own.component)) == found
 
 
@@ -332,9 +332,9 @@ def test_guesses(name, unit, found):
     ],
 )
 def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit, family, reason):
-    own = guess_channel(Channel(name, unit, "", 0, 10, None, family=family))
+    own = guess_channel(FileChannel(name, unit, "", 0, 10, None, family=family))
     assert own.at == "" and f"({reason}" in own.left_out
-    own = guess_channel(Channel("Unheard of FL", "N", "", 0, 10, None))
+    own = guess_channel(FileChannel("Unheard of FL", "N", "", 0, 10, None))
     assert "'unheard'" in own.left_out
     t = np.arange(200) * 1e-2
     write_csv(tmp_path / "a.csv", t, **{"FL_Fz__N": t, f"{name}__{unit}": t})
@@ -354,7 +354,7 @@ def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit,
     ],
 )
 def test_groups_and_words_that_only_sound_like_parts_are_guessed(name, unit, family, at):
-    own = guess_channel(Channel(name, unit, "", 0, 10, None, family=family))
+    own = guess_channel(FileChannel(name, unit, "", 0, 10, None, family=family))
     assert own.at == at and not own.left_out
 
 

@@ -9,8 +9,8 @@ from scipy.signal import lfilter
 
 from models.core.errors import InputError
 from models.core.strict import read
-from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults, check_faults, measured_samples
+from models.measured.columns import SampleFile
+from models.measured.faults_of_measurement import SimulatedFaults, check_faults, measured_samples
 from models.measured.gaps import filled_samples
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
@@ -48,12 +48,14 @@ def driven(car: CutVehicle) -> VirtualMeasurement:
     return virtual_measurement(car, read(VirtualTable, table, ""), "mujoco")
 
 
-def _signal(channel: str, what: Quantity = "force", at: str = "fl", component: str = "z") -> Signal:
-    return Signal(channel, "", channel, what, at, component, "inertial", 1, "N", 1.0)
+def _signal(channel: str, what: Quantity = "force", at: str = "fl", component: str = "z") -> MeasuredSignal:
+    return MeasuredSignal(channel, "", channel, what, at, component, "inertial", 1, "N", 1.0)
 
 
-def _faulty(faults: dict[str, object], signals: tuple[Signal, ...], truth: np.ndarray, path: int = 0) -> np.ndarray:
-    return measured_samples(read(Faults, faults, ""), signals, truth, 1e-3, 2, 7, path)
+def _faulty(
+    faults: dict[str, object], signals: tuple[MeasuredSignal, ...], truth: np.ndarray, path: int = 0
+) -> np.ndarray:
+    return measured_samples(read(SimulatedFaults, faults, ""), signals, truth, 1e-3, 2, 7, path)
 
 
 WAVE = np.sin(2 * np.pi * 3.0 * 1e-3 * np.arange(8001))
@@ -101,9 +103,9 @@ def test_a_converter_rounds_and_a_silent_transducer_loses_all_its_channels() -> 
 
 def test_names_that_no_signal_has_are_refused() -> None:
     with pytest.raises(InputError, match="did you mean 'force'"):
-        check_faults(read(Faults, {"noise": {"forse": 1.0}}, ""), TWO)
+        check_faults(read(SimulatedFaults, {"noise": {"forse": 1.0}}, ""), TWO)
     with pytest.raises(InputError, match="must be 0 or more"):
-        check_faults(read(Faults, {"delay": {"a": -1e-3}}, ""), TWO)
+        check_faults(read(SimulatedFaults, {"delay": {"a": -1e-3}}, ""), TWO)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +150,9 @@ def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, t
     rows = StepGrid(1e-3, 2e-3).cubic_rows(samples, 30)[:, 0]
     fine = np.arange(30) / 4
     assert np.abs(rows - (2.0 - fine + 0.3 * fine**2 - 0.05 * fine**3)).max() < 1e-13
-    inputs = RecordingInputs(recording_of_samples(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
+    inputs = RecordingInputs(
+        recording_of_samples(driven, driven.samples(SimulatedFaults(), 1), tmp_path / "c.bin"), car
+    )
     start, end = inputs.wrenches_with_neighbours(0, 4), inputs.wrenches_with_neighbours(inputs.recording.count - 4, 4)
     assert (inputs.wrenches_with_neighbours(5, 4) == inputs.wrenches(4, 7)).all()
     assert np.allclose(start[0], 2 * start[1] - start[2]) and len(start) == len(end) == 7
@@ -236,7 +240,7 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> Recording:
         (_signal("pitch", "angle", "chassis", "pitch"), -true["pitch"]),
         (_signal("rate", "angular rate", "chassis", "pitch"), -true["pitch_rate"]),
     ]
-    columns = Columns(tmp_path_factory.mktemp("plane") / "c.bin", tuple(s.name for s, _ in pairs), len(true.times))
+    columns = SampleFile(tmp_path_factory.mktemp("plane") / "c.bin", tuple(s.name for s, _ in pairs), len(true.times))
     columns.write(0, np.column_stack([values for _, values in pairs]))
     return Recording(tuple(s for s, _ in pairs), columns, 1e-3)
 
@@ -261,7 +265,7 @@ def test_a_free_run_on_turning_forces_is_accepted_only_beside_its_pitch(planar: 
     unseen = plane_run(replace(job, recording=blind), tmp_path / "blind").verdict
     assert unseen.word == "stabilise" and "no measured pitch" in unseen.reason
     names = planar.columns.names
-    tilted = Columns(tmp_path / "tilted.bin", names, planar.count)
+    tilted = SampleFile(tmp_path / "tilted.bin", names, planar.count)
     tilted.write(0, planar.columns.block(names, 0, planar.count) + 0.03 * (np.array(names) == "pitch"))
     off = plane_run(replace(job, recording=replace(turning, columns=tilted)), tmp_path / "off").verdict
     assert off.word == "stabilise" and "0.03 rad off the measured one" in off.reason
@@ -269,7 +273,7 @@ def test_a_free_run_on_turning_forces_is_accepted_only_beside_its_pitch(planar: 
 
 def test_another_vehicle_or_a_missing_wheel_is_refused(planar: Recording, tmp_path: Path) -> None:
     names = planar.columns.names
-    light = Columns(tmp_path / "light.bin", names, planar.count)
+    light = SampleFile(tmp_path / "light.bin", names, planar.count)
     light.write(0, 0.8 * planar.columns.block(names, 0, planar.count))
     with pytest.raises(InputError, match="too little"):
         plane_run(

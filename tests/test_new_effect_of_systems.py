@@ -7,7 +7,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from models.advice.choice.variants import system_of
+from models.advice.choice.variants import module_of_system
 from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import QuantityChange, price_list
 from models.advice.ride_choice.reduced import FullScene
@@ -379,7 +379,7 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
     """Of the runs that it times, at the usual values of both."""
     new_file(system, NEW[system].name, NEW[system].text)
     scene = bare_scene(system)
-    runs = system_of(scene)
+    runs = module_of_system(scene)
     less, more = (runs.computed_quantities(one, runs.ENGINE) for one in (scene, with_effects(scene, NEW[system].name)))
     assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
 

@@ -82,16 +82,16 @@ def with_points(points):
 def test_order_of_synthetic_curves():
     steps = np.array(STEPS)
     for order in (1, 2, 4):
-        assert curves.slope(steps, 7 * steps**order) == pytest.approx(order, abs=1e-12)
+        assert curves.log_log_slope(steps, 7 * steps**order) == pytest.approx(order, abs=1e-12)
 
 
 def test_hollow_points_do_not_enter_the_order():
     """A floor of 1e-6 bends a fourth-order curve; the points above it still say 4."""
     steps = np.array(STEPS)
     errors = np.maximum(1e6 * steps**4, 1e-6)
-    assert curves.observed_order(steps, errors, floor=1e-5) == pytest.approx(4, abs=1e-12)
-    assert curves.observed_order(steps, errors, floor=0.0) < 3
-    assert math.isnan(curves.observed_order(steps, errors, floor=1e9))
+    assert curves.observed_order(steps, errors, error_floor=1e-5) == pytest.approx(4, abs=1e-12)
+    assert curves.observed_order(steps, errors, error_floor=0.0) < 3
+    assert math.isnan(curves.observed_order(steps, errors, error_floor=1e9))
 
 
 def test_coinciding_curves_are_named():
@@ -110,34 +110,39 @@ def test_coinciding_curves_are_named():
 def test_cheapest_setting_is_interpolated():
     """error = h^2, calls = 1 / h: 1e-5 needs h = 10^-2.5 and 10^2.5 calls, between the settings tried."""
     steps = [1e-1, 1e-2, 1e-3]
-    found = curves.cost_at_tolerance(steps, [h**2 for h in steps], [1 / h for h in steps], 1e-5, order=2)
-    assert found.how == "interpolated"
+    found = curves.cost_at_tolerance(steps, [h**2 for h in steps], [1 / h for h in steps], 1e-5, convergence_order=2)
+    assert found.origin == "interpolated"
     assert (found.cost, found.value) == pytest.approx((10**2.5, 10**-2.5), rel=1e-12)
 
 
 def test_beyond_the_finest_setting():
     steps = [1e-1, 1e-2]
     table = steps, [h**2 for h in steps], [1 / h for h in steps]
-    assert curves.cost_at_tolerance(*table, 1e-6, order=2) is None
-    found = curves.cost_at_tolerance(*table, 1e-6, order=2, extrapolate=True)
-    assert (found.cost, found.how) == (pytest.approx(1000, rel=1e-12), "extrapolated")
-    assert curves.cost_at_tolerance(*table, 1.0, order=2).how == "coarsest"
+    assert curves.cost_at_tolerance(*table, 1e-6, convergence_order=2) is None
+    found = curves.cost_at_tolerance(*table, 1e-6, convergence_order=2, extrapolate=True)
+    assert (found.cost, found.origin) == (pytest.approx(1000, rel=1e-12), "extrapolated")
+    assert curves.cost_at_tolerance(*table, 1.0, convergence_order=2).origin == "coarsest"
 
 
 def test_adaptive_methods_count_only_where_tried():
-    found = curves.cost_at_tolerance([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 0.1, order=0)
-    assert (found.cost, found.value, found.how) == (20.0, 1e-4, "tried")
-    assert curves.cost_at_tolerance([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 1e-4, order=0, extrapolate=True) is None
+    found = curves.cost_at_tolerance([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 0.1, convergence_order=0)
+    assert (found.cost, found.value, found.origin) == (20.0, 1e-4, "tried")
+    assert (
+        curves.cost_at_tolerance([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 1e-4, convergence_order=0, extrapolate=True)
+        is None
+    )
 
 
 def test_a_lucky_coarse_setting_does_not_count():
     """The curve dips below 0.1 at 0.4 and comes back: only the last crossing promises anything."""
-    found = curves.cost_at_tolerance([0.8, 0.4, 0.2, 0.1], [1.0, 0.05, 0.2, 0.01], [1.0, 2.0, 4.0, 8.0], 0.1, order=1)
+    found = curves.cost_at_tolerance(
+        [0.8, 0.4, 0.2, 0.1], [1.0, 0.05, 0.2, 0.01], [1.0, 2.0, 4.0, 8.0], 0.1, convergence_order=1
+    )
     assert 4.0 < found.cost < 8.0
 
 
 def test_pareto_front():
-    assert curves.pareto([1, 2, 3, 4], [10, 20, 1, 0.999]) == [0, 2], "0.1 % better is not better"
+    assert curves.pareto_front([1, 2, 3, 4], [10, 20, 1, 0.999]) == [0, 2], "0.1 % better is not better"
 
 
 @pytest.mark.parametrize(
@@ -210,7 +215,7 @@ def test_a_wrong_order_fails_its_row():
     points = [
         p
         if p.setting.method == "first"
-        else cost.Point(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
+        else cost.WorkPrecisionPoint(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
         for p in measured_of(problem).points
     ]
     rows = {one.id: one for one in rows_of(problem, with_points(points), quick=True)}
@@ -220,19 +225,21 @@ def test_a_wrong_order_fails_its_row():
 
 def test_what_a_default_loses():
     """1e-3 N: first order needs 1000 times 125 calls, fourth order 1000^(1/4) times 500: 44.5 times."""
-    found = measured_of(PlantedProblem()).loss(1e-3, "force calls", "exudyn first")
-    assert found.how == "extrapolated"
-    assert found.factor == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
-    assert found.low == found.high == found.factor, "counts have no interval"
+    found = measured_of(PlantedProblem()).loss_by_default(1e-3, "force calls", "exudyn first")
+    assert found.origin == "extrapolated"
+    assert found.cost_ratio == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
+    assert found.lower_limit == found.upper_limit == found.cost_ratio, "counts have no interval"
 
 
 def test_an_interval_needs_rounds():
     """One round has a factor, but nothing to tell how sure it is: its interval would be of width 0, as if exact."""
     points = [replace(p, seconds=(p.counts["force calls"] * 1e-6,)) for p in measured_of(PlantedProblem()).points]
-    one = with_points(points).loss(1e-3, "seconds", "exudyn first")
-    assert one.factor > 1 and math.isnan(one.low) and math.isnan(one.high)
-    five = [replace(p, seconds=p.seconds * cost.FEWEST_ROUNDS) for p in points]
-    assert with_points(five).loss(1e-3, "seconds", "exudyn first").low == pytest.approx(one.factor)
+    one = with_points(points).loss_by_default(1e-3, "seconds", "exudyn first")
+    assert one.cost_ratio > 1 and math.isnan(one.lower_limit) and math.isnan(one.upper_limit)
+    five = [replace(p, seconds=p.seconds * cost.FEWEST_TIMING_ROUNDS) for p in points]
+    assert with_points(five).loss_by_default(1e-3, "seconds", "exudyn first").lower_limit == pytest.approx(
+        one.cost_ratio
+    )
 
 
 def timed(factor=1.0, once=()):
@@ -251,9 +258,9 @@ def test_a_slowed_setting_is_noticed():
     """1 N takes 125 calls of first order and 500 of fourth: slowed fourfold they take the same seconds, sixfold half as
     many again, by the interval of 15 rounds of 5 % noise, which is 4 % each way."""
     for factor, slower in ((4.0, False), (6.0, True)):
-        found = with_points(timed(factor)).loss(1.0, "seconds", "exudyn first")
-        assert found.factor == pytest.approx(factor / 4, rel=0.1)
-        assert (found.low > 1.05) == slower, "slower beyond doubt, or not"
+        found = with_points(timed(factor)).loss_by_default(1.0, "seconds", "exudyn first")
+        assert found.cost_ratio == pytest.approx(factor / 4, rel=0.1)
+        assert (found.lower_limit > 1.05) == slower, "slower beyond doubt, or not"
 
 
 def test_rounds_are_for_settings_that_decide_something():
@@ -272,16 +279,16 @@ def test_rounds_are_for_settings_that_decide_something():
 
 def test_a_slow_run_is_not_repeated_in_few_rounds(monkeypatch):
     """Three rounds, of which a slow setting is in the first: that is the run that has been."""
-    monkeypatch.setattr(cost, "SLOW_RUN_SECONDS", 0.0)
-    points = cost.measure(PlantedProblem(), True, cost.FEWEST_ROUNDS - 2, 0.0).points
+    monkeypatch.setattr(cost, "SLOW_RUN_DURATION", 0.0)
+    points = cost.measure(PlantedProblem(), True, cost.FEWEST_TIMING_ROUNDS - 2, 0.0).points
     assert {(len(p.seconds), p.changed) for p in points} == {(1, None)}
-    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST_ROUNDS - 1, 0.0).points
-    assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST_ROUNDS}
+    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST_TIMING_ROUNDS - 1, 0.0).points
+    assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST_TIMING_ROUNDS}
 
 
 def test_no_interval_from_one_run():
-    found = with_points(timed(once=STEPS[-1:])).loss(1e-3, "seconds", "exudyn first")
-    assert found.factor > 10 and math.isnan(found.low), "its finest step has one run alone"
+    found = with_points(timed(once=STEPS[-1:])).loss_by_default(1e-3, "seconds", "exudyn first")
+    assert found.cost_ratio > 10 and math.isnan(found.lower_limit), "its finest step has one run alone"
 
 
 def test_a_job_takes_part_in_some_rounds():
@@ -307,7 +314,7 @@ def test_rounds_are_told():
 def test_tables_come_from_saved_points():
     problem = PlantedProblem("raises")
     saved = json.loads(json.dumps(asdict(measured_of(problem))))
-    found = {table.title: table for table in tables(cost.of_saved(saved))}
+    found = {table.title: table for table in tables(cost.points_from_saved(saved))}
     cheapest = found["Cheapest setting that meets the tolerance"].rows[0]
     assert cheapest[0] == "0.1"
     assert cheapest[1].startswith("Exudyn fourth, 4.5 ms"), "0.1^(1/4) 8 ms = 4.499 ms"

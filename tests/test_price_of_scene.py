@@ -28,20 +28,20 @@ STEPS = tuple(0.1 / 2**k for k in range(12))
 class Planted:
     """y = t^2 sin 5t with an error of scale h^order, and one method that lies."""
 
-    title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, work_count_name = "planted", "y", "N", 0.0, "", "force calls"
     full_duration: float = 2.0
     searched_duration: float = 1.0
     growing: float = 0.0
     lies: float = 0.0
 
-    def ladders(self):
+    def setting_ladders(self):
         return [
             SettingLadder("exudyn", "fourth", STEPS, 4),
             SettingLadder("exudyn", "first", STEPS, 1, default=0.05),
             SettingLadder("exudyn", "liar", STEPS, 2),
         ]
 
-    def reference(self):
+    def reference_ladder(self):
         return SettingLadder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
 
     def second_setting(self, last):
@@ -63,7 +63,7 @@ class Planted:
         values = times**2 * np.sin(5 * times) + error * grown
         return PricedRun(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
 
-    def lines(self, setting):
+    def scene_file_lines(self, setting):
         return [setting.label()]
 
 
@@ -89,10 +89,10 @@ def test_an_error_that_grows_after_the_part_searched_is_found_and_met():
 class AsGood(Planted):
     """One whose steps must be so short that they are those of the reference, which has the same error."""
 
-    def ladders(self):
+    def setting_ladders(self):
         return [SettingLadder("exudyn", "fourth", STEPS[5:], 4)]
 
-    def reference(self):
+    def reference_ladder(self):
         return SettingLadder("reference", "fourth", tuple(2 * STEPS[5] / 2**k for k in range(6)), 4)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from models.advice.price.meshed import MeshedScene, first_part
+from models.advice.price.meshed import MeshedScene, duration_of_first_part
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, priced_scene, recommend
 from models.advice.price.text import recommendation_lines
@@ -55,13 +55,13 @@ def test_a_stop_is_held_to_its_tolerance_with_as_few_steps_as_that_takes():
 def test_a_path_with_linear_creep_is_held_by_steps_alone():
     scene = own(PATHS)
     found = recommend(scene, 1e-9)
-    assert found.winners["", "calls"].error <= 1e-9 and scene.counted == "force calls"
+    assert found.winners["", "calls"].error <= 1e-9 and scene.work_count_name == "force calls"
     assert "DOP853" in found.search_truth.origin  # another family has said the same
 
 
 def test_more_cells_come_nearer_and_are_counted():
     scene = own({**PATHS, "contact": {"law": "fastsim"}}, "fy")
-    ladder = next(one for one in scene.ladders() if one.default)
+    ladder = next(one for one in scene.setting_ladders() if one.default)
     coarse, fine, exact = (
         scene.priced_run(scene.solve(ladder.setting(ladder.values.index(1.0 / n)), 0.05)) for n in (5, 11, 45)
     )
@@ -73,7 +73,7 @@ def test_more_cells_come_nearer_and_are_counted():
 
 def test_steps_divide_what_is_searched():
     scene = own(PATHS)
-    assert isinstance(scene, MeshedScene) and first_part(3.0, 0.25) == 0.25
+    assert isinstance(scene, MeshedScene) and duration_of_first_part(3.0, 0.25) == 0.25
     assert all(
         abs(scene.searched_duration / step - round(scene.searched_duration / step)) < 1e-9
         for step in scene.steps.values()

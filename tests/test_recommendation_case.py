@@ -9,9 +9,9 @@ import pytest
 from models.advice.price import SettingLadder, recommendation
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import recommend
-from models.advice.price.search import Search, TriedSetting
+from models.advice.price.search import SettingSearch, TriedSetting
 from models.advice.price.text import as_dict, recommendation_lines
-from models.advice.price.truth import reference_truth
+from models.advice.price.truth import refined_reference
 from models.core.errors import InputError, RunFailed
 from validation.cases import recommendation as case
 from validation.faults.advice import LOOSE_TOLERANCE, Swing
@@ -31,8 +31,8 @@ class Whole(Swing):
 class Torn(Whole):
     """One engine gives no answer at all."""
 
-    def ladders(self):
-        return [*super().ladders(), SettingLadder("exudyn", "RK4", (0.1, 0.05), 4, default=0.1)]
+    def setting_ladders(self):
+        return [*super().setting_ladders(), SettingLadder("exudyn", "RK4", (0.1, 0.05), 4, default=0.1)]
 
     def solve(self, setting, duration):
         if setting.engine == "exudyn":
@@ -116,11 +116,11 @@ def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
 def test_a_run_of_minutes_is_not_made_where_the_tolerance_is_met_in_less():
     own = Whole()
     quick = TriedSetting(Setting("reference", "RK4", 0.1, 4), "ok", "", 0.0, 80, 0.1)
-    search = Search(
-        own, reference_truth(own, LOOSE_TOLERANCE, own.full_duration), LOOSE_TOLERANCE, own.full_duration, [quick]
+    search = SettingSearch(
+        own, refined_reference(own, LOOSE_TOLERANCE, own.full_duration), LOOSE_TOLERANCE, own.full_duration, [quick]
     )
     rough = TriedSetting(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
-    ladder = own.ladders()[2]
+    ladder = own.setting_ladders()[2]
     assert not search._is_too_long(ladder, 0, rough)  # 8 s
     assert search._is_too_long(ladder, 2, rough)  # 24 s
     assert search.tried[-1].reason == "not run: it would take about 24 s, and the tolerance is met in 0.1 s"

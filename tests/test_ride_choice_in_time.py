@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from models.advice.choice.answer import sampled_change_and_error
-from models.advice.choice.choose import Chooser
-from models.advice.choice.screen import Screen
-from models.advice.choice.systems.ride import opened
+from models.advice.choice.choose import EffectChooser
+from models.advice.choice.screen import EffectScreen
+from models.advice.choice.systems.ride import copies_of_scene
 from models.advice.choice.variants import Variants
 from models.advice.price import effects
 from models.advice.price.effects import price_list
@@ -60,11 +60,11 @@ def test_a_change_that_is_the_same_in_all_samples_is_sure_and_nothing_left_is_al
 
 
 def test_longer_steps_meet_the_same_roads():
-    whole = opened(quarter_car())
+    whole = copies_of_scene(quarter_car())
     pace = whole.steps_at_speeds[0]
     one, two = (scene.mean_squares(pace, scene.roads(pace))[1] for scene in (whole, whole.in_longer_steps(2)))
     other = whole.mean_squares(
-        pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
+        pace, copies_of_scene(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
     )[1]
     assert np.array_equal(whole.in_longer_steps(2).roads(pace), whole.roads(pace)[::2])
     same, apart = (sampled_change_and_error((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
@@ -72,7 +72,7 @@ def test_longer_steps_meet_the_same_roads():
 
 
 def test_what_is_left_out_is_gone_and_gains_stand_for_it():
-    whole = opened(quarter_car())
+    whole = copies_of_scene(quarter_car())
     rest = whole.without(LAWS)
     (spring,) = nonlinear_springs(whole.vehicle(whole.steps_at_speeds[0]))
     (gains,) = rest.vehicle(rest.steps_at_speeds[0]).springs
@@ -80,7 +80,7 @@ def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     k, c = whole.steps_at_speeds[0].springs[spring.name].equivalent_gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
-        opened(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
+        copies_of_scene(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
 
 
 def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
@@ -96,14 +96,14 @@ def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
 
 def test_a_choice_is_kept_and_says_what_chance_may_add():
     scene = quarter_car()
-    choice = Chooser(scene, "reference", scene.quantities, scene.tolerance).choose()
+    choice = EffectChooser(scene, "reference", scene.quantities, scene.tolerance).choose()
     assert choice.within_tolerance and choice.left_out and choice.step_factor > 1
     assert scene.tolerance - choice.confirmed_change[0] >= choice.statistical_error[0] > 0.0
 
 
 def test_few_copies_find_what_all_of_them_tell():
     scene = quarter_car(options={"copies": 48, "lasting": 2.0})
-    own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
+    own = EffectChooser(scene, "reference", scene.quantities, scene.tolerance)
     copies = [one.variants.scene.samples.copies for one in (own.screen, own.reporting_screen, own.whole)]
     assert (
         copies == [12, 48, 48]
@@ -124,7 +124,7 @@ def test_what_a_search_may_take_is_shown_beforehand(twinrig, capsys):
 def test_a_choice_that_chance_alone_could_break_is_refused():
     asked = random_nonlinear_ride(4)
     with pytest.raises(InputError, match="times as many samples would tell"):
-        Chooser(asked.prepared_in_time(FEWEST_COPIES), "reference", list(asked.quantities), 0.005).choose()
+        EffectChooser(asked.prepared_in_time(FEWEST_COPIES), "reference", list(asked.quantities), 0.005).choose()
 
 
 def test_a_quantity_that_one_sample_makes_up_is_refused():
@@ -134,7 +134,7 @@ def test_a_quantity_that_one_sample_makes_up_is_refused():
     lone = replace(answer.quantities[name], cases=(np.array([1.0, *[0.01] * 15]),))
     variants._quantities_of_variant[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
     with pytest.raises(InputError, match="made up to 87 % by one sample of 16"):
-        Screen(variants, [name])
+        EffectScreen(variants, [name])
 
 
 def test_prices_of_a_ride_on_bent_springs_say_what_chance_may_add(monkeypatch):

@@ -22,12 +22,17 @@ def case(request):
 
 def test_everything_that_needs_no_integration_is_exact(case):
     array, clean = case
-    found = motion.spin_from_readings(array, clean)
+    found = motion.body_rotation_from_readings(array, clean)
     # readings of 20 m/s^2 over a spread of 0.8 m: some 1e-15 of rounding, amplified by at most 20
     assert np.abs(motion.angular_acceleration(found, PATH.rates) - PATH.alpha).max() < 1e-12
     # squares, because a root loses half the digits where a rate passes through zero
-    assert np.abs((motion.rates_up_to_sign(found) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2).max() < 1e-13
-    assert motion.fit_quality(array, clean).share < 1e-14
+    assert (
+        np.abs(
+            (motion.rates_up_to_sign(found) @ array.principal_axes) ** 2 - (PATH.rates @ array.principal_axes) ** 2
+        ).max()
+        < 1e-13
+    )
+    assert motion.fit_quality(array, clean).unexplained_share < 1e-14
 
 
 def test_the_whole_motion_comes_back(case):
@@ -46,7 +51,7 @@ def test_integration_falls_with_the_fourth_power_of_the_period(case):
     errors = [
         np.abs(
             motion.integrate_rates(
-                motion.spin_from_readings(array, clean[::every]), every * PATH.period, PATH.rates[0]
+                motion.body_rotation_from_readings(array, clean[::every]), every * PATH.period, PATH.rates[0]
             )[-1]
             - PATH.rates[::every][-1]
         ).max()
@@ -63,7 +68,7 @@ def test_in_a_plane_the_plain_formula_would_give_half_and_a_bias():
     w, plain = PATH.rates, 0.5 * (m[:, 2, 1] - m[:, 1, 2])
     assert np.abs(plain - 0.5 * (PATH.alpha[:, 0] + w[:, 1] * w[:, 2])).max() < 1e-13
     array = sensor_array(SENSOR_ARRANGEMENTS["5 in a plane"])
-    assert array.planar and "lie in a plane" in " ".join(array.describe())
+    assert array.is_planar and "lie in a plane" in " ".join(array.description_sentences())
     with pytest.raises(InputError, match="half of the angular acceleration"):
         sensor_array(SENSOR_ARRANGEMENTS["5 in a plane"], "spatial")
 
@@ -72,7 +77,9 @@ def test_both_formulas_agree_where_both_hold():
     places = SENSOR_ARRANGEMENTS["5, one 1 m up"]
     clean = sensor_readings(np.array(list(places.values())))
     alphas = [
-        motion.angular_acceleration(motion.spin_from_readings(sensor_array(places, formula), clean), PATH.rates)
+        motion.angular_acceleration(
+            motion.body_rotation_from_readings(sensor_array(places, formula), clean), PATH.rates
+        )
         for formula in ("spatial", "plane")
     ]
     assert np.abs(alphas[0] - alphas[1]).max() < 1e-13
@@ -100,7 +107,7 @@ def test_noise_gains_are_those_of_a_car_floor():
         # relative to the mean of all sensors up to 3 % less
         assert 0.96 * wanted < array.noise_gains().max() < 1.02 * wanted
         assert array.noise_gains()[2] == pytest.approx(0.486, abs=1e-3)
-        assert array.noise_gains(planar=True).max() == pytest.approx(1 / 1.2)
+        assert array.noise_gains(with_plane_formula=True).max() == pytest.approx(1 / 1.2)
 
 
 @pytest.mark.parametrize("loose", range(5))
@@ -110,24 +117,24 @@ def test_a_loose_sensor_is_named(loose):
     shaken = clean.copy()
     shaken[:, loose] += 0.5 * RANDOM.normal(size=(len(clean), 3))
     found = motion.fit_quality(array, shaken)
-    assert found.rigid is False and found.suspect == array.names[loose]
+    assert found.rigid is False and found.suspect_sensor == array.names[loose]
     noisy = clean + 0.5 * RANDOM.normal(size=clean.shape)  # as much on all: noise, if it is known to be
-    assert motion.fit_quality(array, noisy, noise=0.5).rigid and not motion.fit_quality(array, noisy).rigid
+    assert motion.fit_quality(array, noisy, reading_deviation=0.5).rigid and not motion.fit_quality(array, noisy).rigid
 
 
 @pytest.mark.parametrize("height", [1.0, 0.4, 0.2, 0.1, 0.03, 0.0])
 def test_misfit_of_noise_is_what_the_redundancy_says(height):
     array = sensor_array(tilted_sensors(height, np.eye(3)))
     noisy = sensor_readings(array.positions) + 0.05 * RANDOM.normal(size=(len(PATH.rates), 5, 3))
-    found = motion.fit_quality(array, noisy, noise=0.05)
+    found = motion.fit_quality(array, noisy, reading_deviation=0.05)
     # 2001 samples of 6 equations: 1 % standard error; the rates are not quite those of least squares
-    assert 0.96 < np.sqrt(np.mean(found.misfit**2)) / found.expected_misfit < 1.2
+    assert 0.96 < np.sqrt(np.mean(found.unexplained_rms**2)) / found.expected_misfit < 1.2
 
 
 def test_three_sensors_say_that_nothing_can_be_said():
     array = sensor_array(SENSOR_ARRANGEMENTS["3"])
     assert motion.fit_quality(array, sensor_readings(array.positions)).rigid is None
-    assert "nothing over to check" in array.describe()[-1]
+    assert "nothing over to check" in array.description_sentences()[-1]
 
 
 def test_a_reading_that_is_no_number_is_named():
@@ -137,7 +144,7 @@ def test_a_reading_that_is_no_number_is_named():
     with pytest.raises(InputError, match="sensor s4, sample 17 along z"):
         motion.recovered_motion(array, bad, PATH.period)
     with pytest.raises(InputError, match="shape"):
-        motion.spin_from_readings(array, bad[:, :4])
+        motion.body_rotation_from_readings(array, bad[:, :4])
 
 
 def test_zeroed_sensors_give_the_same_motion():
@@ -154,7 +161,7 @@ def test_a_tilt_error_becomes_a_displacement():
     """At rest, level, but believed to be tilted by 1 mrad."""
     array, count, tilt = sensor_array(SENSOR_ARRANGEMENTS["4"]), 10001, 1e-3
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
-    start = motion.StartState(orientation=tuple(quaternion_from_cardan(0.0, tilt, 0.0)))
+    start = motion.BodyStartState(orientation=tuple(quaternion_from_cardan(0.0, tilt, 0.0)))
     found = motion.recovered_motion(array, still, 1e-3, start)
     law = motion.tilt_displacement(tilt, 1e-3 * np.arange(count))
     assert np.abs(-found.position[:, 0] - law).max() < 1e-9
@@ -169,7 +176,7 @@ def test_the_symmetric_part_bounds_the_rate():
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
     lever = motion.skew_matrix(alpha) + motion.skew_matrix(rates) @ motion.skew_matrix(rates)
     noisy = np.einsum("nij,sj->nsi", lever, array.positions) + 0.3 * RANDOM.normal(size=(len(t), 5, 3))
-    found = motion.spin_from_readings(array, noisy)
+    found = motion.body_rotation_from_readings(array, noisy)
     filtered, stated = filter_rates(found, period, rates[0], 0.3)
     late = slice(3000, None)
     walked = np.abs(motion.integrate_rates(found, period, rates[0]) - rates)[late].max()

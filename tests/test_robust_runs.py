@@ -16,7 +16,7 @@ import pytest
 
 from models.core.errors import RunFailed
 from models.ensemble import runner
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.workers import process_pool
 from studies.command.sweep import SweepJob
 
@@ -41,13 +41,13 @@ class Suicide:
 def test_a_worker_that_dies_is_replaced_and_its_block_computed_again(tmp_path):
     with process_pool(2) as executor:
         assert np.array_equal(
-            run_paths(Suicide(tmp_path, 1), 9, executor=executor, blocks=Blocks(3))["x"], np.arange(9)
+            run_paths(Suicide(tmp_path, 1), 9, executor=executor, path_blocks=PathBlocks(3))["x"], np.arange(9)
         )
 
 
 def test_a_block_that_kills_every_worker_is_the_only_failure(tmp_path):
     with process_pool(2) as executor, pytest.raises(RunFailed) as caught:
-        run_paths(Suicide(tmp_path, 99), 9, executor=executor, blocks=Blocks(3))
+        run_paths(Suicide(tmp_path, 99), 9, executor=executor, path_blocks=PathBlocks(3))
     assert str(caught.value) == "ensemble: block 0 (paths 0 to 2): its worker died: killed, or out of memory"
     assert len(list(tmp_path.iterdir())) == runner.MOST_WORKER_LOSSES
 
@@ -213,5 +213,5 @@ def test_no_more_blocks_are_under_way_than_were_asked_for(ahead):
     """What is timed must have the machine to itself."""
     job = Counted()
     with ThreadPoolExecutor(4) as pool:
-        run_paths(job, 6, executor=pool, blocks=Blocks(1, ahead))
+        run_paths(job, 6, executor=pool, path_blocks=PathBlocks(1, ahead))
     assert job.most == ahead

@@ -9,10 +9,9 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.drift.score import (
     SECTION_FORCE_CHANNELS,
-    Limits,
+    AcceptanceLimits,
     RunErrors,
     RunFigures,
-    blind_verdict,
     errors_of_run,
     figures_of_run,
     innovations_are_consistent,
@@ -20,6 +19,7 @@ from models.drift.score import (
     root_mean_square,
     section_forces,
     verdict_on_run,
+    verdict_without_true_run,
 )
 from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
 from models.systems.pitch_plane.run import run as simulate
@@ -175,28 +175,28 @@ def test_the_upright_component_is_scored_in_the_chassis_frame(place):
     ],
 )
 def test_verdict_with_the_truth(own, wrong, effects, word):
-    assert verdict_on_run(replace(FIGURES, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
+    assert verdict_on_run(replace(FIGURES, **own), replace(ERRORS, **wrong), effects, AcceptanceLimits()).word == word
 
 
 @pytest.mark.parametrize(
     ("own", "effects", "more", "word"),
     [
         ({}, GUIDED, {}, "accepted"),
-        ({}, (*FREE, "kalman_filter"), {"consistent": True}, "accepted"),
-        ({}, (*FREE, "kalman_filter"), {"consistent": False}, "rejected"),
-        ({}, (*FREE, "kalman_filter"), {"consistent": True, "uncertainty": 0.03}, "rejected"),
+        ({}, (*FREE, "kalman_filter"), {"innovations_consistent": True}, "accepted"),
+        ({}, (*FREE, "kalman_filter"), {"innovations_consistent": False}, "rejected"),
+        ({}, (*FREE, "kalman_filter"), {"innovations_consistent": True, "pitch_uncertainty": 0.03}, "rejected"),
         ({"moment_share_band": 0.2}, GUIDED, {}, "rejected"),
         ({"moment_share_band": 0.2}, SPRUNG, {}, "rejected"),
         ({}, SPRUNG, {}, "stabilise"),
-        ({}, (*FREE, "high_pass"), {"trusted": 100.0}, "stabilise"),
+        ({}, (*FREE, "high_pass"), {"trusted_duration": 100.0}, "stabilise"),
         ({}, FREE, {}, "stabilise"),
-        ({}, FREE, {"trusted": 5.0}, "stabilise"),
-        ({}, FREE, {"trusted": 10.0}, "accepted"),
-        ({"pitch_max": 5.9}, FREE, {"trusted": 100.0}, "rejected"),
+        ({}, FREE, {"trusted_duration": 5.0}, "stabilise"),
+        ({}, FREE, {"trusted_duration": 10.0}, "accepted"),
+        ({"pitch_max": 5.9}, FREE, {"trusted_duration": 100.0}, "rejected"),
     ],
 )
 def test_verdict_without_the_truth(own, effects, more, word):
-    assert blind_verdict(replace(FIGURES, **own), effects, 10.0, Limits(), **more).word == word
+    assert verdict_without_true_run(replace(FIGURES, **own), effects, 10.0, AcceptanceLimits(), **more).word == word
 
 
 @pytest.mark.parametrize(("mean", "expected"), [(1.0, True), (0.97, True), (1.3, False), (0.9, False)])
@@ -210,7 +210,9 @@ def test_a_filter_is_consistent_where_its_surprises_are_its_own(mean, expected, 
 
 
 def test_reasons_name_what_is_wrong():
-    found = verdict_on_run(replace(FIGURES, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, Limits())
+    found = verdict_on_run(
+        replace(FIGURES, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, AcceptanceLimits()
+    )
     assert found.reason == "pitch wrong by 0.3 rad; artificial moment 20% of I pitch''"
 
 

@@ -6,18 +6,24 @@ from functools import partial
 import numpy as np
 import pytest
 
-from models.advice.choice.choose import Choice, Chooser
+from models.advice.choice.choose import EffectChoice, EffectChooser
 from models.advice.choice.variants import Variants
 from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import SettingChoice, _valid_over_run, recommend
-from models.advice.price.search import Search, TriedSetting
-from models.advice.price.truth import ReferenceTruth, reference_truth
+from models.advice.price.search import SettingSearch, TriedSetting
+from models.advice.price.truth import ReferenceSolution, refined_reference
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 from models.ensemble.workers import process_pool
 from models.identification.fit import fit
-from models.identification.problem import FAILED_RESIDUAL, FitClock, Parameter, Problem, measured_channel
+from models.identification.problem import (
+    FAILED_RESIDUAL,
+    FitClock,
+    IdentificationProblem,
+    IdentifiedParameter,
+    measured_channel,
+)
 from models.identification.uncertainty import uncertainty
 from models.rail.equations import Equations
 from models.rail.limit_cycle import branch_of_orbits, orbit_of_small_amplitude, refined_orbit
@@ -66,8 +72,12 @@ def bent_problem():
     times, random = np.linspace(0.0, 1.0, 200), np.random.default_rng(5)
     clock = FitClock(times)
     values = np.exp(-2.0 * times) + 0.3 * times + 0.02 * random.standard_normal(200)
-    parameters = [Parameter("a", 0.7), Parameter("b", -1.0, high=-0.1), Parameter("c", 0.1)]
-    return Problem(bent, parameters, [measured_channel("y", "-", (times, values), clock)], clock)
+    parameters = [
+        IdentifiedParameter("a", 0.7),
+        IdentifiedParameter("b", -1.0, upper_bound=-0.1),
+        IdentifiedParameter("c", 0.1),
+    ]
+    return IdentificationProblem(bent, parameters, [measured_channel("y", "-", (times, values), clock)], clock)
 
 
 @CREWS
@@ -122,7 +132,7 @@ def half_car():
     return build(table, "t")
 
 
-def told(choice: Choice):
+def told(choice: EffectChoice):
     """All of a choice but its seconds."""
     return {name: str(value) for name, value in asdict(replace(choice, seconds=())).items()}
 
@@ -130,7 +140,8 @@ def told(choice: Choice):
 def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_not_count():
     with process_pool(2) as pool:
         choosers = [
-            Chooser(half_car(), "reference", ["pitch", "rms f1"], 0.02, executor=executor) for executor in (None, pool)
+            EffectChooser(half_car(), "reference", ["pitch", "rms f1"], 0.02, executor=executor)
+            for executor in (None, pool)
         ]
         alone, shared = (chooser.choose() for chooser in choosers)
         assert told(alone) == told(shared) and alone.left_out and alone.calls_of_search > 0
@@ -152,14 +163,14 @@ STEPS = tuple(0.1 / 2**k for k in range(10))
 class Planted:
     """y = t^2 sin 5t with an error of 40 h^2, more of it in the second half; the reference errs as its steps say."""
 
-    title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, work_count_name = "planted", "y", "N", 0.0, "", "force calls"
     full_duration: float = 2.0
     searched_duration: float = 1.0
 
-    def ladders(self):
+    def setting_ladders(self):
         return [SettingLadder("exudyn", "second", STEPS, 2), SettingLadder("exudyn", "first", STEPS, 1, default=0.05)]
 
-    def reference(self):
+    def reference_ladder(self):
         return SettingLadder("reference", "fine", tuple(2e-2 / 2**k for k in range(9)), 4)
 
     def second_setting(self, last):
@@ -177,11 +188,11 @@ class Planted:
         values = times**2 * np.sin(5 * times) + size * setting.value**setting.order * (1.0 + 5.0 * (times > 1.5))
         return PricedRun(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
 
-    def lines(self, setting):
+    def scene_file_lines(self, setting):
         return [setting.label()]
 
 
-def same(alone: ReferenceTruth, shared: ReferenceTruth):
+def same(alone: ReferenceSolution, shared: ReferenceSolution):
     keys = ("uncertainty", "origin", "rung", "broken_assumptions")
     equal = np.array_equal(alone.run.values, shared.run.values)
     return equal and all(getattr(alone, key) == getattr(shared, key) for key in keys)
@@ -189,10 +200,10 @@ def same(alone: ReferenceTruth, shared: ReferenceTruth):
 
 @CREWS
 def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
-    alone, shared = (reference_truth(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
+    alone, shared = (refined_reference(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
     assert same(alone, shared) and alone.rung > 0
-    over, blocks = Search(Planted(), alone, 1e-2, 2.0), []
-    for ladder, i in zip(Planted().ladders(), (2, 4), strict=True):
+    over, blocks = SettingSearch(Planted(), alone, 1e-2, 2.0), []
+    for ladder, i in zip(Planted().setting_ladders(), (2, 4), strict=True):
         tried = TriedSetting(ladder.setting(i), "ok", seconds=0.5, calls=10)
         blocks.append((ladder, SettingChoice(tried, 0.0, 10, 0.5, False, (0.4, 0.5, 0.6))))
     here, there = (block_results(partial(_valid_over_run, over), blocks, executor) for executor in (None, pool))

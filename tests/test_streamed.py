@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.noise import normal_samples
-from models.ensemble.runner import Blocks, each_block
+from models.ensemble.runner import PathBlocks, arrays_by_block
 from models.ensemble.statistics import FAN_PERCENTILES, deviation_with_error, percentiles, quantile_with_interval
 from models.ensemble.streamed import (
     QUANTILE_ACCURACY,
@@ -83,7 +83,7 @@ class Paths:
 def peak(paths, folder):
     tracemalloc.start()
     moments = StreamedMoments()
-    for block in each_block(Paths(), paths, folder, blocks=Blocks(10)):
+    for block in arrays_by_block(Paths(), paths, folder, path_blocks=PathBlocks(10)):
         moments.add(block["states"])
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.advice.choice.choose import Chooser
+from models.advice.choice.choose import EffectChooser
 from models.advice.price.runner import attempt
 from models.core import told
 from models.core.assumptions import broken_of, collected_breaches
@@ -156,7 +156,7 @@ def test_a_choice_keeps_what_the_assumptions_need_and_states_its_error(tmp_path)
     assert "lift_off stays; without it an assumption would be broken: linear tyres stay on the road" in said
     (left,) = found.results
     assert errors_of(left) and broken_of(left) == []
-    monkey = Chooser(scene, "reference", scene.quantities, scene.tolerance)
+    monkey = EffectChooser(scene, "reference", scene.quantities, scene.tolerance)
     monkey.breaks_assumption = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
     assert not monkey.within_tolerance(monkey.confirmed_changes(frozenset(["lift_off"])))
 

@@ -10,10 +10,10 @@ import pytest
 from mortal_job import Mortal
 
 from models.core.errors import InputError
-from models.ensemble.runner import Blocks, run_paths, values_in_order
+from models.ensemble.runner import PathBlocks, run_paths, values_in_order
 from models.ensemble.workers import Crew, process_pool
 from models.identification.fit import fit
-from models.identification.problem import FitClock, Parameter, Problem, measured_channel
+from models.identification.problem import FitClock, IdentificationProblem, IdentifiedParameter, measured_channel
 from models.identification.uncertainty import likelihood_profile, uncertainty
 from models.systems.braking.stops import StopEnsemble
 from models.systems.ride.nonlinear import CopiesJob, RunSampling
@@ -40,8 +40,8 @@ def pool():
 
 @pytest.mark.parametrize(("make", "paths"), [(stops, 4), (copies, 3)])
 def test_two_workers_give_the_bits_of_this_process(make, paths, pool):
-    alone = run_paths(make(), paths, blocks=Blocks(1))
-    shared = run_paths(make(), paths, executor=pool, blocks=Blocks(1))
+    alone = run_paths(make(), paths, path_blocks=PathBlocks(1))
+    shared = run_paths(make(), paths, executor=pool, path_blocks=PathBlocks(1))
     assert set(alone) == set(shared) and all(np.array_equal(alone[name], shared[name]) for name in alone)
     scattered = alone["distance" if "distance" in alone else "moments"]
     assert len({values.tobytes() for values in scattered}) == paths  # paths that were mixed up would be seen
@@ -57,13 +57,19 @@ def test_profiles_of_a_fit_are_the_same_by_two_workers(pool):
     times, random = np.linspace(0.0, 1.0, 200), np.random.default_rng(5)
     clock = FitClock(times)
     channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(200)), clock)
-    known = uncertainty(fit(Problem(straight, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
+    known = uncertainty(
+        fit(
+            IdentificationProblem(
+                straight, [IdentifiedParameter("a", 0.5), IdentifiedParameter("b", 1.0)], [channel], clock
+            )
+        )
+    )
     shared = list(values_in_order(partial(likelihood_profile, known), iter([0, 1]), pool))
     assert [k for k, _ in shared] == [0, 1]
     for k, made in shared:
         alone = likelihood_profile(known, k)
-        assert np.array_equal(made.values, alone.values) and np.array_equal(made.rise, alone.rise)
-    assert not np.array_equal(shared[0][1].rise, shared[1][1].rise)
+        assert np.array_equal(made.values, alone.values) and np.array_equal(made.misfit_rise, alone.misfit_rise)
+    assert not np.array_equal(shared[0][1].misfit_rise, shared[1][1].misfit_rise)
 
 
 def test_an_interrupt_between_blocks_and_a_resume_give_the_same_bits(tmp_path):
@@ -71,11 +77,11 @@ def test_an_interrupt_between_blocks_and_a_resume_give_the_same_bits(tmp_path):
         if state.done >= 2:
             raise KeyboardInterrupt
 
-    alone = run_paths(stops(), 4, blocks=Blocks(1))
+    alone = run_paths(stops(), 4, path_blocks=PathBlocks(1))
     with pytest.raises(KeyboardInterrupt):
-        run_paths(stops(), 4, tmp_path, blocks=Blocks(1), progress=stop)
+        run_paths(stops(), 4, tmp_path, path_blocks=PathBlocks(1), report_progress=stop)
     assert len(list(tmp_path.glob("block*.npz"))) == 2
-    resumed = run_paths(stops(), 4, tmp_path, blocks=Blocks(1))
+    resumed = run_paths(stops(), 4, tmp_path, path_blocks=PathBlocks(1))
     assert all(np.array_equal(alone[name], resumed[name]) for name in alone)
 
 
@@ -114,5 +120,7 @@ def test_workers_killed_at_random_moments_change_nothing(workers, kills, tmp_pat
                 return
 
     with process_pool(workers) as executor:
-        found = run_paths(Mortal(tmp_path), 200, executor=executor, blocks=Blocks(1), progress=kill)["x"]
+        found = run_paths(Mortal(tmp_path), 200, executor=executor, path_blocks=PathBlocks(1), report_progress=kill)[
+            "x"
+        ]
     assert 2 * len(killed) >= kills and np.array_equal(found, np.sqrt(np.arange(200)))

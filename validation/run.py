@@ -24,8 +24,8 @@ import numpy as np
 
 from models.core.result import provenance
 from models.core.whole_files import whole_file, write_whole
-from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.store import Arrays, checksum_of_sources, exclusive_folder
+from models.ensemble.runner import PathBlocks, run_paths
+from models.ensemble.store import ArraysByName, checksum_of_sources, exclusive_folder
 from models.ensemble.workers import Crew
 from validation.cases import CASES
 from validation.common.changes import change_lines, comparison_with_earlier
@@ -67,7 +67,7 @@ class Cases:
     quick: bool
     folder: Path
 
-    def __call__(self, paths: range) -> Arrays:
+    def __call__(self, paths: range) -> ArraysByName:
         """Array "record" (n,): rows and seconds of each of the n cases as JSON text."""
         return _json_array([self.record(self.names[i]) for i in paths])
 
@@ -100,7 +100,7 @@ class Cases:
         }
 
 
-def _json_array(records: list[Saved]) -> Arrays:
+def _json_array(records: list[Saved]) -> ArraysByName:
     return {"record": np.array([json.dumps(record) for record in records])}
 
 
@@ -115,14 +115,14 @@ def measured_cases(
     another version or share, RunFailed for a full disk.
     """
 
-    def lost(case_numbers: range, reason: str) -> Arrays:
+    def lost(case_numbers: range, reason: str) -> ArraysByName:
         return _json_array(
             [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in case_numbers]
         )
 
     store, blocks = (
         job.folder / FINISHED_CASES / ("alone" if runs_alone else "together"),
-        Blocks(1, 1) if runs_alone else Blocks(1),
+        PathBlocks(1, 1) if runs_alone else PathBlocks(1),
     )
     record_texts = run_paths(
         job, len(job.names), store, pool, blocks, lambda progress_count: progress(progress_count.done), lost

@@ -13,16 +13,16 @@ import numpy as np
 from models.bicycle.weave import Observation
 from models.bicycle.whipple import Control, Whipple
 from models.core.errors import InputError
-from models.identification.subsets import Candidate, SubsetChoice
+from models.identification.subsets import CandidateParameter, SubsetChoice
 from models.identification.subsets import ranked_subsets as chosen_of
 
 SUSPECTED_PARAMETERS = {
-    "friction": Candidate(0.1, lowest=0.0),
-    "dry_friction": Candidate(0.1, lowest=0.0),
-    "torque_gain": Candidate(1.0),
-    "encoder_gain": Candidate(1.0),
-    "speed_gain": Candidate(1.0),
-    "speed_bias": Candidate(0.0),
+    "friction": CandidateParameter(0.1, lower_bound=0.0),
+    "dry_friction": CandidateParameter(0.1, lower_bound=0.0),
+    "torque_gain": CandidateParameter(1.0),
+    "encoder_gain": CandidateParameter(1.0),
+    "speed_gain": CandidateParameter(1.0),
+    "speed_bias": CandidateParameter(0.0),
 }
 """Parameters of a bicycle's control that may explain a deviation from measurement, keys of ``Control``."""
 FRICTION_SETS = {"friction of either kind": ("friction", "dry_friction")}

@@ -91,13 +91,13 @@ rcParams.update(
 
 REMARK_FONT_SIZE = 8
 """Font size (points) of remarks below a figure."""
-LETTER_WIDTH = 0.6
+LETTER_WIDTH_SHARE = 0.6
 """Ratio of a bold letter's mean width to the font size; other letters are a tenth narrower."""
 
 
-def wrapped_text(text: str, inches: float, font_size: float) -> str:
+def wrapped_text(text: str, line_width: float, font_size: float) -> str:
     """Text split into lines that fit into a width (inches) at a font size (points)."""
-    letters_per_line = max(int(72 * inches / (LETTER_WIDTH * font_size)), 8)
+    letters_per_line = max(int(72 * line_width / (LETTER_WIDTH_SHARE * font_size)), 8)
     return "\n".join("\n".join(wrap(line, letters_per_line, break_long_words=False)) for line in text.split("\n"))
 
 
@@ -123,13 +123,13 @@ def empty_figure(figure_size: tuple[float, float] | None = None) -> Figure:
 
 
 def subplots(
-    rows: int = 1, columns: int = 1, figsize: tuple[float, float] | None = None, **options_of_figure: Any
+    row_count: int = 1, column_count: int = 1, figsize: tuple[float, float] | None = None, **options_of_figure: Any
 ) -> tuple[Figure, Any]:
     """A figure with panels in rows and columns; figsize : inches; options_of_figure : as for matplotlib's
     ``Figure.subplots``.
     """
     figure = empty_figure(figsize)
-    return figure, figure.subplots(rows, columns, **options_of_figure)
+    return figure, figure.subplots(row_count, column_count, **options_of_figure)
 
 
 def subplot_mosaic(
@@ -160,13 +160,13 @@ def panels(
     return figure, list(axes.flat[:panel_count])
 
 
-def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
+def legend_below(figure: Figure, *axes: Axes, column_count: int = 4) -> None:
     """Add one legend for all panels below them; a name that occurs in several panels is listed once."""
     handles: dict[str, Any] = {}
     for axis in axes:
         lines, names = axis.get_legend_handles_labels()
         handles |= dict(zip(names, lines, strict=True))
-    figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=columns)
+    figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=column_count)
 
 
 def _lines_of_legends(figure: Figure) -> int:
@@ -176,48 +176,50 @@ def _lines_of_legends(figure: Figure) -> int:
     return int(np.ceil(lowest / (1.2 * REMARK_FONT_SIZE * figure.dpi / 72)))
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure to ``path`` (.svg or .png) without a date, and return the path. The figure is drawn once, while
-    ``savefig`` draws it twice."""
-    with whole_file(path) as partial_path:
-        if path.suffix == ".svg":
+def save(figure: Figure, figure_path: Path) -> Path:
+    """Write a figure to ``figure_path`` (.svg or .png) without a date, and return the path. The figure is drawn once,
+    while ``savefig`` draws it twice."""
+    with whole_file(figure_path) as partial_path:
+        if figure_path.suffix == ".svg":
             from matplotlib.backends.backend_svg import FigureCanvasSVG
 
             FigureCanvasSVG(figure).print_svg(partial_path, metadata={"Date": None})
         else:
             figure.set_dpi(rcParams["savefig.dpi"])
             FigureCanvasAgg(figure).print_png(partial_path, metadata={"Software": None})
-    return path
+    return figure_path
 
 
-RATIO_SHARPNESS = 0.05
-"""Ratios are drawn as asinh(ln(ratio) / RATIO_SHARPNESS): linear about 1, where differences of 10 % are visible, and
-logarithmic far from 1."""
+RATIO_SCALE_SHARPNESS = 0.05
+"""Ratios are drawn as asinh(ln(ratio) / RATIO_SCALE_SHARPNESS): linear about 1, where differences of 10 % are visible,
+and logarithmic far from 1."""
 
 
-def scale_about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
-    """Scale an axis ("x" or "y") for ratios, so that both 5 % and several decades are visible; ``ticks`` are the ratios
-    to be marked."""
+def scale_about_one(axis: Axes, axis_name: str, marked_ratios: Sequence[float]) -> None:
+    """Scale an axis ("x" or "y") for ratios, so that both 5 % and several decades are visible; ``marked_ratios`` are
+    the ratios to be marked."""
     scale = (
-        lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / RATIO_SHARPNESS),
-        lambda u: np.exp(RATIO_SHARPNESS * np.sinh(u)),
+        lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / RATIO_SCALE_SHARPNESS),
+        lambda u: np.exp(RATIO_SCALE_SHARPNESS * np.sinh(u)),
     )
     getattr(axis, f"set_{axis_name}scale")("function", functions=scale)
-    getattr(axis, f"set_{axis_name}ticks")(ticks, [f"{tick:g}" for tick in ticks])
+    getattr(axis, f"set_{axis_name}ticks")(marked_ratios, [f"{tick:g}" for tick in marked_ratios])
     getattr(axis, f"{axis_name}axis").set_minor_locator(NullLocator())
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """Translation of a minus sign and digits to superscripts."""
-MANY_DECADES = 2.0
+PLAIN_LABEL_DECADES = 2.0
 """Number of decades on an axis from which on only whole powers of ten are labelled."""
 DECADE_MARKS = ("", "2", "4")
-"""Leading digits that are labelled on an axis of one decade to ``MANY_DECADES``; empty for the power of ten itself."""
+"""Leading digits that are labelled on an axis of one decade to ``PLAIN_LABEL_DECADES``; empty for the power of ten
+itself.
+"""
 
 
-def _spans_few_decades(low: float, high: float) -> bool:
-    """Whether an axis range is positive and shorter than ``MANY_DECADES``."""
-    return 0 < low < high and bool(np.log10(high / low) < MANY_DECADES)
+def _spans_few_decades(lower_end: float, upper_end: float) -> bool:
+    """Whether an axis range is positive and shorter than ``PLAIN_LABEL_DECADES``."""
+    return 0 < lower_end < upper_end and bool(np.log10(upper_end / lower_end) < PLAIN_LABEL_DECADES)
 
 
 class _PlainTickLabels(LogFormatterSciNotation):

@@ -15,7 +15,7 @@ from models.drift.score import SECTION_FORCE_CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
 from models.sensors.inertial_unit import bias_path
 
-ANGLE_NODES = 41
+ANGLE_ERROR_COUNT = 41
 """Number of constant angle errors at which damage is counted; odd, so that one of them is zero."""
 EVEN_SPACING_ANGLE = 1e-3
 """Angle error (rad) below which the nodes are evenly spaced; above it their spacing grows with the angle."""
@@ -26,46 +26,51 @@ gyro bias of 1 rad/s."""
 
 
 def unit_angle_error_paths(
-    path_count: int, rate: int, length: int, correlation_time: float, seed: int
+    path_count: int, sampling_rate: int, duration: int, correlation_time: float, seed: int
 ) -> UnitErrorPaths:
     """Random angle error paths of a gyro of unit grade, two arrays (path_count, length + 1) with a value per second: by
-    white noise and by bias. They sum ``rate`` noise samples per second over ``length`` (s); the bias has a correlation
-    time (s).
+    white noise and by bias. They sum ``sampling_rate`` noise samples per second over ``duration`` (s); the bias has a
+    correlation time (s).
 
     Every grade of gyro is a multiple of the same paths, so that grades are compared without scatter between them.
     """
     walks, drifts = list[np.ndarray](), list[np.ndarray]()
     for path in range(path_count):
-        noise = normal_samples(seed, path, rate * length, 1, noise_source=GYRO)[:, 0] / rate**0.5
-        wander = bias_path(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
+        noise = normal_samples(seed, path, sampling_rate * duration, 1, noise_source=GYRO)[:, 0] / sampling_rate**0.5
+        wander = (
+            bias_path(sampling_rate * duration, 1 / sampling_rate, 0.0, 1.0, correlation_time, seed, path)
+            / sampling_rate
+        )
         for paths, samples_of_paths in ((walks, noise), (drifts, wander)):
-            paths.append(np.concatenate([[0.0], samples_of_paths.reshape(length, rate).sum(axis=1).cumsum()]))
+            paths.append(
+                np.concatenate([[0.0], samples_of_paths.reshape(duration, sampling_rate).sum(axis=1).cumsum()])
+            )
     return np.array(walks), np.array(drifts)
 
 
-def damage_at_angle_errors(result: Result, error: float) -> list[float]:
+def damage_at_angle_errors(run_result: Result, pitch_error: float) -> list[float]:
     """Pseudo-damage of each section force of a run whose pitch is wrong by a constant error (rad)."""
-    forces = section_forces(result["f3"], result["f4"], result["pitch"] + error)
-    return [pseudo_damage(rotated_to_maximum(forces[name])) for name in SECTION_FORCE_CHANNELS]
+    forces = section_forces(run_result["f3"], run_result["f4"], run_result["pitch"] + pitch_error)
+    return [pseudo_damage(load_rotated_to_maximum(forces[name])) for name in SECTION_FORCE_CHANNELS]
 
 
-def log_damage_over_pitch_error(result: Result, largest_angle: float, file: str = "") -> CubicSpline:
+def log_damage_over_pitch_error(run_result: Result, largest_pitch_error: float, scene_path: str = "") -> CubicSpline:
     """Spline of the logarithm of damage divided by true damage for each section force, over a constant pitch error
     (rad).
 
     Raises InputError, which names the scene's file, for a run without damage.
     """
-    widest = np.arcsinh(largest_angle / EVEN_SPACING_ANGLE)
-    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, ANGLE_NODES))
-    damage = np.array([damage_at_angle_errors(result, angle) for angle in angles])
-    true = damage[ANGLE_NODES // 2]
+    widest = np.arcsinh(largest_pitch_error / EVEN_SPACING_ANGLE)
+    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, ANGLE_ERROR_COUNT))
+    damage = np.array([damage_at_angle_errors(run_result, angle) for angle in angles])
+    true = damage[ANGLE_ERROR_COUNT // 2]
     if not (true > 0).all():
         allowed = "leaves no damage in the section forces to compare with: use a road that moves the vehicle"
-        raise InputError(file, "effects.road", None, allowed)
+        raise InputError(scene_path, "effects.road", None, allowed)
     return CubicSpline(angles, np.log(damage / true))
 
 
-def rotated_to_maximum(load: np.ndarray) -> np.ndarray:
+def load_rotated_to_maximum(load: np.ndarray) -> np.ndarray:
     """The load history (n,) rotated so that it begins and ends at its largest value, as in a block of many repetitions
     (ASTM E1049-85, 5.4.5).
 
@@ -75,8 +80,8 @@ def rotated_to_maximum(load: np.ndarray) -> np.ndarray:
     return np.concatenate([load[top:], load[: top + 1]])
 
 
-def damage_errors(curve: CubicSpline, angles: np.ndarray) -> np.ndarray:
+def damage_errors(log_damage_curve: CubicSpline, angle_error_paths: np.ndarray) -> np.ndarray:
     """Relative error (paths, 4) of the damage of each section force, averaged over angle error paths (paths, n) in
-    rad; ``curve`` is from ``log_damage_over_pitch_error``."""
-    reach = curve.x[-1]
-    return np.expm1(curve(np.clip(angles, -reach, reach))).mean(axis=1)
+    rad; ``log_damage_curve`` is from ``log_damage_over_pitch_error``."""
+    reach = log_damage_curve.x[-1]
+    return np.expm1(log_damage_curve(np.clip(angle_error_paths, -reach, reach))).mean(axis=1)

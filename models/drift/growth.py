@@ -25,7 +25,7 @@ FAST_PITCH_FREQUENCY = 0.2
 """Frequency (Hz) above which a pitch rate counts as fast: 1.3 rad/s, three times the largest growth rate of the study
 roads, for an average over a motion means something only where the error hardly grows meanwhile. Half of it or twice
 as much changes the growth rate of these roads by 1 to 3 %."""
-SERIES_LIMIT = 0.1
+SERIES_ARGUMENT_LIMIT = 0.1
 """Argument 2 lambda t below which the sinh law is summed as a power series, which loses no digit."""
 LARGEST_EXPONENT = 710.0
 """Argument 2 lambda t from which on sinh overflows."""
@@ -56,22 +56,22 @@ class RigidPitch:
         """Total pitch inertia I + J (kg m^2)."""
         return self.inertia + self.wheel_inertia
 
-    def moment(self, forces: np.ndarray) -> np.ndarray:
+    def moment(self, wheel_forces: np.ndarray) -> np.ndarray:
         """Pitch moment (n,) in N m from wheel forces (n, 2) in N."""
-        return self.front_arm * forces[:, 0] - self.rear_arm * forces[:, 1]
+        return self.front_arm * wheel_forces[:, 0] - self.rear_arm * wheel_forces[:, 1]
 
-    def noise_intensity(self, deviation: float, sample_period: float) -> float:
+    def noise_intensity(self, force_deviation: float, sample_period: float) -> float:
         """Noise intensity q (rad^2/s^3) of the pitch acceleration from white samples of both wheel forces, each with
         the standard deviation (N) and the sample period (s).
 
         q = s^2 D (front^2 + rear^2) / (I + J)^2 with the standard deviation s (N) of each sample and the period D (s).
         """
-        return deviation**2 * sample_period * (self.front_arm**2 + self.rear_arm**2) / self.total_inertia**2
+        return force_deviation**2 * sample_period * (self.front_arm**2 + self.rear_arm**2) / self.total_inertia**2
 
-    def squared_growth_rate(self, rates: np.ndarray) -> np.ndarray:
+    def squared_growth_rate(self, pitch_rates: np.ndarray) -> np.ndarray:
         """Squared growth rate lambda^2 (1/s^2) of a pitch error for each fast pitch rate (rad/s); the wheel forces are
         vertical in space."""
-        return rates**2 * self.inertia / self.total_inertia
+        return pitch_rates**2 * self.inertia / self.total_inertia
 
 
 def rigid_pitch(parameters: Parameters) -> RigidPitch:
@@ -86,35 +86,37 @@ def rigid_pitch(parameters: Parameters) -> RigidPitch:
     )
 
 
-def high_passed(values: np.ndarray, sample_period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
-    """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x =
+def high_passed(signal: np.ndarray, sample_period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
+    """Part of the signal ``signal`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x =
     frequency / cutoff.
 
     That is a Butterworth filter of order 2 run forward and backward. Beyond its ends the signal goes on as its odd
     mirror image, for a period of the cut-off where it is that long.
     """
-    beyond = min(len(values) - 1, round(1.0 / (cutoff * sample_period)))
-    longer = np.pad(values, beyond, mode="reflect", reflect_type="odd")
+    beyond = min(len(signal) - 1, round(1.0 / (cutoff * sample_period)))
+    longer = np.pad(signal, beyond, mode="reflect", reflect_type="odd")
     power = (np.fft.rfftfreq(len(longer), sample_period) / cutoff) ** 4
-    return np.fft.irfft(np.fft.rfft(longer) * power / (1.0 + power), len(longer))[beyond : beyond + len(values)]
+    return np.fft.irfft(np.fft.rfft(longer) * power / (1.0 + power), len(longer))[beyond : beyond + len(signal)]
 
 
-def pitch_rate_of_forces(forces: np.ndarray, sample_period: float, parameters: Parameters) -> np.ndarray:
+def pitch_rate_of_forces(wheel_forces: np.ndarray, sample_period: float, parameters: Parameters) -> np.ndarray:
     """Pitch rate (n,) in rad/s from wheel forces (n, 2) in N alone: their moment is integrated once, without a
     simulation."""
     rigid = rigid_pitch(parameters)
-    moment = rigid.moment(forces)
+    moment = rigid.moment(wheel_forces)
     steps = 0.5 * (moment[1:] + moment[:-1]) * sample_period
     return np.concatenate(([0.0], np.cumsum(steps))) / rigid.total_inertia
 
 
 def growth_rate(
-    pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+    pitch_rate: np.ndarray, sample_period: float, vehicle_parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> float:
     """Growth rate lambda (1/s) of a pitch error from the pitch rate (n,) in rad/s of a run or of
     ``pitch_rate_of_forces``; the wheel forces are vertical in space."""
     return float(
-        np.sqrt(rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff)).mean())
+        np.sqrt(
+            rigid_pitch(vehicle_parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff)).mean()
+        )
     )
 
 
@@ -131,8 +133,8 @@ def sinh_law_rate(
     times = sample_period * np.arange(len(pitch_rate))
     squares = rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff))
 
-    def weighted(samples: np.ndarray) -> np.ndarray:
-        second, third, fourth = (np.cumsum(samples * times**power) for power in (2, 3, 4))
+    def weighted(squared_rates: np.ndarray) -> np.ndarray:
+        second, third, fourth = (np.cumsum(squared_rates * times**power) for power in (2, 3, 4))
         return 3 * times**2 * second - 4 * times * third + fourth
 
     scaled = np.zeros(len(times))
@@ -140,7 +142,9 @@ def sinh_law_rate(
     return np.sqrt(np.maximum(scaled, 0.0))
 
 
-def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensity: float) -> np.ndarray:
+def pitch_variance(
+    times: np.ndarray | float, error_growth_rate: np.ndarray | float, noise_intensity: float
+) -> np.ndarray:
     """Variance (rad^2) of the pitch after times t (s) by the sinh law: q / (4 lambda^3) (sinh(2 lambda t) - 2 lambda
     t), with growth rate lambda (1/s) and noise intensity q (rad^2/s^3); q t^3 / 3 for lambda = 0.
 
@@ -148,32 +152,35 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
     x = 2 lambda t it is q t^3 / 3 times 6 (sinh x - x) / x^3, whose bracket loses its digits for small x and is summed
     there.
     """
-    for name, argument in (("times", times), ("rate", rate), ("intensity", intensity)):
+    for name, argument in (("times", times), ("rate", error_growth_rate), ("intensity", noise_intensity)):
         if not (np.asarray(argument, dtype=float) >= 0.0).all():
             raise InputError("", name, None, "must be 0 or more, and a number")
-    t, x = np.asarray(times, dtype=float), 2.0 * np.asarray(rate, dtype=float) * np.asarray(times, dtype=float)
-    small = np.minimum(np.abs(x), SERIES_LIMIT) ** 2
+    t, x = (
+        np.asarray(times, dtype=float),
+        2.0 * np.asarray(error_growth_rate, dtype=float) * np.asarray(times, dtype=float),
+    )
+    small = np.minimum(np.abs(x), SERIES_ARGUMENT_LIMIT) ** 2
     series = 1.0 + small / 20 * (1.0 + small / 42 * (1.0 + small / 72 * (1.0 + small / 110)))
-    large = np.where(np.abs(x) > SERIES_LIMIT, x, 1.0)
+    large = np.where(np.abs(x) > SERIES_ARGUMENT_LIMIT, x, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # beyond all numbers is infinite, at no rate and no time alike
         closed = np.where(large > LARGEST_EXPONENT, np.inf, 6 * (np.sinh(large) - large) / large**3)
-    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES_LIMIT, closed, series)
+    return noise_intensity * t**3 / 3 * np.where(np.abs(x) > SERIES_ARGUMENT_LIMIT, closed, series)
 
 
 def heave_variance(
-    times: np.ndarray | float, parameters: Parameters, deviation: float, sample_period: float
+    times: np.ndarray | float, parameters: Parameters, force_deviation: float, sample_period: float
 ) -> np.ndarray:
     """Variance (m^2) of the heave of the common centre of mass after times t (s): 2 s^2 D / M^2 t^3 / 3, with standard
     deviation s (N) and period D (s) of the wheel forces' samples, and total mass M. A heave error does not grow by
     itself."""
     mass = rigid_pitch(parameters).mass
-    return 2 * deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
+    return 2 * force_deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
 
 
-def holding_stiffness(parameters: Parameters, rate: float) -> float:
+def holding_stiffness(parameters: Parameters, error_growth_rate: float) -> float:
     """Smallest rotational stiffness to the ground (N m/rad) that keeps the pitch from growing: total pitch inertia
     times the squared growth rate (1/s)."""
-    return rigid_pitch(parameters).total_inertia * rate**2
+    return rigid_pitch(parameters).total_inertia * error_growth_rate**2
 
 
 def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
@@ -183,27 +190,31 @@ def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float)
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
-def drift_off_time(rate: float, intensity: float, angle: float) -> float:
-    """Time (s) after which half of all runs deviate in pitch by more than ``angle`` (rad), for a constant growth rate
-    (1/s) and noise intensity (rad^2/s^3).
+def drift_off_time(error_growth_rate: float, noise_intensity: float, pitch_limit: float) -> float:
+    """Time (s) after which half of all runs deviate in pitch by more than ``pitch_limit`` (rad), for a constant growth
+    rate (1/s) and noise intensity (rad^2/s^3).
 
     Raises InputError for an intensity or angle that is not above 0, and for a rate below it.
     """
     from scipy.optimize import brentq
 
     for name, value, smallest_value in (
-        ("rate", rate, 0.0),
-        ("intensity", intensity, SMALLEST_POSITIVE),
-        ("angle", angle, SMALLEST_POSITIVE),
+        ("rate", error_growth_rate, 0.0),
+        ("intensity", noise_intensity, SMALLEST_POSITIVE),
+        ("angle", pitch_limit, SMALLEST_POSITIVE),
     ):
         if not (math.isfinite(value) and value >= smallest_value):
             raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
-    longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN_OF_NORMAL) - math.log(intensity)) / 3.0  # without growth
-    if rate == 0.0:
+    longest = (
+        math.log(3.0) + 2.0 * math.log(pitch_limit / MEDIAN_OF_NORMAL) - math.log(noise_intensity)
+    ) / 3.0  # without growth
+    if error_growth_rate == 0.0:
         return math.exp(longest)
-    longest_log_time = math.log(2.0) + math.log(rate) + longest
+    longest_log_time = math.log(2.0) + math.log(error_growth_rate) + longest
     ends = min(longest_log_time, 0.0) - 1.0, min(longest_log_time, math.log(3.0 * max(longest_log_time, 0.0) + 3.0))
-    return math.exp(brentq(lambda x: 3.0 * (x - longest_log_time) + _log_gain(x), *ends, xtol=1e-14)) / (2.0 * rate)
+    return math.exp(brentq(lambda x: 3.0 * (x - longest_log_time) + _log_gain(x), *ends, xtol=1e-14)) / (
+        2.0 * error_growth_rate
+    )
 
 
 def _log_gain(log_x: float) -> float:

@@ -48,7 +48,7 @@ VerdictWord = Literal["accepted", "accepted with doubt", "rejected", "stabilise"
 """Words of a verdict on a run."""
 
 
-class Limits(Strict):
+class AcceptanceLimits(Strict):
     """[options.limits]: from where on a run is not good enough; chosen by whoever uses its forces."""
 
     damage_error: float = Field(default=0.05, gt=0, description="largest |damage ratio - 1| of any section force")
@@ -107,14 +107,14 @@ class RunErrors:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class StabilisedRunVerdict:
     """Verdict on a stabilised run: a word and its reason."""
 
     word: VerdictWord
     reason: str
 
 
-def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
+def figures_of_run(run: Result, vehicle_parameters: Parameters) -> RunFigures:
     """Figures of a run that need no true run, such as its artificial moment; raises InputError unless its rows are on a
     uniform, fine grid.
 
@@ -123,11 +123,11 @@ def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
     """
     row_spacing = _row_spacing(run)
     inertia, heave = (
-        parameters.I * np.diff(run["pitch_rate"]) / row_spacing,
-        parameters.m3 * np.diff(run["z3_rate"]) / row_spacing,
+        vehicle_parameters.I * np.diff(run["pitch_rate"]) / row_spacing,
+        vehicle_parameters.m3 * np.diff(run["z3_rate"]) / row_spacing,
     )
-    moment = inertia - _step_means(_natural_moment(run, parameters), row_spacing)
-    force = heave - _step_means(parameters.m3 * parameters.g - run["f3"] - run["f4"], row_spacing)
+    moment = inertia - _step_means(_natural_moment(run, vehicle_parameters), row_spacing)
+    force = heave - _step_means(vehicle_parameters.m3 * vehicle_parameters.g - run["f3"] - run["f4"], row_spacing)
     band = {
         name: low_pass(values, row_spacing)
         for name, values in (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))
@@ -146,8 +146,8 @@ def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
     )
 
 
-def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -> RunErrors:
-    """Errors of a run relative to the true run, with rows at the same times; ``slope`` is the Woehler exponent.
+def errors_of_run(run: Result, true_run: Result, woehler_slope: float = WOEHLER_SLOPE) -> RunErrors:
+    """Errors of a run relative to the true run, with rows at the same times; ``woehler_slope`` is the Woehler exponent.
 
     Raises InputError if the rows lie at different times, or if a load of the truth never turns.
     """
@@ -156,31 +156,37 @@ def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -
     loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, true_run))
     pitch = run["pitch"] - true_run["pitch"]
     return RunErrors(
-        damage={name: damage_ratio(loads[name], true[name], slope) for name in SECTION_FORCE_CHANNELS},
+        damage={name: damage_ratio(loads[name], true[name], woehler_slope) for name in SECTION_FORCE_CHANNELS},
         force_rms={name: root_mean_square(loads[name] - true[name]) for name in SECTION_FORCE_CHANNELS},
-        vertical_damage={name: damage_ratio(run[name], true_run[name], slope) for name in ("f3", "f4")},
+        vertical_damage={name: damage_ratio(run[name], true_run[name], woehler_slope) for name in ("f3", "f4")},
         pitch_max=float(np.abs(pitch).max()),
         pitch_rms=root_mean_square(pitch),
         heave_max=float(np.abs(run["z3"] - true_run["z3"]).max()),
     )
 
 
-def verdict_on_run(figures: RunFigures, errors: RunErrors, effects: Iterable[str], limits: Limits) -> Verdict:
+def verdict_on_run(
+    run_figures: RunFigures, run_errors: RunErrors, effect_names: Iterable[str], acceptance_limits: AcceptanceLimits
+) -> StabilisedRunVerdict:
     """Verdict on a virtual measurement with a true run, by damage, pitch error and artificial moment.
 
     ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED_PITCH_EFFECTS or
-    LEVELLING_EFFECTS among the scene's ``effects``) that is outside them but has not tumbled. ``rejected``: all else.
+    LEVELLING_EFFECTS among the scene's ``effect_names``) that is outside them but has not tumbled. ``rejected``: all
+    else.
     """
-    if figures.pitch_max > TUMBLING_PITCH:
-        return _tumbling_verdict(figures)
-    wrong = [*_exceeded_limits(errors, limits), *_burden_sentences(figures, limits)]
+    if run_figures.pitch_max > TUMBLING_PITCH:
+        return _tumbling_verdict(run_figures)
+    wrong = [
+        *_exceeded_limits(run_errors, acceptance_limits),
+        *_stabiliser_burden_sentences(run_figures, acceptance_limits),
+    ]
     if not wrong:
-        return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
-    stabilised = not set(effects).isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS))
-    return Verdict("rejected" if stabilised else "stabilise", "; ".join(wrong))
+        return StabilisedRunVerdict("accepted", f"damage ratios within {acceptance_limits.damage_error:.0%} of 1")
+    stabilised = not set(effect_names).isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS))
+    return StabilisedRunVerdict("rejected" if stabilised else "stabilise", "; ".join(wrong))
 
 
-def innovations_are_consistent(run: Result) -> bool | None:
+def innovations_are_consistent(filtered_run: Result) -> bool | None:
     """Whether the innovations of a run's Kalman filter are as large as the filter states; None without a filter.
 
     The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
@@ -188,110 +194,131 @@ def innovations_are_consistent(run: Result) -> bool | None:
     """
     from scipy.stats import chi2
 
-    if "kalman_surprise" not in run.data:
+    if "kalman_surprise" not in filtered_run.data:
         return None
-    count = float(run["kalman_used"][-1])
+    count = float(filtered_run["kalman_used"][-1])
     low, high = chi2.ppf([0.5 - INNOVATION_CONFIDENCE / 2, 0.5 + INNOVATION_CONFIDENCE / 2], count)
-    return bool(low <= run["kalman_surprise"][-1] <= high)
+    return bool(low <= filtered_run["kalman_surprise"][-1] <= high)
 
 
-def uncertainty(run: Result) -> float:
+def stated_pitch_uncertainty(filtered_run: Result) -> float:
     """Uncertainty (rad) that a Kalman filter states for the pitch: twice its largest standard deviation; 0 without a
     filter."""
-    return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
+    return 2.0 * float(filtered_run["pitch_deviation"].max()) if "pitch_deviation" in filtered_run.data else 0.0
 
 
-def blind_verdict(
-    figures: RunFigures,
-    effects: Iterable[str],
+def verdict_without_true_run(
+    run_figures: RunFigures,
+    effect_names: Iterable[str],
     duration: float,
-    limits: Limits,
-    trusted: float | None = None,
-    consistent: bool | None = None,
-    uncertainty: float = 0.0,
-) -> Verdict:
+    acceptance_limits: AcceptanceLimits,
+    trusted_duration: float | None = None,
+    innovations_consistent: bool | None = None,
+    pitch_uncertainty: float = 0.0,
+) -> StabilisedRunVerdict:
     """Verdict without a true run, from figures of the run alone; damage is not among them.
 
     ``accepted``: the pitch is held to a measured one (MEASURED_PITCH_EFFECTS), the artificial moment is within its
     limit and the filter, where there is one, is ``innovations_are_consistent`` with its measurement (NIS within its
-    band) and its own ``uncertainty`` (rad) is within the limit of pitch errors; or a free run ends before
-    the ``trusted`` time (s) predicted for it. ``stabilise``: a longer free run, or one that is held near zero
+    band) and its own ``pitch_uncertainty`` (rad) is within the limit of pitch errors; or a free run ends before
+    the ``trusted_duration`` time (s) predicted for it. ``stabilise``: a longer free run, or one that is held near zero
     (LEVELLING_EFFECTS): that is wrong on a grade, and nothing in the run shows it. ``rejected``: all else.
 
-    effects : names of the scene's effects; duration : of the run in s; ``trusted`` and ``innovations_are_consistent``
-    None: not known.
+    effect_names : names of the scene's effects; duration : of the run in s; ``trusted_duration`` and
+    ``innovations_are_consistent`` None: not known.
     """
-    named = set(effects)
-    if figures.pitch_max > TUMBLING_PITCH:
-        return _tumbling_verdict(figures)
+    named = set(effect_names)
+    if run_figures.pitch_max > TUMBLING_PITCH:
+        return _tumbling_verdict(run_figures)
     if named.isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS)):
-        return _free_run_verdict(duration, trusted)
-    wrong = _burden_sentences(figures, limits) + (["NIS outside its band"] if consistent is False else [])
-    wrong += [f"pitch known to {uncertainty:.2g} rad only"] if uncertainty > limits.pitch_error else []
+        return _free_run_verdict(duration, trusted_duration)
+    wrong = _stabiliser_burden_sentences(run_figures, acceptance_limits) + (
+        ["NIS outside its band"] if innovations_consistent is False else []
+    )
+    wrong += (
+        [f"pitch known to {pitch_uncertainty:.2g} rad only"]
+        if pitch_uncertainty > acceptance_limits.pitch_error
+        else []
+    )
     if wrong:
-        return Verdict("rejected", "; ".join(wrong))
+        return StabilisedRunVerdict("rejected", "; ".join(wrong))
     if named.isdisjoint(MEASURED_PITCH_EFFECTS):
-        return Verdict("stabilise", "held near zero, not to a measured pitch: wrong on a grade, unseen in the run")
-    return Verdict("accepted", f"held to the measured pitch by {figures.moment_share_band:.1%} of I pitch''")
+        return StabilisedRunVerdict(
+            "stabilise", "held near zero, not to a measured pitch: wrong on a grade, unseen in the run"
+        )
+    return StabilisedRunVerdict(
+        "accepted", f"held to the measured pitch by {run_figures.moment_share_band:.1%} of I pitch''"
+    )
 
 
-def _tumbling_verdict(figures: RunFigures) -> Verdict:
+def _tumbling_verdict(run_figures: RunFigures) -> StabilisedRunVerdict:
     """Verdict on a run that tumbled: rejected."""
-    return Verdict("rejected", f"tumbled: pitch of {figures.pitch_max:.2g} rad; none of its forces mean anything")
+    return StabilisedRunVerdict(
+        "rejected", f"tumbled: pitch of {run_figures.pitch_max:.2g} rad; none of its forces mean anything"
+    )
 
 
-def _free_run_verdict(duration: float, trusted: float | None) -> Verdict:
+def _free_run_verdict(duration: float, trusted_duration: float | None) -> StabilisedRunVerdict:
     """Verdict on a run without stabiliser, by the predicted time (s) for which it can be trusted."""
-    if trusted is None:
-        return Verdict("stabilise", "free, and nothing predicts how long it can be trusted")
-    if duration <= trusted:
-        return Verdict("accepted", f"free, and trusted for {trusted:.3g} s")
-    return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
+    if trusted_duration is None:
+        return StabilisedRunVerdict("stabilise", "free, and nothing predicts how long it can be trusted")
+    if duration <= trusted_duration:
+        return StabilisedRunVerdict("accepted", f"free, and trusted for {trusted_duration:.3g} s")
+    return StabilisedRunVerdict("stabilise", f"free, and trusted for {trusted_duration:.3g} s of {duration:.3g} s")
 
 
-def _exceeded_limits(errors: RunErrors, limits: Limits) -> list[str]:
+def _exceeded_limits(run_errors: RunErrors, acceptance_limits: AcceptanceLimits) -> list[str]:
     """Phrases on the errors relative to the true run that exceed their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
-        for name, ratio in errors.damage.items()
-        if not abs(ratio - 1.0) <= limits.damage_error
+        for name, ratio in run_errors.damage.items()
+        if not abs(ratio - 1.0) <= acceptance_limits.damage_error
     ]
-    return damage + ([] if errors.pitch_max <= limits.pitch_error else [f"pitch wrong by {errors.pitch_max:.2g} rad"])
+    return damage + (
+        []
+        if run_errors.pitch_max <= acceptance_limits.pitch_error
+        else [f"pitch wrong by {run_errors.pitch_max:.2g} rad"]
+    )
 
 
-def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:
+def _stabiliser_burden_sentences(run_figures: RunFigures, acceptance_limits: AcceptanceLimits) -> list[str]:
     """Phrases on the artificial moment and force of the stabiliser where their shares exceed the limit."""
-    shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
+    shares = {
+        "moment": (run_figures.moment_share_band, "I pitch''"),
+        "force": (run_figures.force_share_band, "m3 z3''"),
+    }
     return [
         f"artificial {name} {share:.0%} of {full_value}"
         for name, (share, full_value) in shares.items()
-        if not share <= limits.artificial_share
+        if not share <= acceptance_limits.artificial_share
     ]
 
 
-def root_mean_square(values: np.ndarray) -> float:
+def root_mean_square(samples: np.ndarray) -> float:
     """Root mean square of an array."""
-    return float(np.sqrt(np.mean(np.square(values))))
+    return float(np.sqrt(np.mean(np.square(samples))))
 
 
-def low_pass(values: np.ndarray, step: float) -> np.ndarray:
-    """Samples (n,) spaced by ``step`` (s), with frequencies above JUDGED_BAND removed without phase shift."""
+def low_pass(samples: np.ndarray, sampling_period: float) -> np.ndarray:
+    """Samples (n,) spaced by ``sampling_period`` (s), with frequencies above JUDGED_BAND removed without phase
+    shift.
+    """
     from scipy.signal import butter, sosfiltfilt
 
-    return sosfiltfilt(butter(BUTTERWORTH_ORDER, JUDGED_BAND, fs=1.0 / step, output="sos"), values)
+    return sosfiltfilt(butter(BUTTERWORTH_ORDER, JUDGED_BAND, fs=1.0 / sampling_period, output="sos"), samples)
 
 
-def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
-    """Ratio of the root mean square of ``values`` to that of ``total``; 0 where both are 0."""
-    size, all_of_it = root_mean_square(values), root_mean_square(total)
+def _rms_ratio(samples: np.ndarray, reference_samples: np.ndarray) -> float:
+    """Ratio of the root mean square of ``samples`` to that of ``reference_samples``; 0 where both are 0."""
+    size, all_of_it = root_mean_square(samples), root_mean_square(reference_samples)
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
 
-def _step_means(values: np.ndarray, step: float) -> np.ndarray:
+def _step_means(samples: np.ndarray, sampling_period: float) -> np.ndarray:
     """Means (n - 1,) over each step (s) of a sampled signal (n,), by the trapezoidal rule with its end correction,
     order 4."""
-    slope = np.gradient(values, step, edge_order=2)
-    return (values[1:] + values[:-1]) / 2.0 - step / 12.0 * np.diff(slope)
+    slope = np.gradient(samples, sampling_period, edge_order=2)
+    return (samples[1:] + samples[:-1]) / 2.0 - sampling_period / 12.0 * np.diff(slope)
 
 
 def _natural_moment(run: Result, parameters: Parameters) -> np.ndarray:

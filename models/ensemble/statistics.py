@@ -14,16 +14,16 @@ FAN_PERCENTILES = (5, 25, 50, 75, 95)
 """Percentiles of errors that figures show."""
 
 
-def deviation_with_error(values: np.ndarray) -> tuple[float, float]:
+def deviation_with_error(samples: np.ndarray) -> tuple[float, float]:
     """Standard deviation of values (n,) and its standard error, for any distribution of finite fourth moment.
 
     By Var(s^2) = (mu4 - sigma^4) / n to first order; 1/sqrt(2 n) of it for a normal law. Not a number if any
     value is none. Raises InputError for fewer than ``FEWEST_PATHS`` values, of which two have an error of 0 by this.
     """
-    if not len(values):
+    if not len(samples):
         return deviation_from_moments(0, 0.0, 0.0)
-    centred = values - values.mean()
-    return deviation_from_moments(len(values), float(np.mean(centred**2)), float(np.mean(centred**4)))
+    centred = samples - samples.mean()
+    return deviation_from_moments(len(samples), float(np.mean(centred**2)), float(np.mean(centred**4)))
 
 
 def deviation_from_moments(value_count: int, second_moment: float, fourth_moment: float) -> tuple[float, float]:
@@ -45,16 +45,16 @@ def percentiles(errors: np.ndarray) -> np.ndarray:
     return np.nanpercentile(np.abs(errors), FAN_PERCENTILES, axis=0)
 
 
-def quantile_with_interval(values: np.ndarray, probability: float) -> tuple[float, float, float]:
+def quantile_with_interval(samples: np.ndarray, probability: float) -> tuple[float, float, float]:
     """Quantile of values (n,), some of which may be infinite, and the ends of the quantile's 95 % interval.
 
     Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial. Raises
     InputError without a value, for one that is no number, and for a probability that is not between 0 and 1.
     """
-    if not len(values) or np.isnan(values).any():
+    if not len(samples) or np.isnan(samples).any():
         raise InputError("", "values", None, "must be numbers, one or more; infinite ones are allowed")
-    ordered = np.sort(values)
-    middle, low, high = (float(ordered[rank]) for rank in quantile_ranks(len(values), probability))
+    ordered = np.sort(samples)
+    middle, low, high = (float(ordered[rank]) for rank in quantile_ranks(len(samples), probability))
     return middle, low, high
 
 

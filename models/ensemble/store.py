@@ -21,7 +21,7 @@ from models.core.errors import InputError
 from models.core.result import RECORDED_PACKAGES
 from models.core.whole_files import remove_partial_files, write_whole
 
-Arrays = dict[str, np.ndarray]
+ArraysByName = dict[str, np.ndarray]
 """Arrays by name: the results of a block."""
 JOB_FILE = "job.json"
 """Name of the file that identifies the job to which the blocks of a folder belong."""
@@ -30,13 +30,13 @@ LOCK_FILE = ".lock"
 
 
 @dataclass(frozen=True)
-class Store:
+class BlockStore:
     """Store of finished blocks in ``folder``, one file each; a file is either complete or absent."""
 
     folder: Path
 
     @contextmanager
-    def reserved_folder(self, facts: dict[str, Any]) -> Iterator[None]:
+    def reserved_folder(self, job_facts: dict[str, Any]) -> Iterator[None]:
         """Context in which the folder is reserved for this job and process.
 
         Raises InputError if it belongs to another job, or if another process is at work in it.
@@ -44,7 +44,7 @@ class Store:
         self.folder.mkdir(parents=True, exist_ok=True)
         with exclusive_folder(self.folder):
             remove_partial_files(self.folder)
-            self._write_job(fingerprint(facts))
+            self._write_job(fingerprint(job_facts))
             yield
 
     def _write_job(self, job_facts: dict[str, Any]) -> None:
@@ -54,7 +54,7 @@ class Store:
         if not file.exists():
             write_whole(file, json.dumps(job_facts, indent=1).encode())
             return
-        stored_job = _read_note(file)
+        stored_job = _read_job_file(file)
         for key in (*job_facts, *stored_job):
             if job_facts.get(key) != stored_job.get(key):
                 allowed = (
@@ -64,31 +64,31 @@ class Store:
                 )
                 raise InputError(file, key, stored_job.get(key), allowed)
 
-    def path(self, block: int) -> Path:
+    def path(self, block_number: int) -> Path:
         """Path of a block's file."""
-        return self.folder / f"block {block:06d}.npz"
+        return self.folder / f"block {block_number:06d}.npz"
 
-    def has(self, block: int) -> bool:
+    def has(self, block_number: int) -> bool:
         """Whether a block is finished."""
-        return self.path(block).exists()
+        return self.path(block_number).exists()
 
-    def save(self, block: int, arrays: Arrays) -> None:
+    def save(self, block_number: int, arrays: ArraysByName) -> None:
         """Save a block to disk; its file appears only when it is complete."""
         content = io.BytesIO()
         np.savez(content, allow_pickle=False, **arrays)
-        write_whole(self.path(block), content.getvalue())
+        write_whole(self.path(block_number), content.getvalue())
 
-    def load(self, block: int) -> Arrays:
+    def load(self, block_number: int) -> ArraysByName:
         """A finished block; raises InputError if its file is damaged (zip checks every byte)."""
         try:
-            with np.load(self.path(block), allow_pickle=False) as file:
+            with np.load(self.path(block_number), allow_pickle=False) as file:
                 return {name: file[name] for name in file.files}
         except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise InputError(self.path(block), "", None, f"is damaged ({error}): delete it and resume") from None
+            raise InputError(self.path(block_number), "", None, f"is damaged ({error}): delete it and resume") from None
 
 
 @contextmanager
-def exclusive_folder(folder: Path) -> Iterator[None]:
+def exclusive_folder(store_folder: Path) -> Iterator[None]:
     """Context with exclusive use of the folder; InputError if another process uses it. The lock ends with its
     process."""
     try:
@@ -96,32 +96,32 @@ def exclusive_folder(folder: Path) -> Iterator[None]:
     except ImportError:  # not a system that has such locks
         yield
         return
-    with (folder / LOCK_FILE).open("a") as file:
+    with (store_folder / LOCK_FILE).open("a") as file:
         try:
             flock(file, LOCK_EX | LOCK_NB)
         except BlockingIOError:
             allowed = "another process is at work in this folder: wait for it, or begin in a new one"
-            raise InputError(folder, "", None, allowed) from None
+            raise InputError(store_folder, "", None, allowed) from None
         yield
 
 
-def _read_note(file: Path) -> dict[str, Any]:
+def _read_job_file(note_path: Path) -> dict[str, Any]:
     """Content of a folder's job file; raises InputError if it cannot be read."""
     try:
-        note = json.loads(file.read_text())
+        note = json.loads(note_path.read_text())
     except (OSError, ValueError) as error:
-        raise InputError(file, "", None, f"is not the note of an ensemble: {error}") from None
+        raise InputError(note_path, "", None, f"is not the note of an ensemble: {error}") from None
     return note if isinstance(note, dict) else {}
 
 
-def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
+def fingerprint(job_facts: dict[str, Any]) -> dict[str, Any]:
     """Facts that identify a job: its settings as dotted keys, arrays by their checksum, the code and the package
     versions.
 
     Bits depend on all of these (and on the processor's own rounding of sines, which is left out).
     """
     versions = {name: version(name) for name in RECORDED_PACKAGES}
-    return dict(_flat_items("", {**facts, "code of models": _code_checksum(), "versions": versions}))
+    return dict(_flat_items("", {**job_facts, "code of models": _code_checksum(), "versions": versions}))
 
 
 def _flat_items(key_path: str, job_value: Any) -> list[tuple[str, Any]]:
@@ -144,54 +144,58 @@ def _code_checksum() -> str:
     return checksum_of_sources(Path(__file__).parents[1])
 
 
-def checksum_of_sources(root: Path) -> str:
+def checksum_of_sources(source_folder: Path) -> str:
     """Checksum of all files below a folder on which a run can depend: sources, parameters, tables."""
     digest = hashlib.sha256()
-    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml", ".csv", ".dat")):
-        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    for path in sorted(path for path in source_folder.rglob("*") if path.suffix in (".py", ".toml", ".csv", ".dat")):
+        digest.update(path.relative_to(source_folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def named_files(job_value: Any, folder: Path) -> dict[str, str]:
-    """Checksum of each file that a text in a job names, by that text; paths start from ``folder`` or from the working
-    folder.
+def named_files(job_value: Any, base_folder: Path) -> dict[str, str]:
+    """Checksum of each file that a text in a job names, by that text; paths start from ``base_folder`` or from the
+    working folder.
 
     job_value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
     """
     hashes: dict[str, str] = {}
-    _collect_files(job_value, folder, hashes, set())
+    _collect_files(job_value, base_folder, hashes, set())
     return hashes
 
 
-def _collect_files(job_value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
-    """Add the checksums of all files named in a job's values to ``hashes``."""
+def _collect_files(job_value: Any, base_folder: Path, checksums: dict[str, str], paths_seen: set[Path]) -> None:
+    """Add the checksums of all files named in a job's values to ``checksums``."""
     if isinstance(job_value, dict | list | tuple):
         for inner in job_value.values() if isinstance(job_value, dict) else job_value:
-            _collect_files(inner, folder, hashes, paths_seen)
-    elif isinstance(job_value, str) and (path := _named_file(job_value, folder)) and path.resolve() not in paths_seen:
+            _collect_files(inner, base_folder, checksums, paths_seen)
+    elif (
+        isinstance(job_value, str)
+        and (path := _named_file(job_value, base_folder))
+        and path.resolve() not in paths_seen
+    ):
         paths_seen.add(path.resolve())
         content = path.read_bytes()
-        hashes[job_value] = hashes.get(job_value, "") + hashlib.sha256(content).hexdigest()[:16]
+        checksums[job_value] = checksums.get(job_value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
-            _collect_files(_toml_content(content), path.parent, hashes, paths_seen)
+            _collect_files(_toml_content(content), path.parent, checksums, paths_seen)
 
 
-def _named_file(text: str, folder: Path) -> Path | None:
+def _named_file(file_text: str, base_folder: Path) -> Path | None:
     """Path of the file that a text names, or None."""
-    text_before_colon, _, _ = text.rpartition(":")
-    for path in (folder / text, Path(text), folder / text_before_colon, Path(text_before_colon)):
-        if text and os.path.isfile(path):
+    text_before_colon, _, _ = file_text.rpartition(":")
+    for path in (base_folder / file_text, Path(file_text), base_folder / text_before_colon, Path(text_before_colon)):
+        if file_text and os.path.isfile(path):
             return path
     return _module_file(text_before_colon)
 
 
-def _module_file(name: str) -> Path | None:
+def _module_file(module_name: str) -> Path | None:
     """Path of a Python module's source, or None."""
-    if not name or not all(name_part.isidentifier() for name_part in name.split(".")):
+    if not module_name or not all(name_part.isidentifier() for name_part in module_name.split(".")):
         return None
     try:
-        spec = find_spec(name)
+        spec = find_spec(module_name)
     except (ImportError, ValueError):
         return None
     return Path(spec.origin) if spec and spec.origin and os.path.isfile(spec.origin) else None

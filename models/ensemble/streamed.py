@@ -26,11 +26,11 @@ class StreamedMoments:
         self.count = 0
         self.mean = self.second = self.third = self.fourth = np.zeros(())
 
-    def add(self, values: np.ndarray) -> None:
+    def add(self, samples: np.ndarray) -> None:
         """Include a batch of values (n, ...) in the moments."""
-        n, m, total = self.count, len(values), self.count + len(values)
-        mean = values.mean(axis=0)
-        second, third, fourth = (((values - mean) ** power).sum(axis=0) for power in (2, 3, 4))
+        n, m, total = self.count, len(samples), self.count + len(samples)
+        mean = samples.mean(axis=0)
+        second, third, fourth = (((samples - mean) ** power).sum(axis=0) for power in (2, 3, 4))
         d = mean - self.mean
         self.fourth = (
             self.fourth
@@ -45,11 +45,11 @@ class StreamedMoments:
         self.second = self.second + second + d**2 * n * m / total
         self.mean, self.count = self.mean + d * m / total, total
 
-    def deviation(self, *index: int) -> tuple[float, float]:
+    def deviation(self, *array_index: int) -> tuple[float, float]:
         """Standard deviation of the values at an array index, and its standard error, as by
         ``statistics.deviation_with_error``."""
         return deviation_from_moments(
-            self.count, float(self.second[index]) / self.count, float(self.fourth[index]) / self.count
+            self.count, float(self.second[array_index]) / self.count, float(self.fourth[array_index]) / self.count
         )
 
 
@@ -59,11 +59,11 @@ class StreamedCovariance:
     def __init__(self) -> None:
         self.count, self.mean, self._sums = 0, np.zeros(()), np.zeros(())
 
-    def add(self, values: np.ndarray) -> None:
+    def add(self, samples: np.ndarray) -> None:
         """Include a batch of values (n, ..., p) in mean and covariance."""
-        n, m, total = self.count, len(values), self.count + len(values)
-        mean = values.mean(axis=0)
-        deviations, d = values - mean, mean - self.mean
+        n, m, total = self.count, len(samples), self.count + len(samples)
+        mean = samples.mean(axis=0)
+        deviations, d = samples - mean, mean - self.mean
         mean_shift = d[..., :, None] * d[..., None, :] * (n * m / total)
         self._sums = self._sums + np.einsum("n...i,n...j->...ij", deviations, deviations) + mean_shift
         self.mean, self.count = self.mean + d * m / total, total
@@ -81,9 +81,9 @@ class ValueCounts:
     def __init__(self) -> None:
         self._counts: Counter[float] = Counter()
 
-    def add(self, values: np.ndarray) -> None:
+    def add(self, samples: np.ndarray) -> None:
         """Count a batch of values (n,), some of which may be infinite."""
-        distinct_values, counts = np.unique(values, return_counts=True)
+        distinct_values, counts = np.unique(samples, return_counts=True)
         self._counts.update(dict(zip(distinct_values.tolist(), counts.tolist(), strict=True)))
 
     @property
@@ -114,16 +114,16 @@ class MagnitudeQuantiles:
         self._bins = int(np.ceil(np.log(LARGEST_MAGNITUDE / SMALLEST_MAGNITUDE) / self._width)) + 2
         self._counts = np.zeros((0, self._bins), dtype=np.int64)
 
-    def add(self, values: np.ndarray) -> None:
+    def add(self, samples: np.ndarray) -> None:
         """Count a batch of values (n, k)."""
-        columns = values.shape[1]
+        columns = samples.shape[1]
         if not len(self._counts):
             self._counts = np.zeros((columns, self._bins), dtype=np.int64)
-        sizes = np.clip(np.abs(values), 0.0, LARGEST_MAGNITUDE)
+        sizes = np.clip(np.abs(samples), 0.0, LARGEST_MAGNITUDE)
         with np.errstate(divide="ignore"):
             bin_numbers = np.ceil(np.log(sizes / SMALLEST_MAGNITUDE) / self._width)
         bin_numbers = np.clip(np.nan_to_num(bin_numbers, nan=0.0, neginf=0.0), 0, self._bins - 1).astype(np.int64)
-        known = ~np.isnan(values)
+        known = ~np.isnan(samples)
         cells = (np.arange(columns) * self._bins + bin_numbers)[known]
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 

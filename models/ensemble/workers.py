@@ -25,7 +25,7 @@ from models.machine.left_out import let_in
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of glibc's mallopt, from its malloc.h."""
-KEPT_MEMORY = 1 << 28
+KEPT_MEMORY_BYTES = 1 << 28
 """Freed memory (bytes) that a worker keeps for its next array."""
 
 
@@ -36,8 +36,8 @@ class ReplacingProcessPool(Executor):
     workers wait for ever. These end as soon as the far end of their pipe is closed, by whatever closes it.
     """
 
-    def __init__(self, workers: int) -> None:
-        self._workers, self._context = workers, get_context("spawn")
+    def __init__(self, worker_count: int) -> None:
+        self._workers, self._context = worker_count, get_context("spawn")
         self._theirs, self._ours = self._context.Pipe(duplex=False)
         self._pool = self._started()
 
@@ -76,9 +76,9 @@ class ReplacingProcessPool(Executor):
         self.shutdown(cancel_futures=error_type is not None)
 
 
-def process_pool(workers: int) -> ReplacingProcessPool:
+def process_pool(worker_count: int) -> ReplacingProcessPool:
     """A pool of freshly started processes, since threads of engines and compilers do not survive a fork."""
-    return ReplacingProcessPool(workers)
+    return ReplacingProcessPool(worker_count)
 
 
 @contextmanager
@@ -112,7 +112,7 @@ def keep_freed_memory() -> None:
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
     if mallopt is not None:
         for option in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):
-            mallopt(option, KEPT_MEMORY)
+            mallopt(option, KEPT_MEMORY_BYTES)
 
 
 def _exit_with_parent(pipe: Connection) -> None:
@@ -122,7 +122,7 @@ def _exit_with_parent(pipe: Connection) -> None:
     os._exit(1)
 
 
-DEFAULT_WORKERS = 2
+DEFAULT_WORKER_COUNT = 2
 """Number of worker processes by default, at most one per core; no result depends on it."""
 SCHEDULER_SCHEMES = ("tcp", "tls", "ws", "wss", "ucx", "inproc")
 """Schemes of the address of a Dask scheduler."""
@@ -140,27 +140,30 @@ class Crew:
 
     @classmethod
     def given(
-        cls, workers: int | None = None, cluster: str | None = None, default_workers: int = DEFAULT_WORKERS
+        cls,
+        worker_count: int | None = None,
+        cluster_address: str | None = None,
+        default_workers: int = DEFAULT_WORKER_COUNT,
     ) -> "Crew":
         """The requested workers; without a request, ``default_workers`` processes but at most one per core."""
-        return cls(workers or min(default_workers, os.cpu_count() or 1), cluster)
+        return cls(worker_count or min(default_workers, os.cpu_count() or 1), cluster_address)
 
     @classmethod
-    def of(cls, scene: Any, default_workers: int = DEFAULT_WORKERS) -> "Crew":
+    def of(cls, scene: Any, default_workers: int = DEFAULT_WORKER_COUNT) -> "Crew":
         """The workers that a scene requests: its keys ``workers`` and ``cluster``, or the default."""
         return cls.given(scene.workers, scene.cluster, default_workers)
 
     @contextmanager
-    def at_work(self, blocks: int, *paths: Path) -> Iterator[Executor | None]:
+    def at_work(self, block_count: int, *used_paths: Path) -> Iterator[Executor | None]:
         """Context with the executor for a number of blocks; None where this process computes alone.
 
-        paths : files and folders that the workers read or write, too; InputError where those of a cluster do not see
-        them, or where ``dask_workers`` has something to refuse.
+        used_paths : files and folders that the workers read or write, too; InputError where those of a cluster do not
+        see them, or where ``dask_workers`` has something to refuse.
         """
         if self.cluster is not None:
-            with dask_workers(self.cluster, *paths) as executor:
+            with dask_workers(self.cluster, *used_paths) as executor:
                 yield executor
-        elif (workers := min(self.workers, blocks)) > 1:
+        elif (workers := min(self.workers, block_count)) > 1:
             with process_pool(workers) as executor:
                 yield executor
         else:
@@ -174,31 +177,31 @@ def folders_for_workers(scene: Any) -> tuple[Path, ...]:
 
 
 @contextmanager
-def dask_workers(address: str, *paths: Path) -> Iterator[Executor]:
+def dask_workers(scheduler_address: str, *used_paths: Path) -> Iterator[Executor]:
     """Context with the workers of a Dask scheduler, such as ``tcp://host:8786``, as an executor; the same twinrig must
     be installed there.
 
     Certificates of a ``tls://`` address are those of Dask's configuration. Raises InputError where the extra
     ``cluster`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
-    sources, with several threads (engines share their callbacks within a process), or without sight of ``paths``.
+    sources, with several threads (engines share their callbacks within a process), or without sight of ``used_paths``.
     """
     let_in("dask")
     try:
         from distributed import Client
     except ImportError:
-        raise InputError("", "cluster", address, "needs Dask: pip install 'twinrig[cluster]'") from None
-    scheme, separator, host = address.partition("://")
+        raise InputError("", "cluster", scheduler_address, "needs Dask: pip install 'twinrig[cluster]'") from None
+    scheme, separator, host = scheduler_address.partition("://")
     if not separator or not host:
-        raise InputError("", "cluster", address, "must read SCHEME://HOST:PORT, for example tcp://host:8786")
+        raise InputError("", "cluster", scheduler_address, "must read SCHEME://HOST:PORT, for example tcp://host:8786")
     if scheme not in SCHEDULER_SCHEMES:
         raise InputError("", "cluster", scheme, "is no way to reach a scheduler", SCHEDULER_SCHEMES)
     try:
-        client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
+        client = Client(scheduler_address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
+        raise InputError("", "cluster", scheduler_address, f"no Dask scheduler answers there: {reason}") from None
     with client:
-        _check_workers(client, address, paths)
+        _check_workers(client, scheduler_address, used_paths)
         from models.ensemble.dask_worker import WorkerSetup
 
         client.register_plugin(WorkerSetup())
@@ -212,8 +215,8 @@ class ClusterExecutor(Executor):
     width : workers at its beginning.
     """
 
-    def __init__(self, client: Any) -> None:
-        self._client, self._executor, self.width = client, client.get_executor(), len(client.nthreads())
+    def __init__(self, dask_client: Any) -> None:
+        self._client, self._executor, self.width = dask_client, dask_client.get_executor(), len(dask_client.nthreads())
         self._jobs: dict[int, tuple[Any, Any]] = {}
 
     def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:
@@ -226,9 +229,9 @@ class ClusterExecutor(Executor):
         return self._executor.submit(function, *args, **options)
 
 
-def _identity(job: Any) -> Any:
+def _identity(cluster_job: Any) -> Any:
     """The job itself: the task by which a cluster stores it."""
-    return job
+    return cluster_job
 
 
 class _WorkerState(NamedTuple):
@@ -236,26 +239,28 @@ class _WorkerState(NamedTuple):
 
     sources: str
     threads: int
-    missing: list[str]
+    missing_paths: list[str]
 
 
-def _worker_state(paths: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
+def _worker_state(used_paths: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
     """State of the cluster worker on which this function runs, for these paths; Dask prescribes the name of the second
     argument."""
-    missing = [str(path) for path in paths if not path.exists()]
+    missing = [str(path) for path in used_paths if not path.exists()]
     return _WorkerState(checksum_of_sources(Path(__file__).parents[1]), dask_worker.state.nthreads, missing)
 
 
-def _check_workers(client: Any, address: str, paths: tuple[Path, ...]) -> None:
+def _check_workers(dask_client: Any, scheduler_address: str, used_paths: tuple[Path, ...]) -> None:
     """Raise InputError if a cluster has no worker, or one that would not compute the same results."""
-    absolute = tuple(path.resolve() for path in paths)
+    absolute = tuple(path.resolve() for path in used_paths)
     try:
-        workers = client.run(_worker_state, absolute)
+        workers = dask_client.run(_worker_state, absolute)
     except (ImportError, AttributeError) as error:
         allowed = f"its workers have no twinrig, or another one: {error}"
-        raise InputError("", "cluster", address, allowed) from None
+        raise InputError("", "cluster", scheduler_address, allowed) from None
     if not workers:
-        raise InputError("", "cluster", address, "no worker has joined this scheduler: start one, dask worker ADDRESS")
+        raise InputError(
+            "", "cluster", scheduler_address, "no worker has joined this scheduler: start one, dask worker ADDRESS"
+        )
     checksum = checksum_of_sources(Path(__file__).parents[1])
     for worker, worker_state in workers.items():
         if worker_state.sources != checksum:
@@ -263,8 +268,8 @@ def _check_workers(client: Any, address: str, paths: tuple[Path, ...]) -> None:
         elif worker_state.threads != 1:
             threads = f"has {worker_state.threads} threads, which would share an engine's callbacks"
             allowed = f"{threads}: start it with --nthreads 1"
-        elif worker_state.missing:
-            allowed = f"does not see {', '.join(worker_state.missing)}: use a folder that all machines share"
+        elif worker_state.missing_paths:
+            allowed = f"does not see {', '.join(worker_state.missing_paths)}: use a folder that all machines share"
         else:
             continue
-        raise InputError("", "cluster", address, f"the worker {worker} {allowed}")
+        raise InputError("", "cluster", scheduler_address, f"the worker {worker} {allowed}")

@@ -36,9 +36,9 @@ class CountedLoad:
     mean: float
 
 
-def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> CountedLoad:
-    """``CountedLoad`` of a load history (n,), for Woehler exponents ``slopes``; raises InputError for an empty load, or
-    one that is not finite."""
+def counted_load(load: np.ndarray, woehler_slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> CountedLoad:
+    """``CountedLoad`` of a load history (n,), for Woehler exponents ``woehler_slopes``; raises InputError for an empty
+    load, or one that is not finite."""
     load = checked_load(load)
     turns = turning_points(load)
     spans, _, counts = rainflow_cycles(turns)
@@ -46,7 +46,7 @@ def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) 
     levels = np.linspace(smallest, greatest, LEVEL_COUNT + 1)
     ranges = np.linspace(0.0, greatest - smallest, RANGE_COUNT + 1)[1:]
     return CountedLoad(
-        {slope: damage_sum(spans, counts, slope) for slope in slopes},
+        {slope: damage_sum(spans, counts, slope) for slope in woehler_slopes},
         levels,
         level_crossings(turns, levels),
         ranges,
@@ -71,9 +71,9 @@ def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
     return np.cumsum(change)[: len(levels)][index_of_level]
 
 
-def range_pairs(spans: np.ndarray, cycle_counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Number of cycles with at least each range (r,), from the ranges ``spans`` (c,) and counts (c,) of the rainflow
-    cycles."""
-    order = np.argsort(spans)
+def range_pairs(cycle_ranges: np.ndarray, cycle_counts: np.ndarray, counted_ranges: np.ndarray) -> np.ndarray:
+    """Number of cycles with at least each range (r,), from the ranges ``cycle_ranges`` (c,) and counts (c,) of the
+    rainflow cycles."""
+    order = np.argsort(cycle_ranges)
     cycles_above = np.concatenate((np.cumsum(cycle_counts[order][::-1])[::-1], [0.0]))
-    return cycles_above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]
+    return cycles_above[np.searchsorted(cycle_ranges[order], counted_ranges * (1 - 1e-12), side="left")]

@@ -53,23 +53,26 @@ def checked_load(load: np.ndarray) -> np.ndarray:
     return load
 
 
-def damage_sum(spans: np.ndarray, cycle_counts: np.ndarray, slope: float) -> float:
+def damage_sum(cycle_ranges: np.ndarray, cycle_counts: np.ndarray, woehler_slope: float) -> float:
     """Pseudo-damage: sum of count times range^slope over cycles (c,); raises InputError for an invalid slope, or a sum
     too large for a double."""
-    if not (math.isfinite(slope) and slope > 0.0):
-        raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
+    if not (math.isfinite(woehler_slope) and woehler_slope > 0.0):
+        raise InputError("", "slope", woehler_slope, "must be a Woehler exponent above 0")
     with np.errstate(over="ignore"):
-        damage = float(np.sum(cycle_counts * spans**slope))
+        damage = float(np.sum(cycle_counts * cycle_ranges**woehler_slope))
     if not math.isfinite(damage):
         raise InputError(
-            "", "load", float(spans.max()), f"has a range whose power {slope:g} is beyond all numbers: use another unit"
+            "",
+            "load",
+            float(cycle_ranges.max()),
+            f"has a range whose power {woehler_slope:g} is beyond all numbers: use another unit",
         )
     return damage
 
 
-def pseudo_damage(load: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
+def pseudo_damage(load_history: np.ndarray, woehler_slope: float = WOEHLER_SLOPE) -> float:
     """Pseudo-damage of a load history (n,): sum of count times range^slope over its rainflow cycles, in the load's unit
-    to the power ``slope``.
+    to the power ``woehler_slope``.
 
     A load that never turns has none. Raises InputError for a load without a sample, or with one that is not
     finite: damage of a broken run is not a number to compare; for a slope that is not above 0; and where the damage
@@ -77,14 +80,14 @@ def pseudo_damage(load: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
     """
     from models.fatigue.rainflow_cycles import rainflow_cycles
 
-    spans, _, counts = rainflow_cycles(turning_points(checked_load(load)))
-    return damage_sum(spans, counts, slope)
+    spans, _, counts = rainflow_cycles(turning_points(checked_load(load_history)))
+    return damage_sum(spans, counts, woehler_slope)
 
 
-def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
+def damage_ratio(load_history: np.ndarray, true_load: np.ndarray, woehler_slope: float = WOEHLER_SLOPE) -> float:
     """Pseudo-damage of a load (n,) divided by that of the true load (m,); raises InputError if the true load never
     varies."""
-    true_damage = pseudo_damage(truth, slope)
-    if true_damage == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():
+    true_damage = pseudo_damage(true_load, woehler_slope)
+    if true_damage == 0.0 or np.ptp(true_load) <= REST_RANGE_SHARE * np.abs(true_load).max():
         raise InputError("", "true load", None, "never varies, so it does no damage to which another could be compared")
-    return pseudo_damage(load, slope) / true_damage
+    return pseudo_damage(load_history, woehler_slope) / true_damage

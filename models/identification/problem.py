@@ -17,32 +17,32 @@ FAILED_RESIDUAL = 1e3
 """Residual of every sample where the model fails at trial values, so that a search turns back."""
 SAMPLES_PER_PERIOD = 4.0
 """Number of samples kept per period of the low-pass edge."""
-FEWEST_SAMPLES = 32
+FEWEST_FITTED_SAMPLES = 32
 """Least number of samples of a channel for a fit."""
-SETS_OF_PREDICTIONS = 2
+CACHED_PREDICTION_COUNT = 2
 """Number of cached sets of predictions; a set is a base prediction and all its derivatives."""
 
-Curve = tuple[np.ndarray, np.ndarray]
+TimeCurve = tuple[np.ndarray, np.ndarray]
 """Times (n,) in s and values (n,) of a channel."""
-Model = Callable[[np.ndarray], Mapping[str, Curve]]
+ChannelModel = Callable[[np.ndarray], Mapping[str, TimeCurve]]
 """Function of parameter values (p,) that gives channels by name; raises RunFailed or InputError where the model
 fails."""
 
 
 @dataclass(frozen=True)
-class Parameter:
+class IdentifiedParameter:
     """Parameter to be identified, with start value, bounds, and ``scale``: a significant change, in which steps and
     combinations are measured."""
 
     name: str
     start: float
-    low: float = -np.inf
-    high: float = np.inf
+    lower_bound: float = -np.inf
+    upper_bound: float = np.inf
     scale: float = 0.0
 
     def __post_init__(self) -> None:
-        if not self.low < self.start < self.high:
-            allowed = f"must start between its bounds, {self.low:g} and {self.high:g}"
+        if not self.lower_bound < self.start < self.upper_bound:
+            allowed = f"must start between its bounds, {self.lower_bound:g} and {self.upper_bound:g}"
             raise InputError("--parameters", self.name, self.start, allowed)
         if self.scale <= 0.0:
             object.__setattr__(self, "scale", self._default_scale())
@@ -52,8 +52,8 @@ class Parameter:
         there is no range."""
         if self.start != 0.0:
             return abs(self.start)
-        if np.isfinite(self.high - self.low):
-            return 0.25 * (self.high - self.low)
+        if np.isfinite(self.upper_bound - self.lower_bound):
+            return 0.25 * (self.upper_bound - self.lower_bound)
         allowed = f"starts at 0 and so has no scale: name a range, {self.name}=LOW:HIGH"
         raise InputError("--parameters", self.name, None, allowed)
 
@@ -81,11 +81,11 @@ class FitClock:
             else 1
         )
 
-    def filtered(self, values: np.ndarray) -> np.ndarray:
+    def filtered(self, channel_values: np.ndarray) -> np.ndarray:
         """A channel's values (n,) after the low-pass filter."""
         if self.low_pass_edge <= 0.0:
-            return values
-        return low_passed(values[:, None], self.period, self.low_pass_edge, "", "--low-pass")[:, 0]
+            return channel_values
+        return low_passed(channel_values[:, None], self.period, self.low_pass_edge, "", "--low-pass")[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,23 +105,28 @@ class ChannelOnClock:
         return float(np.sqrt(np.mean(self.values[self.is_used] ** 2)))
 
 
-def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, source: str = "") -> ChannelOnClock:
+def measured_channel(
+    channel_name: str, unit: str, measured_curve: TimeCurve, fit_clock: FitClock, measurement_name: str = ""
+) -> ChannelOnClock:
     """A channel of a file, interpolated to the fit's clock; InputError if it has too few samples there, or is zero
     throughout."""
-    times, raw = curve
+    times, raw = measured_curve
     values = without_outliers(raw)
     known = np.isfinite(values)
-    is_inside = known & (times >= clock.times[0]) & (times <= clock.times[-1])
-    if is_inside.sum() < FEWEST_SAMPLES:
-        allowed = f"samples between {clock.times[0]:g} and {clock.times[-1]:g} s: at least {FEWEST_SAMPLES} are needed"
-        raise InputError(source, name, int(is_inside.sum()), allowed)
-    period = max(float(np.median(np.diff(times))), clock.period)
-    nearest = np.abs(times[known][_nearest_sample(times[known], clock.times)] - clock.times)
+    is_inside = known & (times >= fit_clock.times[0]) & (times <= fit_clock.times[-1])
+    if is_inside.sum() < FEWEST_FITTED_SAMPLES:
+        allowed = (
+            f"samples between {fit_clock.times[0]:g} and {fit_clock.times[-1]:g} s: at least "
+            f"{FEWEST_FITTED_SAMPLES} are needed"
+        )
+        raise InputError(measurement_name, channel_name, int(is_inside.sum()), allowed)
+    period = max(float(np.median(np.diff(times))), fit_clock.period)
+    nearest = np.abs(times[known][_nearest_sample(times[known], fit_clock.times)] - fit_clock.times)
     used = nearest <= 1.5 * period
-    smooth = clock.filtered(np.interp(clock.times, times[known], values[known]))
+    smooth = fit_clock.filtered(np.interp(fit_clock.times, times[known], values[known]))
     if not np.any(smooth[used]):
-        raise InputError(source, name, 0.0, "does not move: nothing can be identified by it")
-    return ChannelOnClock(name, unit, smooth, used, int(len(raw) - known.sum()))
+        raise InputError(measurement_name, channel_name, 0.0, "does not move: nothing can be identified by it")
+    return ChannelOnClock(channel_name, unit, smooth, used, int(len(raw) - known.sum()))
 
 
 def _nearest_sample(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
@@ -131,39 +136,39 @@ def _nearest_sample(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class IdentificationProblem:
     """Identification problem: model, parameters and measured channels. counted_times (n,) : whether the residuals at
     each time count; None for all."""
 
-    model: Model
-    parameters: Sequence[Parameter]
+    model: ChannelModel
+    parameters: Sequence[IdentifiedParameter]
     channels: Sequence[ChannelOnClock]
     clock: FitClock
     counted_times: np.ndarray | None = None
 
     @property
-    def start(self) -> np.ndarray:
+    def start_values(self) -> np.ndarray:
         """Start values (p,) of the parameters."""
         return np.array([parameter.start for parameter in self.parameters])
 
     @property
-    def scale(self) -> np.ndarray:
+    def scales(self) -> np.ndarray:
         """Scales (p,) of the parameters: significant changes, in which steps are measured."""
         return np.array([parameter.scale for parameter in self.parameters])
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds (p,) of the parameters."""
-        return np.array([parameter.low for parameter in self.parameters]), np.array(
-            [parameter.high for parameter in self.parameters]
+        return np.array([parameter.lower_bound for parameter in self.parameters]), np.array(
+            [parameter.upper_bound for parameter in self.parameters]
         )
 
-    def predicted(self, values: np.ndarray) -> np.ndarray:
+    def predicted(self, parameter_values: np.ndarray) -> np.ndarray:
         """Channels of the model (channels, n) at all times of the clock, low-passed as the measurement; read-only."""
-        key, kept_predictions = values.tobytes(), self._latest_predictions
+        key, kept_predictions = parameter_values.tobytes(), self._latest_predictions
         if key not in kept_predictions:
-            prediction = self._march(values)
-            if len(kept_predictions) >= SETS_OF_PREDICTIONS * (len(self.parameters) + 1):
+            prediction = self._run_model(parameter_values)
+            if len(kept_predictions) >= CACHED_PREDICTION_COUNT * (len(self.parameters) + 1):
                 kept_predictions.pop(next(iter(kept_predictions)))
             kept_predictions[key] = prediction
         return kept_predictions[key]
@@ -178,9 +183,9 @@ class Problem:
         """State for pickling without cached predictions, which other processes do not need."""
         return {name: value for name, value in vars(self).items() if name != "_latest_predictions"}
 
-    def _march(self, values: np.ndarray) -> np.ndarray:
+    def _run_model(self, parameter_values: np.ndarray) -> np.ndarray:
         """Low-passed channels (channels, n) of a run of the model with parameter values (p,)."""
-        run = self.model(values)
+        run = self.model(parameter_values)
         rows = []
         for channel in self.channels:
             times, raw = run[channel.name]
@@ -198,34 +203,35 @@ class Problem:
         return np.array([row[sample_stride] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
-    def target(self) -> np.ndarray:
+    def measured_values(self) -> np.ndarray:
         """Measured channels (channels, m) at the times of the residuals."""
         return np.array([channel.values[:: self.clock.stride] for channel in self.channels])
 
-    def residuals(self, values: np.ndarray) -> np.ndarray:
+    def residuals(self, parameter_values: np.ndarray) -> np.ndarray:
         """Residuals (channels, m): prediction less measurement, divided by the channel's size; FAILED_RESIDUAL where
         the model fails."""
         try:
-            predicted = self.predicted(values)[:, :: self.clock.stride]
+            predicted = self.predicted(parameter_values)[:, :: self.clock.stride]
         except RunFailed:
             return np.where(self.weights > 0.0, FAILED_RESIDUAL, 0.0)
-        return (predicted - self.target) * self.weights
+        return (predicted - self.measured_values) * self.weights
 
     def jacobian(
         self,
-        values: np.ndarray,
-        function: Callable[[np.ndarray], np.ndarray] | None = None,
+        parameter_values: np.ndarray,
+        differentiated_function: Callable[[np.ndarray], np.ndarray] | None = None,
         executor: Executor | None = None,
     ) -> np.ndarray:
         """Jacobian (channels, m, p) by forward differences in the parameters' scales, or backward differences where
         forward ones fail.
 
-        function : what is derived, the residuals if nothing else is named; executor : computes its columns.
+        differentiated_function : what is derived, the residuals if nothing else is named; executor : computes its
+        columns.
         """
-        answer = self.residuals if function is None else function
-        difference_steps = [self._difference_steps(values, k) for k in range(len(self.parameters))]
+        answer = self.residuals if differentiated_function is None else differentiated_function
+        difference_steps = [self._difference_steps(parameter_values, k) for k in range(len(self.parameters))]
         base, moved_values = (
-            answer(values),
+            answer(parameter_values),
             block_results(answer, [difference_step[0][0] for difference_step in difference_steps], executor),
         )
         failed_columns = [
@@ -243,25 +249,31 @@ class Problem:
         columns = [(row - base) / change for row, (_, change) in zip(moved_values, chosen, strict=True)]
         return np.stack(columns, axis=-1)
 
-    def _difference_steps(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
-        """Steps for difference quotients: values (p,) with parameter ``k`` moved forward, then backward, and the step
-        divided by its scale. Steps stay within the bounds; near the upper bound the backward step comes first."""
-        parameter, difference_steps = self.parameters[k], list[tuple[np.ndarray, float]]()
+    def _difference_steps(self, parameter_values: np.ndarray, parameter_index: int) -> list[tuple[np.ndarray, float]]:
+        """Steps for difference quotients: values (p,) with parameter ``parameter_index`` moved forward, then backward,
+        and the step divided by its scale. Steps stay within the bounds; near the upper bound the backward step comes
+        first.
+        """
+        parameter, difference_steps = self.parameters[parameter_index], list[tuple[np.ndarray, float]]()
         step = (
-            DIFFERENCE_STEP
+            SCALED_DIFFERENCE_STEP
             * parameter.scale
-            * (-1.0 if values[k] + DIFFERENCE_STEP * parameter.scale > parameter.high else 1.0)
+            * (
+                -1.0
+                if parameter_values[parameter_index] + SCALED_DIFFERENCE_STEP * parameter.scale > parameter.upper_bound
+                else 1.0
+            )
         )
         for signed in (step, -step):
-            moved_values = values.copy()
-            moved_values[k] += signed
+            moved_values = parameter_values.copy()
+            moved_values[parameter_index] += signed
             difference_steps.append((moved_values, signed / parameter.scale))
         return [
             difference_step
             for difference_step in difference_steps
-            if parameter.low <= difference_step[0][k] <= parameter.high
+            if parameter.lower_bound <= difference_step[0][parameter_index] <= parameter.upper_bound
         ] or difference_steps[:1]
 
 
-DIFFERENCE_STEP = 1e-4
+SCALED_DIFFERENCE_STEP = 1e-4
 """Step of finite differences, in the parameter's scale."""

@@ -14,22 +14,22 @@ from functools import cached_property
 
 import numpy as np
 
-from models.identification.fit import Fit, fit, problem_with_fixed_parameter
-from models.identification.problem import Problem
+from models.identification.fit import ParameterFit, fit, problem_with_fixed_parameter
+from models.identification.problem import IdentificationProblem
 
 LONGEST_LAG_FACTOR = 4.0
 """Ratio of the longest lag to the integral scale of the residuals."""
-MOST_LAGS = 0.1
+LAG_COUNT_LIMIT = 0.1
 """Largest ratio of the longest lag to the number of samples."""
 NORMAL_QUANTILE = 1.96
 """Number of standard deviations of a 95 % interval."""
-SINGULAR_SHARE = 1e-12
+SINGULAR_EIGENVALUE_SHARE = 1e-12
 """Ratio to the largest eigenvalue of the information matrix below which an eigenvalue counts as zero."""
 DETERMINED_HALF_WIDTH = 1.0
 """Half-width of the 95 % interval, in the parameter's scale, from which on a parameter counts as not determined."""
-CHI_SQUARE = 3.841
+CHI_SQUARE_LIMIT = 3.841
 """95 % quantile of chi-square with one degree of freedom."""
-PROFILE_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
+PROFILED_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
 """Distances from the estimate, in standard deviations, at which a likelihood profile is computed."""
 
 
@@ -40,7 +40,7 @@ class Uncertainty:
     at_no_bound (p,) : estimates that lie at no bound; the others have no covariance.
     """
 
-    fit: Fit
+    fit: ParameterFit
     covariance: np.ndarray
     information: np.ndarray
     at_no_bound: np.ndarray
@@ -50,7 +50,7 @@ class Uncertainty:
     def deviations(self) -> np.ndarray:
         """Standard errors (p,) in the units of the parameters; very large for parameters that the data do not
         determine, NaN for estimates at a bound."""
-        spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
+        spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scales
         return np.where(self.at_no_bound, spread, np.nan)
 
     @cached_property
@@ -58,7 +58,7 @@ class Uncertainty:
         """For each parameter (p,): whether its 95 % interval is narrower than its scale, and its estimate lies at no
         bound."""
         with np.errstate(invalid="ignore"):
-            narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scale
+            narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scales
         return self.at_no_bound & narrow
 
     @cached_property
@@ -66,7 +66,7 @@ class Uncertainty:
         """Ratio of the largest to the smallest standard deviation among combinations of parameters, from the
         information matrix."""
         values = np.linalg.eigvalsh(self.information[np.ix_(self.at_no_bound, self.at_no_bound)])
-        return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR_SHARE * values[-1] else np.inf
+        return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR_EIGENVALUE_SHARE * values[-1] else np.inf
 
     def combinations(self) -> list[tuple[float, np.ndarray]]:
         """Uncorrelated combinations of scaled parameters: standard error and direction (p,) of each, the best
@@ -81,12 +81,12 @@ class Uncertainty:
         return answer
 
 
-def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
+def uncertainty(fit: ParameterFit, executor: Executor | None = None) -> Uncertainty:
     """``Uncertainty`` of the estimates, from the residuals of the fit; executor : computes the columns of their
     Jacobian."""
     problem = fit.problem
     jacobian = problem.jacobian(fit.values, executor=executor)
-    free = ~fit.at_bound
+    free = ~fit.is_at_bound
     inner = np.einsum("cmp,cmq->pq", jacobian, jacobian)
     scores = np.einsum("cmp,cm->mp", jacobian, fit.residuals)
     lags, staying = _longest_lags(fit.residuals)
@@ -95,7 +95,7 @@ def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
     if free.any():
         inverse = _information_inverse(inner[free_block])
         both_covariances = (
-            _long_run(scores[:, free], lags),
+            _long_run_covariance(scores[:, free], lags),
             _stationary_covariance(jacobian[:, :, free], fit.residuals, lags),
         )
         covariance[free_block] = inverse @ _larger_covariance(*both_covariances) @ inverse
@@ -103,17 +103,17 @@ def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
     return Uncertainty(fit, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
 
-def _information_inverse(matrix: np.ndarray) -> np.ndarray:
+def _information_inverse(information: np.ndarray) -> np.ndarray:
     """Inverse of an information matrix (p, p), without its undetermined directions."""
-    values, vectors = np.linalg.eigh(matrix)
-    known = values > SINGULAR_SHARE * values[-1]
+    values, vectors = np.linalg.eigh(information)
+    known = values > SINGULAR_EIGENVALUE_SHARE * values[-1]
     return (vectors[:, known] / values[known]) @ vectors[:, known].T
 
 
-def _undetermined_variance(matrix: np.ndarray) -> np.ndarray:
+def _undetermined_variance(information: np.ndarray) -> np.ndarray:
     """Very large variance (p, p) for directions of parameters that do not affect the residuals."""
-    values, vectors = np.linalg.eigh(matrix)
-    blind = vectors[:, values <= SINGULAR_SHARE * values[-1]]
+    values, vectors = np.linalg.eigh(information)
+    blind = vectors[:, values <= SINGULAR_EIGENVALUE_SHARE * values[-1]]
     return 1e12 * blind @ blind.T
 
 
@@ -131,30 +131,30 @@ def _longest_lags(residuals: np.ndarray) -> tuple[int, float]:
             staying = max(
                 staying, float(1.0 + 2.0 * autocorrelation[1 : negative[0] if len(negative) else count].sum())
             )
-    lag_limit = max(1, int(MOST_LAGS * residuals.shape[1]))
+    lag_limit = max(1, int(LAG_COUNT_LIMIT * residuals.shape[1]))
     return min(lag_limit, int(np.ceil(LONGEST_LAG_FACTOR * staying))), staying
 
 
-def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
+def _long_run_covariance(scores: np.ndarray, lag_count: int) -> np.ndarray:
     """Long-run covariance (p, p) of the sum of scores (m, p), with weights that fall linearly with the lag
     (Bartlett)."""
     total = scores.T @ scores
-    for lag in range(1, lags + 1):
+    for lag in range(1, lag_count + 1):
         product = scores[lag:].T @ scores[:-lag]
-        total += (1.0 - lag / (lags + 1.0)) * (product + product.T)
+        total += (1.0 - lag / (lag_count + 1.0)) * (product + product.T)
     count, p = scores.shape
     return total * count / max(count - p, 1)
 
 
-def _stationary_covariance(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.ndarray:
-    """Long-run covariance (p, p) as in ``_long_run``, for stationary residuals: from each channel's own
+def _stationary_covariance(jacobian: np.ndarray, residuals: np.ndarray, lag_count: int) -> np.ndarray:
+    """Long-run covariance (p, p) as in ``_long_run_covariance``, for stationary residuals: from each channel's own
     autocovariance."""
     total = np.zeros((jacobian.shape[2],) * 2)
     for rows, error in zip(jacobian, residuals, strict=True):
-        for lag in range(lags + 1):
+        for lag in range(lag_count + 1):
             autocovariance = float(error[lag:] @ error[: len(error) - lag]) / len(error)
             product = rows[lag:].T @ rows[: len(rows) - lag]
-            total += (1.0 - lag / (lags + 1.0)) * autocovariance * (product if lag == 0 else product + product.T)
+            total += (1.0 - lag / (lag_count + 1.0)) * autocovariance * (product if lag == 0 else product + product.T)
     return total
 
 
@@ -162,7 +162,7 @@ def _larger_covariance(first_covariance: np.ndarray, second_covariance: np.ndarr
     """A covariance (p, p) that is at least as large as both given ones in every direction. Scores account for where
     residuals are large, but scatter more."""
     values, vectors = np.linalg.eigh(second_covariance)
-    values = np.maximum(values, SINGULAR_SHARE * values[-1])
+    values = np.maximum(values, SINGULAR_EIGENVALUE_SHARE * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
     ratios, principal_axes = np.linalg.eigh(back @ first_covariance @ back)
     return root @ (principal_axes * np.maximum(ratios, 1.0)) @ principal_axes.T @ root
@@ -171,42 +171,56 @@ def _larger_covariance(first_covariance: np.ndarray, second_covariance: np.ndarr
 @dataclass(frozen=True, eq=False)
 class LikelihoodProfile:
     """Likelihood profile of one parameter: its values (k,), and the rise of the misfit (k,) at each after all other
-    parameters are refitted, in units in which 3.84 is the 95 % limit; ``parabola`` (k,) : the rise according to the
-    standard error."""
+    parameters are refitted, in units in which 3.84 is the 95 % limit; ``parabolic_rise`` (k,) : the rise according to
+    the standard error."""
 
     name: str
     values: np.ndarray
-    rise: np.ndarray
-    parabola: np.ndarray
+    misfit_rise: np.ndarray
+    parabolic_rise: np.ndarray
 
     @property
     def is_quadratic(self) -> bool:
         """Whether profile and parabola agree to within one half; the standard error then describes the uncertainty
         fully."""
-        return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))
+        return bool(
+            np.all(np.abs(self.misfit_rise - self.parabolic_rise) <= 0.5 * np.maximum(self.parabolic_rise, 1.0))
+        )
 
 
-def likelihood_profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
-    """Likelihood profile of parameter ``k``. The misfit is weighted as in the covariance, so that correlated residuals
-    do not count as independent ones."""
+def likelihood_profile(uncertainty: Uncertainty, parameter_index: int) -> LikelihoodProfile:
+    """Likelihood profile of parameter ``parameter_index``. The misfit is weighted as in the covariance, so that
+    correlated residuals do not count as independent ones."""
     solved, problem = uncertainty.fit, uncertainty.fit.problem
-    scale, parameter = problem.scale[k], problem.parameters[k]
-    spread = uncertainty.deviations[k] if np.isfinite(uncertainty.deviations[k]) else scale
+    scale, parameter = problem.scales[parameter_index], problem.parameters[parameter_index]
+    spread = uncertainty.deviations[parameter_index] if np.isfinite(uncertainty.deviations[parameter_index]) else scale
     spread = min(spread, 0.5 * scale)
-    naive = _information_inverse(uncertainty.information)[k, k] * scale**2
-    weight = naive / uncertainty.deviations[k] ** 2 if np.isfinite(uncertainty.deviations[k]) and naive > 0.0 else 1.0
-    values = [v for v in solved.values[k] + spread * np.array(PROFILE_DEVIATIONS) if parameter.low < v < parameter.high]
+    naive = _information_inverse(uncertainty.information)[parameter_index, parameter_index] * scale**2
+    weight = (
+        naive / uncertainty.deviations[parameter_index] ** 2
+        if np.isfinite(uncertainty.deviations[parameter_index]) and naive > 0.0
+        else 1.0
+    )
+    values = [
+        v
+        for v in solved.values[parameter_index] + spread * np.array(PROFILED_DEVIATIONS)
+        if parameter.lower_bound < v < parameter.upper_bound
+    ]
     rises = []
     for value in values:
-        held_fit = fit(_fixed_parameter_problem(problem, k, value, solved.values))
+        held_fit = fit(_fixed_parameter_problem(problem, parameter_index, value, solved.values))
         rises.append(2.0 * (held_fit.cost - solved.cost) * weight)
-    parabola = ((np.array(values) - solved.values[k]) / uncertainty.deviations[k]) ** 2
+    parabola = ((np.array(values) - solved.values[parameter_index]) / uncertainty.deviations[parameter_index]) ** 2
     return LikelihoodProfile(parameter.name, np.array(values), np.array(rises), parabola)
 
 
-def _fixed_parameter_problem(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:
-    """The problem with parameter ``k`` fixed at a value; the others start from ``values`` (p,), moved inside their
-    bounds."""
-    low, high = problem.bounds
-    start_inside = np.clip(values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
-    return problem_with_fixed_parameter(problem, k, value, start_inside)
+def _fixed_parameter_problem(
+    identification_problem: IdentificationProblem, parameter_index: int, fixed_value: float, start_values: np.ndarray
+) -> IdentificationProblem:
+    """The problem with parameter ``parameter_index`` fixed at a value; the others start from ``start_values`` (p,),
+    moved inside their bounds."""
+    low, high = identification_problem.bounds
+    start_inside = np.clip(
+        start_values, low + 1e-6 * identification_problem.scales, high - 1e-6 * identification_problem.scales
+    )
+    return problem_with_fixed_parameter(identification_problem, parameter_index, fixed_value, start_inside)

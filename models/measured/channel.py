@@ -16,7 +16,7 @@ SAMPLES_PER_BLOCK = 60_000
 
 
 @dataclass(frozen=True)
-class Channel:
+class FileChannel:
     """One channel of a measurement file, with name and unit as in the file."""
 
     name: str
@@ -33,8 +33,8 @@ class Channel:
 class SampleBlock:
     """Successive samples of some channels of one group.
 
-    first : index of the first one. times (n,) : s since ``Source.start``, as in the file, whatever their order;
-    values (n, channels) : in the file's units, NaN where nothing was measured.
+    first : index of the first one. times (n,) : s since ``MeasurementSource.start``, as in the file, whatever their
+    order; values (n, channels) : in the file's units, NaN where nothing was measured.
     """
 
     first: int
@@ -42,7 +42,7 @@ class SampleBlock:
     values: np.ndarray
 
 
-class Source(Protocol):
+class MeasurementSource(Protocol):
     """Protocol of an open measurement file; each format in ``models.measured.formats`` has its own implementation."""
 
     @property
@@ -50,7 +50,7 @@ class Source(Protocol):
         """Path of the file."""
 
     @property
-    def channels(self) -> tuple[Channel, ...]:
+    def channels(self) -> tuple[FileChannel, ...]:
         """All channels that hold numbers over time, with distinct names."""
 
     @property
@@ -65,8 +65,10 @@ class Source(Protocol):
     def findings(self) -> tuple[Finding, ...]:
         """Findings from opening the file: cut off, repeated names, channels left out, notation of numbers."""
 
-    def blocks(self, names: Sequence[str], length: int = SAMPLES_PER_BLOCK, first: int = 0) -> Iterator[SampleBlock]:
-        """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.
+    def blocks(
+        self, channel_names: Sequence[str], block_length: int = SAMPLES_PER_BLOCK, first_sample: int = 0
+    ) -> Iterator[SampleBlock]:
+        """Blocks of at most ``block_length`` samples of channels of one group, from sample ``first_sample`` on.
 
         Raises InputError that names the file and the byte, line or sample where it cannot be read.
         """

@@ -15,7 +15,7 @@ DRIVE_CHANNELS = {"steer": "rad", "speed": "m/s"}
 """Channels of a measured drive, with their units."""
 LEAST_SPEED = 2.0
 """Least speed (m/s) of a drive, since slip angles are ratios to the speed."""
-FEWEST_SAMPLES = 16
+FEWEST_DRIVE_SAMPLES = 16
 """Least number of samples of a drive."""
 
 
@@ -30,41 +30,43 @@ class MeasuredDrive:
     left_out: dict[str, int]
 
 
-def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
+def read_drive(drive_path: Path, time_interval: tuple[float, ...] = ()) -> MeasuredDrive:
     """The drive in a file, or in a time interval (s, s) of it; raises InputError if the file holds no drive."""
-    return _read_drive(path, stretch, path.stat().st_mtime_ns)
+    return _read_drive(drive_path, time_interval, drive_path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
-def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
-    """The drive in a file, cached until the file changes (``stamp``: time of its last change)."""
-    source = open_source(path)
+def _read_drive(drive_path: Path, time_interval: tuple[float, ...], modification_time: int) -> MeasuredDrive:
+    """The drive in a file, cached until the file changes (``modification_time``: time of its last change)."""
+    source = open_source(drive_path)
     read = {name: channel_curve(source, name, unit) for name, unit in DRIVE_CHANNELS.items()}
     first = max(times[0] for times, _ in read.values())
     last = min(times[-1] for times, _ in read.values())
-    begin, end = stretch or (first, last)
+    begin, end = time_interval or (first, last)
     period = float(np.median(np.diff(read["steer"][0])))
     if not (first - period <= begin < end <= last + period):
         allowed = f"must rise and lie within the file's time, from {first:g} to {last:g} s"
-        raise InputError(path, "drive.stretch", [begin, end], allowed)
+        raise InputError(drive_path, "drive.stretch", [begin, end], allowed)
     grid = begin + period * np.arange(int((min(end, last) - begin) / period + 1e-6) + 1)
-    if len(grid) < FEWEST_SAMPLES:
-        raise InputError(path, "rows", len(grid), f"a drive needs at least {FEWEST_SAMPLES} samples")
+    if len(grid) < FEWEST_DRIVE_SAMPLES:
+        raise InputError(drive_path, "rows", len(grid), f"a drive needs at least {FEWEST_DRIVE_SAMPLES} samples")
     values, left_out = dict[str, np.ndarray](), dict[str, int]()
     for name, (times, raw) in read.items():
-        values[name], left_out[name] = on_even_grid(times, raw, grid, f"{path}, {name}")
+        values[name], left_out[name] = on_even_grid(times, raw, grid, f"{drive_path}, {name}")
     slow = int(values["speed"].argmin())
     if values["speed"][slow] < LEAST_SPEED:
         allowed = f"at {grid[slow]:g} s: a drive needs at least {LEAST_SPEED:g} m/s, forward, throughout"
-        raise InputError(path, "speed", float(values["speed"][slow]), allowed)
+        raise InputError(drive_path, "speed", float(values["speed"][slow]), allowed)
     return MeasuredDrive(grid, values["steer"], values["speed"], left_out)
 
 
-def on_even_grid(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
+def on_even_grid(
+    times: np.ndarray, values: np.ndarray, even_times: np.ndarray, error_place: str
+) -> tuple[np.ndarray, int]:
     """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left
     out."""
     cleaned = without_outliers(values)
     known = np.isfinite(cleaned)
-    if known.sum() < FEWEST_SAMPLES:
-        raise InputError(place, "", int(known.sum()), f"at least {FEWEST_SAMPLES} samples must be measured")
-    return np.interp(grid, times[known], cleaned[known]), int(len(cleaned) - known.sum())
+    if known.sum() < FEWEST_DRIVE_SAMPLES:
+        raise InputError(error_place, "", int(known.sum()), f"at least {FEWEST_DRIVE_SAMPLES} samples must be measured")
+    return np.interp(even_times, times[known], cleaned[known]), int(len(cleaned) - known.sum())

@@ -14,7 +14,7 @@ from pydantic import Field
 from models.core.errors import InputError, suggestion_phrase
 from models.core.noise import DROPOUTS, TRANSDUCERS, normal_samples
 from models.core.strict import Strict, quantity
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 
 Amounts = dict[str, float]
 """Amounts of a fault in SI units, by name of a channel, a transducer or a quantity."""
@@ -39,7 +39,7 @@ class Dropouts(Strict):
     channels: list[str] = Field(default=[], description="channels, transducers or quantities; none named: all")
 
 
-class Faults(Strict):
+class SimulatedFaults(Strict):
     """[virtual.faults]: faults that are added to each channel's true signal; a fault that is not named is absent."""
 
     gain: Amounts = Field(default={}, description="relative error of the factor, 0.02 for 2 % too much")
@@ -50,13 +50,15 @@ class Faults(Strict):
     dropouts: Dropouts | None = Field(default=None, description="gaps, all channels of a transducer at once")
 
 
-def amount_of_fault(amounts: Amounts, signal: Signal) -> float:
+def amount_of_fault(fault_amounts: Amounts, signal: MeasuredSignal) -> float:
     """Amount of a fault for a signal in a scene: the value for its channel, else for its transducer, else for its
     quantity, else 0."""
-    return next((amounts[name] for name in _names_of_signal(signal) if name in amounts), 0.0)
+    return next((fault_amounts[name] for name in _names_of_signal(signal) if name in fault_amounts), 0.0)
 
 
-def check_faults(faults: Faults, signals: Iterable[Signal], file: str = "", place: str = "virtual.faults") -> None:
+def check_faults(
+    faults: SimulatedFaults, signals: Iterable[MeasuredSignal], scene_path: str = "", key_path: str = "virtual.faults"
+) -> None:
     """Raise InputError for a fault with a name that no signal has, a negative noise or a negative delay."""
     known = tuple(dict.fromkeys(name for signal in signals for name in _names_of_signal(signal)))
     amounts, lists = {kind: getattr(faults, kind) for kind in FAULT_AMOUNTS}, (faults.quantisation, faults.dropouts)
@@ -66,81 +68,95 @@ def check_faults(faults: Faults, signals: Iterable[Signal], file: str = "", plac
     for kind, name in named:
         if name not in known:
             wrong = f"no such channel, transducer or quantity{suggestion_phrase(name, known)}"
-            raise InputError(file, f"{place}.{kind}", name, wrong)
+            raise InputError(scene_path, f"{key_path}.{kind}", name, wrong)
     for kind in ("noise", "delay"):
         for name, value in amounts[kind].items():
             if value < 0:
-                raise InputError(file, f"{place}.{kind}.{name}", value, "must be 0 or more")
+                raise InputError(scene_path, f"{key_path}.{kind}.{name}", value, "must be 0 or more")
 
 
 def measured_samples(
-    faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, stride: int, seed: int, path: int = 0
+    faults: SimulatedFaults,
+    signals: tuple[MeasuredSignal, ...],
+    true_values: np.ndarray,
+    time_step: float,
+    sample_stride: int,
+    seed: int,
+    path_number: int = 0,
 ) -> np.ndarray:
-    """Measured samples (m, signals): every ``stride``-th row of the true values (n, signals), which are ``step`` (s)
-    apart, with all faults; NaN where a sample is lost.
+    """Measured samples (m, signals): every ``sample_stride``-th row of the true values (n, signals), which are
+    ``time_step`` (s) apart, with all faults; NaN where a sample is lost.
 
-    seed and path name the noise: the same ones give the same samples, whoever asks.
+    seed and path_number determine the noise: the same ones give the same samples, whoever asks.
     """
-    period = step * stride
+    period = time_step * sample_stride
     columns = []
-    for signal, true in zip(signals, truth.T, strict=True):
+    for signal, true in zip(signals, true_values.T, strict=True):
         late = amount_of_fault(faults.delay, signal)
         values = (1.0 + amount_of_fault(faults.gain, signal)) * _delayed_samples(
-            true, step, stride, late
+            true, time_step, sample_stride, late
         ) + amount_of_fault(faults.bias, signal)
         values = values + amount_of_fault(faults.noise, signal) * _random_stream(
-            signal.channel, seed, path, len(values), TRANSDUCERS
+            signal.channel, seed, path_number, len(values), TRANSDUCERS
         )
         if faults.quantisation and _is_named(faults.quantisation.channels, signal):
             values = quantised_values(values, faults.quantisation.bits)
         if faults.dropouts and _is_named(faults.dropouts.channels, signal):
-            values[lost_samples(faults.dropouts, signal.at, seed, path, len(values), period)] = np.nan
+            values[lost_samples(faults.dropouts, signal.at, seed, path_number, len(values), period)] = np.nan
         columns.append(values)
     return np.column_stack(columns)
 
 
-def quantised_values(values: np.ndarray, bits: int) -> np.ndarray:
+def quantised_values(true_values: np.ndarray, bits: int) -> np.ndarray:
     """Values (n,) rounded to the steps of a converter with this number of bits, whose range is a little larger than the
     largest value."""
-    largest = float(np.abs(values).max())
+    largest = float(np.abs(true_values).max())
     if largest == 0.0:
-        return values
+        return true_values
     quantum = 2.0 * FULL_SCALE_RATIO * largest / 2**bits
-    return quantum * np.rint(values / quantum)
+    return quantum * np.rint(true_values / quantum)
 
 
-def lost_samples(dropouts: Dropouts, location: str, seed: int, path: int, count: int, period: float) -> np.ndarray:
-    """Whether each of ``count`` samples of a transducer is lost (count,); the first and the last one never are."""
+def lost_samples(
+    dropouts: Dropouts, transducer_name: str, seed: int, path_number: int, sample_count: int, sampling_period: float
+) -> np.ndarray:
+    """Whether each of ``sample_count`` samples of a transducer is lost (count,); the first and the last one never
+    are.
+    """
     from scipy.stats import norm
 
-    begins = _random_stream(location, seed, path, count, DROPOUTS) > norm.isf(min(dropouts.rate * period, 1.0))
-    length = max(round(dropouts.length / period), 1)
-    lost = np.convolve(begins, np.ones(length))[:count] > 0.5
+    begins = _random_stream(transducer_name, seed, path_number, sample_count, DROPOUTS) > norm.isf(
+        min(dropouts.rate * sampling_period, 1.0)
+    )
+    length = max(round(dropouts.length / sampling_period), 1)
+    lost = np.convolve(begins, np.ones(length))[:sample_count] > 0.5
     lost[[0, -1]] = False
     return lost
 
 
-def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -> np.ndarray:
-    """Every ``stride``-th sample of a true signal, delayed by ``delay`` (s); before the start, the value stays at the
-    first sample."""
+def _delayed_samples(true_samples: np.ndarray, time_step: float, sample_stride: int, delay: float) -> np.ndarray:
+    """Every ``sample_stride``-th sample of a true signal, delayed by ``delay`` (s); before the start, the value stays
+    at the first sample."""
     if delay == 0.0:
-        return true[::stride].copy()
-    late_times = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
+        return true_samples[::sample_stride].copy()
+    late_times = np.maximum(time_step * sample_stride * np.arange(len(true_samples[::sample_stride])) - delay, 0.0)
     from scipy.interpolate import make_interp_spline
 
-    return np.asarray(make_interp_spline(step * np.arange(len(true)), true, k=3)(late_times))
+    return np.asarray(make_interp_spline(time_step * np.arange(len(true_samples)), true_samples, k=3)(late_times))
 
 
-def _random_stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
-    """Standard normal random samples (count,) that depend only on seed, path, source and the name."""
-    return normal_samples(seed, (path << 32) + crc32(name.encode()), count, 1, noise_source=source)[:, 0]
+def _random_stream(stream_name: str, seed: int, path_number: int, sample_count: int, source_number: int) -> np.ndarray:
+    """Standard normal random samples (count,) that depend only on seed, path_number, source_number and stream_name."""
+    return normal_samples(
+        seed, (path_number << 32) + crc32(stream_name.encode()), sample_count, 1, noise_source=source_number
+    )[:, 0]
 
 
-def _names_of_signal(signal: Signal) -> tuple[str, ...]:
+def _names_of_signal(signal: MeasuredSignal) -> tuple[str, ...]:
     """Names by which a scene can refer to a signal: its channel, its transducer, its quantity."""
     return signal.channel, signal.at, signal.quantity
 
 
-def _is_named(names: list[str], signal: Signal) -> bool:
+def _is_named(listed_names: list[str], signal: MeasuredSignal) -> bool:
     """Whether a list of names includes a signal; an empty list includes all."""
-    return not names or not set(names).isdisjoint(_names_of_signal(signal))
+    return not listed_names or not set(listed_names).isdisjoint(_names_of_signal(signal))

@@ -24,14 +24,14 @@ FORMAT_OF_EXTENSION = {
 FORMAT_OF_FIRST_BYTES = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
 """Format of a readable file, by its first bytes; any other text is read as CSV."""
 KNOWN_FORMATS = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
-AS_CSV = "save its channels as CSV with a column time [s]"
+EXPORT_AS_CSV_ADVICE = "save its channels as CSV with a column time [s]"
 DESCRIPTION_OF_FORMAT = {
     "ASAM MDF": "ASAM MDF, which begins with MDF",
     "TDMS": "TDMS, which begins with TDSm",
     "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT",
 }
 """Full name and first bytes of each format."""
-WRITE_ANEW = f"write it anew from the software that has it, or {AS_CSV}"
+WRITE_ANEW_ADVICE = f"write it anew from the software that has it, or {EXPORT_AS_CSV_ADVICE}"
 DECODE_ADVICE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
 UNPACK_ADVICE = "unpack it, and name the file inside"
 
@@ -43,7 +43,7 @@ class UnreadableKind:
 
     name: str
     remedy: str
-    begins: bytes
+    first_bytes: bytes
     extensions: tuple[str, ...] = ()
 
 
@@ -102,14 +102,17 @@ UNREADABLE_KINDS = (
         "the index of a TDMS file", "name the .tdms file beside it, which has the data", rb"TDSh", (".tdms_index",)
     ),
     UnreadableKind(
-        "a LabVIEW measurement file", f"write TDMS in LabVIEW, or {AS_CSV}", rb"LabVIEW Measurement", (".lvm",)
+        "a LabVIEW measurement file",
+        f"write TDMS in LabVIEW, or {EXPORT_AS_CSV_ADVICE}",
+        rb"LabVIEW Measurement",
+        (".lvm",),
     ),
-    UnreadableKind("a universal file of modal analysis", AS_CSV, rb"\s{1,4}-1\s", (".unv", ".uff")),
+    UnreadableKind("a universal file of modal analysis", EXPORT_AS_CSV_ADVICE, rb"\s{1,4}-1\s", (".unv", ".uff")),
     UnreadableKind("imc FAMOS", "export it as MDF 4 or CSV from the software that wrote it", rb"\|CF,", (".raw",)),
     UnreadableKind("a Dewesoft file", "export it as MDF 4 or CSV from Dewesoft", rb"(?!)", (".dxd", ".d7d")),
     UnreadableKind("an nCode time series", "export it as RPC III or CSV", rb"(?!)", (".s3t", ".dac")),
     UnreadableKind("a CarMaker result file", "export it as MDF 4 or CSV", rb"(?!)", (".erg",)),
-    UnreadableKind("a numpy array", AS_CSV, rb"\x93NUMPY", (".npy", ".npz")),
+    UnreadableKind("a numpy array", EXPORT_AS_CSV_ADVICE, rb"\x93NUMPY", (".npy", ".npz")),
     UnreadableKind("packed by gzip", UNPACK_ADVICE, rb"\x1f\x8b", (".gz", ".tgz")),
     UnreadableKind("packed by bzip2", UNPACK_ADVICE, rb"BZh", (".bz2",)),
     UnreadableKind("packed by xz", UNPACK_ADVICE, rb"\xfd7zXZ", (".xz",)),
@@ -117,18 +120,18 @@ UNREADABLE_KINDS = (
     UnreadableKind("a 7-Zip archive", UNPACK_ADVICE, rb"7z\xbc\xaf", (".7z",)),
     UnreadableKind("a RAR archive", UNPACK_ADVICE, rb"Rar!", (".rar",)),
     UnreadableKind("a zip archive", UNPACK_ADVICE, rb"PK\x03\x04|PK\x05\x06", (".zip",)),
-    UnreadableKind("a web page", AS_CSV, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
-    UnreadableKind("XML", AS_CSV, rb"<\?xml", (".xml",)),
-    UnreadableKind("JSON", AS_CSV, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
-    UnreadableKind("a PDF", AS_CSV, rb"%PDF", (".pdf",)),
-    UnreadableKind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
-    UnreadableKind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
+    UnreadableKind("a web page", EXPORT_AS_CSV_ADVICE, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
+    UnreadableKind("XML", EXPORT_AS_CSV_ADVICE, rb"<\?xml", (".xml",)),
+    UnreadableKind("JSON", EXPORT_AS_CSV_ADVICE, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
+    UnreadableKind("a PDF", EXPORT_AS_CSV_ADVICE, rb"%PDF", (".pdf",)),
+    UnreadableKind("sound", EXPORT_AS_CSV_ADVICE, rb"RIFF....WAVE", (".wav",)),
+    UnreadableKind("an SQLite database", EXPORT_AS_CSV_ADVICE, rb"SQLite format 3", (".db", ".sqlite")),
 )
 """Kinds of measurement files that cannot be read here; the first kind that fits a file is reported."""
 WORKBOOK_KIND, ARRAYS_KIND = UNREADABLE_KINDS[0], next(kind for kind in UNREADABLE_KINDS if ".npz" in kind.extensions)
 
 
-def format_of(path: Path, first_bytes: bytes) -> str:
+def format_of(measurement_path: Path, first_bytes: bytes) -> str:
     """Format of a file, from its first bytes; raises InputError with the kind of an unreadable file and advice."""
     form = next((form for magic, form in FORMAT_OF_FIRST_BYTES.items() if first_bytes.startswith(magic)), "")
     if form:
@@ -139,18 +142,18 @@ def format_of(path: Path, first_bytes: bytes) -> str:
         (
             kind
             for kind in UNREADABLE_KINDS
-            if re.match(kind.begins, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)
+            if re.match(kind.first_bytes, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)
         ),
         None,
     )
     if kind is not None:
         if kind.extensions == (".zip",):
-            kind = _archive_kind(path) or kind
-        raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
+            kind = _archive_kind(measurement_path) or kind
+        raise InputError(measurement_path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
     if is_text(first_bytes):
         return "CSV"
-    allowed = f"this is the beginning of no known format{extension_phrase(path)}; {KNOWN_FORMATS}"
-    raise InputError(path, "byte 0", first_bytes[:8].hex(" "), allowed)
+    allowed = f"this is the beginning of no known format{extension_phrase(measurement_path)}; {KNOWN_FORMATS}"
+    raise InputError(measurement_path, "byte 0", first_bytes[:8].hex(" "), allowed)
 
 
 def is_text(first_bytes: bytes) -> bool:
@@ -166,35 +169,40 @@ def usual_kind_of_extension(extension: str, format_name: str) -> str:
     return next((kind.name for kind in UNREADABLE_KINDS if extension in kind.extensions), format_name)
 
 
-def extension_phrase(path: Path) -> str:
+def extension_phrase(measurement_path: Path) -> str:
     """Phrase on the usual kind of files with this file's extension; empty if the extension is unknown."""
-    suffix = path.suffix.lower()
+    suffix = measurement_path.suffix.lower()
     kind = next((kind for kind in UNREADABLE_KINDS if suffix in kind.extensions), None)
     if kind is not None:
-        return f", and its extension {path.suffix} is that of {kind.name}: {kind.remedy}"
+        return f", and its extension {measurement_path.suffix} is that of {kind.name}: {kind.remedy}"
     usual = DESCRIPTION_OF_FORMAT.get(FORMAT_OF_EXTENSION.get(suffix, ""), "")
     return (
-        usual and f", and its extension {path.suffix} is that of {usual}: it is damaged or something else; {WRITE_ANEW}"
+        usual
+        and f", and its extension {measurement_path.suffix} is that of {usual}: it is damaged or something else; "
+        f"{WRITE_ANEW_ADVICE}"
     )
 
 
-def is_measurement(path: Path) -> bool:
+def is_measurement(measurement_path: Path) -> bool:
     """Whether a file may be a measurement: it has an extension of measurement files, or is no text."""
-    if path.suffix.lower() in (*FORMAT_OF_EXTENSION, *(each for kind in UNREADABLE_KINDS for each in kind.extensions)):
+    if measurement_path.suffix.lower() in (
+        *FORMAT_OF_EXTENSION,
+        *(each for kind in UNREADABLE_KINDS for each in kind.extensions),
+    ):
         return True
-    if path.suffix.lower() in ("", ".toml") or not path.is_file():
+    if measurement_path.suffix.lower() in ("", ".toml") or not measurement_path.is_file():
         return False
-    with path.open("rb") as file:
+    with measurement_path.open("rb") as file:
         return not is_text(file.read(256))
 
 
-def _archive_kind(path: Path) -> UnreadableKind | None:
+def _archive_kind(measurement_path: Path) -> UnreadableKind | None:
     """Kind of data in a zip archive: a spreadsheet workbook or numpy arrays; None for other contents."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(measurement_path) as archive:
             names = archive.namelist()
     except (zipfile.BadZipFile, OSError, ValueError):
-        return WORKBOOK_KIND if path.suffix.lower() in WORKBOOK_KIND.extensions else None
+        return WORKBOOK_KIND if measurement_path.suffix.lower() in WORKBOOK_KIND.extensions else None
     if any(name.startswith("xl/") or name == "content.xml" for name in names):
         return WORKBOOK_KIND
     return ARRAYS_KIND if names and all(name.endswith(".npy") for name in names) else None

@@ -16,14 +16,14 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.recording import Recording
-from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
+from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal, Quantity
 
 LONGEST_BRIDGED_GAP = 0.1
 """Longest gap (s) in a hub force that is bridged."""
 NEIGHBOUR_SPAN = 0.3
 """Time (s) on either side of a gap whose samples determine the filling: several waves of wheel hop and of the chassis'
 roll."""
-MOST_NEIGHBOURS = 200
+NEIGHBOUR_COUNT_LIMIT = 200
 """Approximate number of neighbouring samples for a filling: all close to the gap, and a selection of those farther
 away."""
 LARGEST_PLAUSIBLE: dict[Quantity, float] = {
@@ -45,7 +45,7 @@ MISSING_VALUE_MARK = 1e30
 
 
 @dataclass(frozen=True)
-class Gap:
+class SampleGap:
     """A gap of samples from ``first`` to before ``end``. ``largest_deviation`` (in the channel's unit) is the largest
     standard deviation of the filled values, NaN if the gap is not filled because it is too long or has no
     neighbours."""
@@ -61,30 +61,34 @@ def true_runs(is_true: np.ndarray) -> np.ndarray:
     return edges.reshape(-1, 2)
 
 
-def filled_samples(values: np.ndarray, period: float, longest_gap: float) -> tuple[np.ndarray, list[Gap]]:
-    """Values (n,), sampled every ``period`` (s), with gaps of up to ``longest_gap`` (s) filled, and the list of all
-    gaps.
+def filled_samples(
+    samples: np.ndarray, sampling_period: float, longest_gap: float
+) -> tuple[np.ndarray, list[SampleGap]]:
+    """Values (n,), sampled every ``sampling_period`` (s), with gaps of up to ``longest_gap`` (s) filled, and the list
+    of all gaps.
 
     Wheels hop at 10 to 15 Hz: of a gap of 0.02 s a third to a tenth of the motion is doubtful, of one of 0.05 s most.
     """
-    lost = true_runs(np.isnan(values)).tolist()
+    lost = true_runs(np.isnan(samples)).tolist()
     if not lost:
-        return values, []
-    out, mean, span = values.copy(), float(np.nanmean(values)), max(round(NEIGHBOUR_SPAN / period), 4)
-    stride = max(2 * span // MOST_NEIGHBOURS, 1)
-    law = autocovariance(values - mean, 2 * span + round(longest_gap / period) + 2)
+        return samples, []
+    out, mean, span = samples.copy(), float(np.nanmean(samples)), max(round(NEIGHBOUR_SPAN / sampling_period), 4)
+    stride = max(2 * span // NEIGHBOUR_COUNT_LIMIT, 1)
+    law = autocovariance(samples - mean, 2 * span + round(longest_gap / sampling_period) + 2)
     gaps = []
     for first, end in lost:
         doubt = np.nan
-        known = _neighbour_samples(values, first, end, span, stride)
-        if len(known) and (end - first) * period <= longest_gap * (1 + 1e-9):
-            guess, doubt = _conditional_mean(law, known, np.arange(first, end), values[known] - mean)
+        known = _neighbour_samples(samples, first, end, span, stride)
+        if len(known) and (end - first) * sampling_period <= longest_gap * (1 + 1e-9):
+            guess, doubt = _conditional_mean(law, known, np.arange(first, end), samples[known] - mean)
             out[first:end] = mean + guess
-        gaps.append(Gap(first, end, doubt))
+        gaps.append(SampleGap(first, end, doubt))
     return out, gaps
 
 
-def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap], tuple[Finding, ...]]:
+def bridged_signals(
+    recording: Recording, signal: MeasuredSignal
+) -> tuple[np.ndarray, list[SampleGap], tuple[Finding, ...]]:
     """All samples (n,) of a signal with short gaps filled, the gaps, and findings on them; raises InputError where a
     gap is too long."""
     period = recording.period
@@ -109,41 +113,43 @@ def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, l
     return values, gaps, (Finding("gaps", "doubt", signal.name, text, longest, "s", (signal.name,), times),)
 
 
-def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
+def autocovariance(samples: np.ndarray, lags: int) -> np.ndarray:
     """Autocovariance (lags,) of values (n,) with mean 0, NaN counting as 0. It is positive definite, as interpolation
     needs."""
-    known = np.nan_to_num(values)
+    known = np.nan_to_num(samples)
     size = 1 << (2 * len(known) - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(known, size)) ** 2
-    law = np.fft.irfft(spectrum, size)[: min(lags, len(known))] / np.count_nonzero(~np.isnan(values))
+    law = np.fft.irfft(spectrum, size)[: min(lags, len(known))] / np.count_nonzero(~np.isnan(samples))
     return np.pad(law, (0, max(lags - len(known), 0)))
 
 
-def _neighbour_samples(values: np.ndarray, first: int, end: int, span: int, stride: int) -> np.ndarray:
+def _neighbour_samples(
+    samples: np.ndarray, gap_start: int, gap_end: int, neighbour_span: int, stride: int
+) -> np.ndarray:
     """Indices of measured samples around a gap: all of the nearest ones, and every ``stride``-th of those farther
     away."""
-    distances = np.arange(1, span + 1)
-    distances = distances[(distances <= 2 * (end - first) + 8) | (distances % stride == 0)]
-    indices = np.concatenate((first - distances[::-1], end - 1 + distances))
-    indices = indices[(indices >= 0) & (indices < len(values))]
-    return indices[~np.isnan(values[indices])]
+    distances = np.arange(1, neighbour_span + 1)
+    distances = distances[(distances <= 2 * (gap_end - gap_start) + 8) | (distances % stride == 0)]
+    indices = np.concatenate((gap_start - distances[::-1], gap_end - 1 + distances))
+    indices = indices[(indices >= 0) & (indices < len(samples))]
+    return indices[~np.isnan(samples[indices])]
 
 
 def _conditional_mean(
-    law: np.ndarray, known_samples: np.ndarray, lost: np.ndarray, values: np.ndarray
+    autocovariances: np.ndarray, known_indices: np.ndarray, lost_indices: np.ndarray, samples: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Expected values (m,) of the lost samples given the known ones, and the largest standard deviation of the
     estimate."""
-    known_covariance = law[np.abs(known_samples[:, None] - known_samples)]
-    known_covariance[np.diag_indices(len(known_samples))] *= 1 + 1e-9
-    cross_covariance = law[np.abs(lost[:, None] - known_samples)]
+    known_covariance = autocovariances[np.abs(known_indices[:, None] - known_indices)]
+    known_covariance[np.diag_indices(len(known_indices))] *= 1 + 1e-9
+    cross_covariance = autocovariances[np.abs(lost_indices[:, None] - known_indices)]
     weights = np.linalg.solve(known_covariance, cross_covariance.T)
-    remaining_variance = law[0] - np.sum(cross_covariance.T * weights, axis=0)
-    return values @ weights, float(np.sqrt(np.maximum(remaining_variance, 0.0).max()))
+    remaining_variance = autocovariances[0] - np.sum(cross_covariance.T * weights, axis=0)
+    return samples @ weights, float(np.sqrt(np.maximum(remaining_variance, 0.0).max()))
 
 
 def without_impossible_values(
-    signal: Signal, values: np.ndarray, times: np.ndarray
+    signal: MeasuredSignal, samples: np.ndarray, times: np.ndarray
 ) -> tuple[np.ndarray, Finding | None]:
     """Values (n,) in SI with NaN in place of values that cannot be measurements, and a finding on them; times (n,) in
     s.
@@ -151,19 +157,19 @@ def without_impossible_values(
     A value is impossible if it is a mark, or beyond LARGEST_PLAUSIBLE and IMPOSSIBLE_DISTANCE_RATIO times farther from
     the median than half of all.
     """
-    if not (np.abs(values) > LARGEST_PLAUSIBLE[signal.quantity]).any():
-        return values, None
-    absurd = ~(np.abs(values) < MISSING_VALUE_MARK) & ~np.isnan(values)
-    plausible = values[~absurd & ~np.isnan(values)]
+    if not (np.abs(samples) > LARGEST_PLAUSIBLE[signal.quantity]).any():
+        return samples, None
+    absurd = ~(np.abs(samples) < MISSING_VALUE_MARK) & ~np.isnan(samples)
+    plausible = samples[~absurd & ~np.isnan(samples)]
     if len(plausible):
         deviations = np.abs(plausible - np.median(plausible))
         limit = np.maximum(IMPOSSIBLE_DISTANCE_RATIO * np.median(deviations), LARGEST_PLAUSIBLE[signal.quantity])
-        absurd[np.flatnonzero(~absurd & ~np.isnan(values))[deviations > limit]] = True
+        absurd[np.flatnonzero(~absurd & ~np.isnan(samples))[deviations > limit]] = True
     if not absurd.any():
-        return values, None
+        return samples, None
     stretches, count = true_runs(absurd), int(absurd.sum())
     first, last = stretches[0, 0], stretches[-1, 1] - 1
-    written = values[first] / (signal.sign * signal.factor) + signal.zero
+    written = samples[first] / (signal.sign * signal.factor) + signal.zero
     count_text = f"{count} samples in {len(stretches)} stretch(es) are" if count > 1 else "a sample is"
     text = (
         f"{signal.file}, {signal.channel}: {count_text} no {signal.quantity}: {written:.4g} {signal.unit}".rstrip()
@@ -172,4 +178,4 @@ def without_impossible_values(
     )
     marked = float(times[first]), float(times[last])
     finding = Finding("no value", "doubt", signal.name, text, float(count), "samples", (signal.name,), marked)
-    return np.where(absurd, np.nan, values), finding
+    return np.where(absurd, np.nan, samples), finding

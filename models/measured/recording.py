@@ -9,14 +9,14 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.measured.channel import SAMPLES_PER_BLOCK
-from models.measured.columns import Columns, MemoryColumns
-from models.measured.signal import Signal
+from models.measured.columns import SampleFile, SamplesInMemory
+from models.measured.signal import MeasuredSignal
 
 Progress = Callable[[str, float], None]
 """Function that is called with a text on the present work and the completed share."""
 
 
-def no_progress(*arguments: Any) -> None:
+def report_no_progress(*arguments: Any) -> None:
     """A progress function that does nothing."""
 
 
@@ -28,8 +28,8 @@ class Recording:
     reading and bringing onto one clock (gaps, repeated times, jitter, drift between clocks). comment : of the files.
     """
 
-    signals: tuple[Signal, ...]
-    columns: Columns | MemoryColumns
+    signals: tuple[MeasuredSignal, ...]
+    columns: SampleFile | SamplesInMemory
     period: float
     start: datetime | None = None
     comment: str = ""
@@ -45,7 +45,7 @@ class Recording:
         """Time (s) of the last sample; the first is at 0."""
         return self.period * (self.count - 1)
 
-    def find(self, quantity: str, location: str = "", component: str = "") -> tuple[Signal, ...]:
+    def find_signals(self, quantity: str, location: str = "", component: str = "") -> tuple[MeasuredSignal, ...]:
         """Signals of a quantity, limited to a location or component if given, in the order of the channel map."""
         return tuple(
             s
@@ -53,25 +53,27 @@ class Recording:
             if s.quantity == quantity and location in ("", s.at) and component in ("", s.component)
         )
 
-    def samples(self, signal: Signal) -> np.ndarray:
+    def samples(self, signal: MeasuredSignal) -> np.ndarray:
         """All samples (count,) of one signal in SI units; NaN where nothing was measured."""
         return self.columns.read(signal.name)
 
-    def blocks(self, signals: tuple[Signal, ...], length: int = SAMPLES_PER_BLOCK) -> Iterator[tuple[int, np.ndarray]]:
+    def blocks(
+        self, signals: tuple[MeasuredSignal, ...], block_length: int = SAMPLES_PER_BLOCK
+    ) -> Iterator[tuple[int, np.ndarray]]:
         """Index of the first sample, and samples (n, signals), of each block of these signals."""
         names = tuple(s.name for s in signals)
-        for first in range(0, self.count, length):
-            yield first, self.columns.block(names, first, length)
+        for first in range(0, self.count, block_length):
+            yield first, self.columns.block(names, first, block_length)
 
-    def changed(self, change: Callable[[Signal, np.ndarray], np.ndarray]) -> "Recording":
-        """A copy of the recording with changed samples. ``change`` returns a signal's new samples (count,), in SI
-        units, from its present ones, NaN where nothing was measured. The copy is stored in a new file beside the old
+    def changed(self, change_samples: Callable[[MeasuredSignal, np.ndarray], np.ndarray]) -> "Recording":
+        """A copy of the recording with changed samples. ``change_samples`` returns a signal's new samples (count,), in
+        SI units, from its present ones, NaN where nothing was measured. The copy is stored in a new file beside the old
         one."""
-        assert isinstance(self.columns, Columns)
+        assert isinstance(self.columns, SampleFile)
         path = self.columns.path.with_stem(f"{self.columns.path.stem}_changed")
         path.with_suffix(".json").unlink(missing_ok=True)
-        columns = Columns(path, self.columns.names, self.count)
+        columns = SampleFile(path, self.columns.names, self.count)
         for signal in self.signals:
-            columns.put((signal.name,), 0, change(signal, self.samples(signal))[:, None])
+            columns.put((signal.name,), 0, change_samples(signal, self.samples(signal))[:, None])
         columns.close(self.count)
         return replace(self, columns=columns)

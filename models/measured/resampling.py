@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from models.measured.timing import EVEN_CLOCK_SHARE, GAP_PERIODS
+from models.measured.timing import EVEN_CLOCK_DEVIATION_SHARE, LEAST_GAP_PERIODS
 
 PASS_BAND, STOP_BAND, STOP_ATTENUATION = 0.4, 0.5, 60.0
 """Edges of the low-pass in ratio to the new sampling rate: passed up to the first, attenuated (dB) from the second
 on."""
-EQUAL_RATES = 1e-6
+EQUAL_RATE_RATIO = 1e-6
 """Relative difference up to which two sampling rates count as equal."""
 
 
-def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
+def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, new_times: np.ndarray) -> np.ndarray:
     """Values (n,) of a signal resampled to the times (n,) in s of an even grid.
 
     times (m,) : s, strictly rising, mostly ``source_period`` apart; values (m,) : NaN where nothing was measured. NaN
@@ -19,27 +19,30 @@ def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, gri
     """
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
-        return np.full(len(grid), np.nan)
+        return np.full(len(new_times), np.nan)
     times, values = times[known], values[known]
-    new = float(grid[1] - grid[0]) if len(grid) > 1 else source_period
-    if source_period < new * (1.0 - EQUAL_RATES):
-        samples = _decimated_values(times, values, source_period, new, grid)
+    new = float(new_times[1] - new_times[0]) if len(new_times) > 1 else source_period
+    if source_period < new * (1.0 - EQUAL_RATE_RATIO):
+        samples = _decimated_values(times, values, source_period, new, new_times)
     else:
-        samples = np.interp(grid, times, values)
-    samples[_unknown_points(times, source_period, grid)] = np.nan
+        samples = np.interp(new_times, times, values)
+    samples[_unknown_points(times, source_period, new_times)] = np.nan
     return samples
 
 
-def _unknown_points(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
+def _unknown_points(times: np.ndarray, source_period: float, new_times: np.ndarray) -> np.ndarray:
     """Which points (n,) of the grid lie in a gap or outside the measurement, with a tolerance for rounding."""
-    right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
-    near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN_CLOCK_SHARE * source_period
-    wide = times[right] - times[right - 1] > GAP_PERIODS * source_period
-    return ((grid < times[0]) | (grid > times[-1]) | wide) & ~near
+    right = np.clip(np.searchsorted(times, new_times), 1, len(times) - 1)
+    near = (
+        np.minimum(np.abs(new_times - times[right - 1]), np.abs(times[right] - new_times))
+        <= EVEN_CLOCK_DEVIATION_SHARE * source_period
+    )
+    wide = times[right] - times[right - 1] > LEAST_GAP_PERIODS * source_period
+    return ((new_times < times[0]) | (new_times > times[-1]) | wide) & ~near
 
 
 def _decimated_values(
-    times: np.ndarray, values: np.ndarray, source_period: float, new_period: float, grid: np.ndarray
+    times: np.ndarray, samples: np.ndarray, source_period: float, new_period: float, new_times: np.ndarray
 ) -> np.ndarray:
     """Values at the times of a slower grid: filtered by a symmetric low-pass kernel, which adds no phase, then
     interpolated by a cubic spline."""
@@ -52,6 +55,6 @@ def _decimated_values(
     taps, beta = kaiserord(STOP_ATTENUATION, (STOP_BAND - PASS_BAND) * rate / nyquist)
     kernel = firwin(taps | 1, 0.5 * (PASS_BAND + STOP_BAND) * rate, window=("kaiser", beta), fs=2.0 * nyquist)
     reach = min(len(kernel) // 2, count - 1)
-    padded = np.pad(np.interp(even, times, values), reach, mode="reflect", reflect_type="odd")
+    padded = np.pad(np.interp(even, times, samples), reach, mode="reflect", reflect_type="odd")
     padded = np.pad(padded, len(kernel) // 2 - reach, mode="edge")
-    return np.asarray(CubicSpline(even, oaconvolve(padded, kernel, mode="valid"))(grid))
+    return np.asarray(CubicSpline(even, oaconvolve(padded, kernel, mode="valid"))(new_times))

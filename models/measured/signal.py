@@ -28,7 +28,7 @@ Frame = Literal["hub", "body", "inertial", "sensor"]
 
 
 @dataclass(frozen=True)
-class Signal:
+class MeasuredSignal:
     """A channel of a file, as the channel map interprets it.
 
     at : the hub (tyre), body, connector or accelerometer that it belongs to. component : x, y, z; roll, pitch, yaw of
@@ -59,7 +59,7 @@ class TransducerPlace(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Places:
+class MeasurementPlaces:
     """Names in a vehicle at which a channel can be measured: hubs, bodies, connectors (springs, mounts, bars),
     sensors."""
 

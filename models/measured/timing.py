@@ -8,11 +8,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 
-GAP_PERIODS = 1.5
+LEAST_GAP_PERIODS = 1.5
 """Distance of two samples, in periods, above which there is a gap between them."""
 SHUFFLED_PERIODS = 10.0
 """Lateness of a sample, in periods, up to which it was only written late; a clock that goes back farther began anew."""
-EVEN_CLOCK_SHARE = 0.01
+EVEN_CLOCK_DEVIATION_SHARE = 0.01
 """Deviation from an even clock, in periods, up to which samples lie on it; beyond, the clock jitters."""
 JITTER_SHARE = 0.1
 """Standard deviation of the steps, in periods, above which jitter is a doubt."""
@@ -20,7 +20,7 @@ JITTER_SHARE = 0.1
 
 ROUNDING_SHARE = 1e-9
 """Rounding of a time by double precision, in periods, that is not reported."""
-LEAST_SLIPS = 5
+LEAST_SLIP_COUNT = 5
 """Number of repeated times, or of steps that deviate, above which rounding may be their cause: one is a row written
 twice."""
 RATE_DIGITS = range(1, 9)
@@ -37,7 +37,7 @@ ReportFinding = Callable[[str, Weight, str, float, str, Iterable[float]], None]
 
 
 @dataclass(frozen=True)
-class Timing:
+class SampleTiming:
     """Times (n,) in s of the samples of one group, strictly ascending, with their order in the file, the period and
     findings.
 
@@ -61,20 +61,23 @@ class Timing:
         return float(self.times[-1])
 
 
-def sample_timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
-    """``Timing`` of sample times (n,) as the file at ``place`` gives them: ascending times, their order in the file,
-    the period, findings. Raises InputError where fewer than two times differ."""
+def sample_timing(times: np.ndarray, measurement_place: str, signal_names: tuple[str, ...] = ()) -> SampleTiming:
+    """``SampleTiming`` of sample times (n,) as the file at ``measurement_place`` gives them: ascending times, their
+    order in the file, the period, findings. Raises InputError where fewer than two times differ."""
     has_no_time = _invalid_times(times)
     if has_no_time.any():
-        timing, first = sample_timing(times[~has_no_time], place, signal_names), int(np.argmax(has_no_time))
+        timing, first = sample_timing(times[~has_no_time], measurement_place, signal_names), int(np.argmax(has_no_time))
         text = (
-            f"{place}: {np.count_nonzero(has_no_time)} samples have no time, the first is number {first + 1} with "
+            f"{measurement_place}: {np.count_nonzero(has_no_time)} samples have no time, the first is number "
+            f"{first + 1} with "
             f"{times[first]:.4g} s; they are left out."
         )
         order = np.flatnonzero(~has_no_time) if timing.order is None else np.flatnonzero(~has_no_time)[timing.order]
-        absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(has_no_time)), "samples", signal_names)
+        absurd = Finding(
+            "time", "doubt", measurement_place, text, float(np.count_nonzero(has_no_time)), "samples", signal_names
+        )
         return replace(timing, order=order, findings=(absurd, *timing.findings))
-    return _timing_of_valid_times(times, place, signal_names)
+    return _timing_of_valid_times(times, measurement_place, signal_names)
 
 
 def _invalid_times(times: np.ndarray) -> np.ndarray:
@@ -88,20 +91,31 @@ def _invalid_times(times: np.ndarray) -> np.ndarray:
     return ~finite | (is_far if length > 0 else False)
 
 
-def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> Timing:
-    """``Timing`` of values (n,) that can be times (s)."""
+def _timing_of_valid_times(times: np.ndarray, measurement_place: str, signal_names: tuple[str, ...]) -> SampleTiming:
+    """``SampleTiming`` of values (n,) that can be times (s)."""
     findings, sample_count = list[Finding](), len(times)
 
-    def report(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
+    def report(
+        check: str, severity: Weight, finding_text: str, finding_size: float, unit: str, times: Iterable[float]
+    ) -> None:
         findings.append(
-            Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, times)))
+            Finding(
+                check,
+                severity,
+                measurement_place,
+                f"{measurement_place}: {finding_text}.",
+                finding_size,
+                unit,
+                signal_names,
+                tuple(map(float, times)),
+            )
         )
 
     keep, order = np.arange(sample_count), None
     steps = np.diff(times)
     rising = steps[steps > 0]
     if not len(rising):
-        raise InputError(place, "time", None, "two samples or more at different times are needed")
+        raise InputError(measurement_place, "time", None, "two samples or more at different times are needed")
     even = even_clock(times)
     if even is not None:
         repeated_count = sample_count - 1 - len(rising)
@@ -115,7 +129,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
             "samples",
             (times[0], times[-1]),
         )
-        return Timing(even[0] + even[1] * np.arange(sample_count), None, even[1], tuple(findings))
+        return SampleTiming(even[0] + even[1] * np.arange(sample_count), None, even[1], tuple(findings))
     period = float(f"{_median_step(times, rising):.9g}")
     if (steps < 0).any():
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * period))
@@ -163,7 +177,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
     kept_times = times[keep]
     _report_gaps(kept_times, period, report)
     _report_jitter(kept_times, period, report)
-    return Timing(kept_times, order, period, tuple(findings))
+    return SampleTiming(kept_times, order, period, tuple(findings))
 
 
 def _median_step(times: np.ndarray, rising_steps: np.ndarray) -> float:
@@ -203,26 +217,28 @@ def _rounding_spacing(times: np.ndarray) -> float | None:
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps < 0).any():
         return None
-    if np.count_nonzero(steps == 0) >= LEAST_SLIPS:
+    if np.count_nonzero(steps == 0) >= LEAST_SLIP_COUNT:
         return float(np.median(steps[steps > 0]))
     middle = float(np.median(steps))
-    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN_CLOCK_SHARE * middle) < LEAST_SLIPS:
+    if (steps == 0).any() or np.count_nonzero(
+        np.abs(steps - middle) > EVEN_CLOCK_DEVIATION_SHARE * middle
+    ) < LEAST_SLIP_COUNT:
         return None
     for digits in range(7):
         scaled_times = times * 10.0**digits
         if (np.abs(scaled_times - np.rint(scaled_times)) < 1e-6).all():
-            return 10.0**-digits if 10.0**-digits > EVEN_CLOCK_SHARE * middle else None
+            return 10.0**-digits if 10.0**-digits > EVEN_CLOCK_DEVIATION_SHARE * middle else None
     return None
 
 
-def _report_gaps(times: np.ndarray, period: float, report: ReportFinding) -> None:
+def _report_gaps(times: np.ndarray, sampling_period: float, report_finding: ReportFinding) -> None:
     """Report a finding on the gaps of a clock, with the longest one."""
     steps = np.diff(times)
-    wide = np.flatnonzero(steps > GAP_PERIODS * period)
+    wide = np.flatnonzero(steps > LEAST_GAP_PERIODS * sampling_period)
     if len(wide):
         longest = wide[np.argmax(steps[wide])]
-        lost = float(np.sum(steps[wide] - period))
-        report(
+        lost = float(np.sum(steps[wide] - sampling_period))
+        report_finding(
             "clock gaps",
             "note",
             f"{len(wide)} gap(s) in its clock, {lost:.4g} s in all, the longest from "
@@ -233,18 +249,18 @@ def _report_gaps(times: np.ndarray, period: float, report: ReportFinding) -> Non
         )
 
 
-def _report_jitter(times: np.ndarray, period: float, report: ReportFinding) -> None:
+def _report_jitter(times: np.ndarray, sampling_period: float, report_finding: ReportFinding) -> None:
     """Report a finding on the jitter of a clock, if there is any."""
     steps = np.diff(times)
-    deviations = steps[steps <= GAP_PERIODS * period] - period
+    deviations = steps[steps <= LEAST_GAP_PERIODS * sampling_period] - sampling_period
     spread = float(deviations.std())
-    if spread > EVEN_CLOCK_SHARE * period:
-        weight: Weight = "doubt" if spread > JITTER_SHARE * period else "note"
-        report(
+    if spread > EVEN_CLOCK_DEVIATION_SHARE * sampling_period:
+        weight: Weight = "doubt" if spread > JITTER_SHARE * sampling_period else "note"
+        report_finding(
             "jitter",
             weight,
-            f"the clock jitters: its steps of {1e3 * period:.6g} ms have a standard deviation of "
-            f"{1e3 * spread:.3g} ms ({spread / period:.1%}); the times of the file are believed",
+            f"the clock jitters: its steps of {1e3 * sampling_period:.6g} ms have a standard deviation of "
+            f"{1e3 * spread:.3g} ms ({spread / sampling_period:.1%}); the times of the file are believed",
             spread,
             "s",
             times[[0, -1]],

@@ -54,23 +54,23 @@ UNIT_EXAMPLES: dict[Quantity, tuple[str, ...]] = {
 """Examples of accepted units of each quantity, for messages."""
 
 
-def factor_to_si(unit: str, quantity: Quantity, file: object, place: str) -> float:
+def factor_to_si(unit: str, quantity: Quantity, error_file: object, error_place: str) -> float:
     """Factor from a unit to SI: value in SI = value * factor.
 
-    Raises InputError at ``file`` and ``place`` for a unit that nobody knows or that is of another quantity.
+    Raises InputError at ``error_file`` and ``error_place`` for a unit that nobody knows or that is of another quantity.
     """
     parsed = _parsed_unit(unit, quantity)
     if parsed is None:
         raise InputError(
-            file,
-            place,
+            error_file,
+            error_place,
             unit,
             f"no such unit is known: write {_units_of_quantity(quantity)}{_intended_unit(unit, quantity)}",
         )
     if not parsed.is_compatible_with(_si_unit(quantity)):
         raise InputError(
-            file,
-            place,
+            error_file,
+            error_place,
             unit,
             f"{_kind_of_quantity(parsed)}, and the channel is mapped as {quantity}: write "
             f"{_units_of_quantity(quantity)}, or map it as what it is{_intended_unit(unit, quantity)}",
@@ -79,29 +79,32 @@ def factor_to_si(unit: str, quantity: Quantity, file: object, place: str) -> flo
     if turned != (quantity in ("angle", "angular rate")):
         what = "is a unit of angle" if turned else "does not say whether of a turn, a degree or a radian"
         raise InputError(
-            file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_units_of_quantity(quantity)}"
+            error_file,
+            error_place,
+            unit,
+            f"{what}, and the channel is mapped as {quantity}: write {_units_of_quantity(quantity)}",
         )
     return float(_unit_registry().Quantity(1.0, parsed).to(_si_unit(quantity)).magnitude)
 
 
-def factor_between(unit: str, target_unit: str, file: object, place: str) -> float:
+def factor_between(unit: str, target_unit: str, error_file: object, error_place: str) -> float:
     """Factor from a unit to another one: value in ``target_unit`` = value * factor.
 
-    Raises InputError at ``file`` and ``place`` where the unit is not known or of another quantity; an angle is no pure
-    number.
+    Raises InputError at ``error_file`` and ``error_place`` where the unit is not known or of another quantity; an angle
+    is no pure number.
     """
     goal = _parsed_unit(target_unit, "force")
     accelerates = goal is not None and goal.is_compatible_with(_si_unit("acceleration"))
     given = _parsed_unit(unit, "acceleration" if accelerates else "force")
     if given is None or goal is None or not given.is_compatible_with(goal) or _has_angle(given) != _has_angle(goal):
         told = "no such unit is known" if given is None else "is the unit of another quantity"
-        raise InputError(file, place, unit, f"{told}: the channel is in {target_unit or '-'}")
+        raise InputError(error_file, error_place, unit, f"{told}: the channel is in {target_unit or '-'}")
     return float(_unit_registry().Quantity(1.0, given).to(goal).magnitude)
 
 
-def _has_angle(unit: Any) -> bool:
+def _has_angle(pint_unit: Any) -> bool:
     """Whether an angle occurs in a pint unit."""
-    return bool(ANGLE_UNITS & set(re.split(r"[^a-z_]+", str(unit))))
+    return bool(ANGLE_UNITS & set(re.split(r"[^a-z_]+", str(pint_unit))))
 
 
 def quantities_of_unit(unit: str) -> tuple[Quantity, ...]:
@@ -145,14 +148,14 @@ def _parsed_unit(unit: str, quantity: Quantity) -> Any:
         return None
 
 
-def _kind_of_quantity(unit: Any) -> str:
+def _kind_of_quantity(pint_unit: Any) -> str:
     """Phrase on the kind of quantity that a pint unit measures, as an engineer calls it."""
-    if "volt" in str(unit) or "ampere" in str(unit):
-        return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
-    same = [name for name in UNIT_OF_QUANTITY if unit.is_compatible_with(_si_unit(name))]
-    if unit.dimensionless:
+    if "volt" in str(pint_unit) or "ampere" in str(pint_unit):
+        return f"is the unit of a raw reading ({pint_unit:~P}), which needs the sensor's calibration in the logger"
+    same = [name for name in UNIT_OF_QUANTITY if pint_unit.is_compatible_with(_si_unit(name))]
+    if pint_unit.dimensionless:
         return "is a pure number"
-    return f"is a unit of {same[0]}" if same else f"is {unit:P}"
+    return f"is a unit of {same[0]}" if same else f"is {pint_unit:P}"
 
 
 def _intended_unit(unit: str, quantity: Quantity) -> str:

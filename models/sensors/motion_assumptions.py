@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.sensors.rigid_body_motion import NOISE_FACTOR, UNEXPLAINED_SHARE_LIMIT, Quality, RecoveredMotion
+from models.sensors.rigid_body_motion import NOISE_FACTOR, UNEXPLAINED_SHARE_LIMIT, RecoveredMotion, RigidFitQuality
 
 LARGEST_UPRIGHT_PITCH = 1.4
 """Largest pitch (rad; 80 degrees) at which roll and yaw can be told apart well; at a right angle they cannot."""
@@ -18,25 +18,28 @@ LARGEST_LEVEL_TILT = 0.05
 
 
 @dataclass(frozen=True)
-class Record:
+class AccelerometerRecord:
     """Accelerometer readings (n, sensors, 3) in m/s^2 every ``period`` (s), the quality of their rigid-body fit, and
     whether the motion was assumed to begin at rest and level, with gravity in the readings."""
 
-    quality: Quality
+    quality: RigidFitQuality
     readings: np.ndarray
     period: float
-    from_rest: bool
+    starts_at_rest_and_level: bool
 
 
-def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
+def assumptions_of_motion(accelerometer_record: AccelerometerRecord, recovered: RecoveredMotion) -> list[Assumption]:
     """Assumptions behind a motion (n samples) recovered from a record."""
-    pitch, turning_angles = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
+    pitch, turning_angles = (
+        cardan_pitch(recovered),
+        np.linalg.norm(recovered.rates, axis=1) * accelerometer_record.period,
+    )
     listed = [
         Assumption(
             "away from gimbal lock",
             "the pitch is so small that roll, pitch and yaw are told apart",
             "no angles tell this attitude: read the orientation itself",
-            partial(_as_known, {"body": pitch}),
+            partial(_watched_values, {"body": pitch}),
             "rad",
             -LARGEST_UPRIGHT_PITCH,
             LARGEST_UPRIGHT_PITCH,
@@ -45,19 +48,24 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
             "fine samples",
             "the samples are fine enough for the turning",
             "sample faster (sampling_rate)",
-            partial(_as_known, {"body": turning_angles}),
+            partial(_watched_values, {"body": turning_angles}),
             "rad per sample",
             upper_limit=LARGEST_TURN_PER_SAMPLE,
         ),
     ]
-    if record.quality.rigid is not None and not record.quality.suspect:
-        listed.append(_rigid_body_assumption(record.quality))
-    if record.from_rest:
+    if accelerometer_record.quality.rigid is not None and not accelerometer_record.quality.suspect_sensor:
+        listed.append(_rigid_body_assumption(accelerometer_record.quality))
+    if accelerometer_record.starts_at_rest_and_level:
         says, remedy = "the record begins at rest and level", "begin it where the body stands level"
-        tilt = _tilt_from_gravity(record.readings[0].mean(axis=0))
+        tilt = _tilt_from_gravity(accelerometer_record.readings[0].mean(axis=0))
         listed.append(
             Assumption(
-                "level start", says, remedy, partial(_as_known, {"body": tilt}), "rad", upper_limit=LARGEST_LEVEL_TILT
+                "level start",
+                says,
+                remedy,
+                partial(_watched_values, {"body": tilt}),
+                "rad",
+                upper_limit=LARGEST_LEVEL_TILT,
             )
         )
     return listed
@@ -69,24 +77,28 @@ def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
     return np.arcsin(np.clip(2.0 * (w * y - x * z) / np.sum(recovered.orientation**2, axis=1), -1.0, 1.0))
 
 
-def _rigid_body_assumption(quality: Quality) -> Assumption:
+def _rigid_body_assumption(quality: RigidFitQuality) -> Assumption:
     """Assumption that the sensors move with a single rigid body. A single sensor that does not is left out, without an
     assumption about it."""
-    size = float(np.sqrt(np.mean(quality.misfit**2))) / quality.share if quality.share > 0.0 else 1.0
+    size = (
+        float(np.sqrt(np.mean(quality.unexplained_rms**2))) / quality.unexplained_share
+        if quality.unexplained_share > 0.0
+        else 1.0
+    )
     return Assumption(
         "rigid body",
         "the sensors stand still on a rigid body",
         "mount them stiffer, leave out the one that gives way, or state their noise (deviation)",
-        partial(_as_known, {"misfit": np.array([quality.share])}),
+        partial(_watched_values, {"misfit": np.array([quality.unexplained_share])}),
         "",
         upper_limit=max(UNEXPLAINED_SHARE_LIMIT, NOISE_FACTOR * quality.expected_misfit / size),
     )
 
 
-def _tilt_from_gravity(first: np.ndarray) -> np.ndarray:
+def _tilt_from_gravity(first_specific_force: np.ndarray) -> np.ndarray:
     """Angle (1,) in rad between a specific force (3,) and the upward vertical."""
-    return np.array([np.arctan2(np.hypot(first[0], first[1]), -first[2])])
+    return np.array([np.arctan2(np.hypot(first_specific_force[0], first_specific_force[1]), -first_specific_force[2])])
 
 
-def _as_known(values: dict[str, np.ndarray], _unused_run: Result) -> Watched:
-    return values
+def _watched_values(watched: dict[str, np.ndarray], _unused_run: Result) -> Watched:
+    return watched

@@ -31,7 +31,7 @@ NOISE_FACTOR = 1.5
 
 
 @dataclass(frozen=True)
-class Spin:
+class BodyRotation:
     """Rotation of the body in the accelerometers' readings at each instant, in the array's axes e1, e2, n: the matrix M
     of angular rates, and the relative accelerations.
 
@@ -39,27 +39,27 @@ class Spin:
     relative_acceleration : (n, 3, sensors) in m/s^2, readings less their mean
     """
 
-    array: SensorArray
+    sensors: SensorArray
     rate_matrix: np.ndarray
     relative_acceleration: np.ndarray
 
 
 @dataclass(frozen=True)
-class Quality:
+class RigidFitQuality:
     """Quality of a rigid-body fit to accelerometer readings.
 
-    misfit : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
-    share : its rms over the record divided by that of the relative accelerations
+    unexplained_rms : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
+    unexplained_share : its rms over the record divided by that of the relative accelerations
     expected_misfit : what the stated noise of the readings alone would leave (m/s^2)
     redundancy : equations per sample behind it; 0 means that nothing can be said
-    suspect : the sensor without which the body is rigid; "" if there is no single one
+    suspect_sensor : the sensor without which the body is rigid; "" if there is no single one
     """
 
-    misfit: np.ndarray
-    share: float
+    unexplained_rms: np.ndarray
+    unexplained_share: float
     expected_misfit: float
     redundancy: int
-    suspect: str = ""
+    suspect_sensor: str = ""
 
     @property
     def rigid(self) -> bool | None:
@@ -67,13 +67,13 @@ class Quality:
         if self.redundancy == 0:
             return None
         return (
-            self.share <= UNEXPLAINED_SHARE_LIMIT
-            or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected_misfit
+            self.unexplained_share <= UNEXPLAINED_SHARE_LIMIT
+            or float(np.sqrt(np.mean(self.unexplained_rms**2))) <= NOISE_FACTOR * self.expected_misfit
         )
 
 
 @dataclass(frozen=True)
-class StartState:
+class BodyStartState:
     """State of the body at the first sample: local rates (rad/s), quaternion, velocity (m/s) and position (m),
     global."""
 
@@ -83,14 +83,14 @@ class StartState:
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @staticmethod
-    def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "StartState":
+    def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "BodyStartState":
         """Start of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
         level = tuple(quaternion_from_cardan(0.0, pitch, 0.0).tolist())
-        return StartState((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
+        return BodyStartState((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 
 
 @dataclass(frozen=True)
-class CutOffs:
+class CutOffFrequencies:
     """Cut-off frequencies (Hz) of high-pass filters against drift; None means no filter.
 
     rotation : of the rates and again of the angles, which takes true grades away, too; position : of velocity and of
@@ -123,178 +123,188 @@ class RecoveredMotion:
         return self.position + rotation_matrix(self.orientation) @ np.asarray(local_position)
 
 
-def spin_from_readings(array: SensorArray, readings: np.ndarray) -> Spin:
-    """``Spin`` from the accelerometers' readings (n, sensors, 3) in m/s^2; gravity cancels at any attitude.
+def body_rotation_from_readings(sensors: SensorArray, readings: np.ndarray) -> BodyRotation:
+    """``BodyRotation`` from the accelerometers' readings (n, sensors, 3) in m/s^2; gravity cancels at any attitude.
 
     Raises InputError for a reading that is not a finite number, and for a wrong number of sensors.
     """
-    if readings.ndim != 3 or readings.shape[1:] != array.positions.shape:
-        raise InputError("", "readings", str(readings.shape), f"must have the shape (n, {len(array.names)}, 3)")
+    if readings.ndim != 3 or readings.shape[1:] != sensors.positions.shape:
+        raise InputError("", "readings", str(readings.shape), f"must have the shape (n, {len(sensors.names)}, 3)")
     if not np.isfinite(readings).all():
         sample, sensor, axis = np.argwhere(~np.isfinite(readings))[0]
         raise InputError(
             "",
-            f"sensor {array.names[sensor]}, sample {sample} along {'xyz'[axis]}",
+            f"sensor {sensors.names[sensor]}, sample {sample} along {'xyz'[axis]}",
             float(readings[sample, sensor, axis]),
             "must be a finite number: repair it or leave the sensor out",
         )
     local = readings - readings.mean(axis=1, keepdims=True)
-    relative = np.einsum("ji,nsj->nis", array.frame, local)
-    return Spin(array, relative @ array.weights, relative)
+    relative = np.einsum("ji,nsj->nis", sensors.principal_axes, local)
+    return BodyRotation(sensors, relative @ sensors.position_weights, relative)
 
 
-def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
+def angular_acceleration(rotation: BodyRotation, rates: np.ndarray) -> np.ndarray:
     """Local angular acceleration (n, 3) of the body in rad/s^2, eq. (20); rates (n, 3) in rad/s, local.
 
     The rates are read by the formula for a plane alone: alpha_1 = n.M e2 - w2 w3, alpha_2 = -n.M e1 + w1 w3.
     """
-    return array_angular_acceleration(spins, rates @ spins.array.frame) @ spins.array.frame.T
+    return (
+        array_angular_acceleration(rotation, rates @ rotation.sensors.principal_axes)
+        @ rotation.sensors.principal_axes.T
+    )
 
 
-def array_angular_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
-    """Angular acceleration (n, 3) in rad/s^2 in the array's axes from the ``Spin`` of the readings; w (n, 3), rad/s, in
-    the same axes."""
-    m = spins.rate_matrix
+def array_angular_acceleration(rotation: BodyRotation, w: np.ndarray) -> np.ndarray:
+    """Angular acceleration (n, 3) in rad/s^2 in the array's axes from the ``BodyRotation`` of the readings; w (n, 3),
+    rad/s, in the same axes."""
+    m = rotation.rate_matrix
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
-    if spins.array.planar:
+    if rotation.sensors.is_planar:
         about_first, about_second = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
     else:
         about_first, about_second = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
     return np.column_stack([about_first, about_second, about_normal])
 
 
-def rates_up_to_sign(spins: Spin) -> np.ndarray:
+def rates_up_to_sign(rotation: BodyRotation) -> np.ndarray:
     """Local angular rates (n, 3) in rad/s from the symmetric part of M alone: no integration, no drift, but no sign.
 
     w w^T = M+ - (tr M+ / 2) I, of which the nearest matrix of rank one is taken. For sensors in a plane the part
     along the normal has a sign of its own, apart from that of the other two.
     """
-    unsigned = _unsigned_in_plane if spins.array.planar else _unsigned_in_space
-    return unsigned(spins.rate_matrix) @ spins.array.frame.T
+    unsigned = _unsigned_rates_in_plane if rotation.sensors.is_planar else _unsigned_rates_in_space
+    return unsigned(rotation.rate_matrix) @ rotation.sensors.principal_axes.T
 
 
-def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
+def _unsigned_rates_in_space(rate_matrix: np.ndarray) -> np.ndarray:
     """Angular rates (n, 3) in rad/s, except for a common sign, from the largest eigenvalue of w w^T and its
     eigenvector."""
-    symmetric = 0.5 * (m + np.swapaxes(m, 1, 2))
+    symmetric = 0.5 * (rate_matrix + np.swapaxes(rate_matrix, 1, 2))
     half = 0.5 * np.trace(symmetric, axis1=1, axis2=2)[:, None, None]
     sizes, directions = np.linalg.eigh(symmetric - half * np.eye(3))
     return np.sqrt(np.maximum(sizes[:, 2:], 0.0)) * directions[:, :, 2]
 
 
-def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
+def _unsigned_rates_in_plane(rate_matrix: np.ndarray) -> np.ndarray:
     """Angular rates (n, 3) in rad/s up to two signs, of w3 and of (w1, w2) together, from sensors in a plane (axes e1,
     e2), whose matrix is (w.w) I - (w1, w2) (w1, w2)^T with w3^2 as its smaller eigenvalue."""
-    flat = m[:, :2, :2]
+    flat = rate_matrix[:, :2, :2]
     sizes, directions = np.linalg.eigh(-0.5 * (flat + np.swapaxes(flat, 1, 2)))
     about_normal = np.sqrt(np.maximum(sizes[:, :1], 0.0))
     within = np.sqrt(np.maximum(sizes[:, 1:], 0.0) - about_normal**2) * directions[:, :, 0]
     return np.hstack([within, about_normal])
 
 
-def unexplained_accelerations(spins: Spin) -> np.ndarray:
+def unexplained_accelerations(rotation: BodyRotation) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 that no rigid motion explains, in the array's axes.
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
-    flat = _unsigned_in_plane(spins.rate_matrix)
+    flat = _unsigned_rates_in_plane(rotation.rate_matrix)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += [] if spins.array.lies_in_plane else [_unsigned_in_space(spins.rate_matrix)]
-    left = np.stack([spins.relative_acceleration - _nearest_rigid(spins, w) for w in offers])
+    offers += [] if rotation.sensors.lies_in_plane else [_unsigned_rates_in_space(rotation.rate_matrix)]
+    left = np.stack([rotation.relative_acceleration - _nearest_rigid_accelerations(rotation, w) for w in offers])
     sensor_with_least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[sensor_with_least, np.arange(len(sensor_with_least))]
 
 
-def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
+def _nearest_rigid_accelerations(rotation: BodyRotation, w: np.ndarray) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 of a rigid body with rates w and the angular acceleration that
     fits best.
 
     By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
     """
-    array, square = spins.array, skew_matrix(w) @ skew_matrix(w)
-    weights = np.where(np.arange(3) < array.weights.shape[1], array.spreads, 0.0) ** 2
+    array, square = rotation.sensors, skew_matrix(w) @ skew_matrix(w)
+    weights = np.where(np.arange(3) < array.position_weights.shape[1], array.spreads, 0.0) ** 2
     rate_products = np.zeros_like(square)
-    rate_products[:, :, : array.weights.shape[1]] = spins.rate_matrix
+    rate_products[:, :, : array.position_weights.shape[1]] = rotation.rate_matrix
     moment = weights * (rate_products - square)
     angular_part = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
-    return (angular_part + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
+    return (angular_part + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.principal_axes).T
 
 
-def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
-    """Quality of the rigid-body fit to readings (n, sensors, 3) in m/s^2; ``noise`` is their standard deviation.
+def fit_quality(sensors: SensorArray, readings: np.ndarray, reading_deviation: float = 0.0) -> RigidFitQuality:
+    """Quality of the rigid-body fit to readings (n, sensors, 3) in m/s^2; ``reading_deviation`` is their standard
+    deviation.
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
     """
-    full_quality = _quality_of(array, readings, noise)
+    full_quality = _quality_of(sensors, readings, reading_deviation)
     if full_quality.rigid is not False:
         return full_quality
-    without = {name: _quality_without(array, readings, name, noise) for name in array.names}
+    without = {name: _quality_without(sensors, readings, name, reading_deviation) for name in sensors.names}
     shares = {
-        name: other_quality.share
+        name: other_quality.unexplained_share
         for name, other_quality in without.items()
         if other_quality is not None and other_quality.rigid
     }
-    return replace(full_quality, suspect=min(shares, key=lambda name: shares[name])) if shares else full_quality
+    return replace(full_quality, suspect_sensor=min(shares, key=lambda name: shares[name])) if shares else full_quality
 
 
-def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
-    spins = spin_from_readings(array, readings)
+def _quality_of(sensors: SensorArray, readings: np.ndarray, reading_deviation: float) -> RigidFitQuality:
+    spins = body_rotation_from_readings(sensors, readings)
     left = unexplained_accelerations(spins)
-    count = 3 * len(array.names)
+    count = 3 * len(sensors.names)
     size = float(np.sqrt(np.mean(spins.relative_acceleration**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
     share = float(np.sqrt(np.mean(misfit**2))) / size if size > 0 else 0.0
-    return Quality(misfit, share, noise * float(np.sqrt(array.redundancy / count)), array.redundancy)
+    return RigidFitQuality(
+        misfit, share, reading_deviation * float(np.sqrt(sensors.redundancy / count)), sensors.redundancy
+    )
 
 
-def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise: float) -> Quality | None:
-    """Quality of the fit without the sensor ``name``; None if the remaining sensors do not make an array."""
-    keep = [i for i, other_name in enumerate(array.names) if other_name != name]
+def _quality_without(
+    sensors: SensorArray, readings: np.ndarray, sensor_name: str, reading_deviation: float
+) -> RigidFitQuality | None:
+    """Quality of the fit without the sensor ``sensor_name``; None if the remaining sensors do not make an array."""
+    keep = [i for i, other_name in enumerate(sensors.names) if other_name != sensor_name]
     try:
-        remaining_array = sensor_array({array.names[i]: array.positions[i].tolist() for i in keep})
+        remaining_array = sensor_array({sensors.names[i]: sensors.positions[i].tolist() for i in keep})
     except InputError:
         return None
-    return _quality_of(remaining_array, readings[:, keep], noise)
+    return _quality_of(remaining_array, readings[:, keep], reading_deviation)
 
 
-def time_integral(values: np.ndarray, sample_period: float, start_values: np.ndarray) -> np.ndarray:
+def time_integral(samples: np.ndarray, sample_period: float, start_values: np.ndarray) -> np.ndarray:
     """Sum of ``start_values`` and the time integral of values (n, ...), by cubics through four neighbouring samples:
     order 4 in the period.
     """
     return start_values + np.concatenate(
-        [np.zeros_like(values[:1]), np.cumsum(cubic_integrals(values, sample_period), axis=0)]
+        [np.zeros_like(samples[:1]), np.cumsum(cubic_integrals(samples, sample_period), axis=0)]
     )
 
 
-def integrate_rates(spins: Spin, sample_period: float, start_rates: np.ndarray) -> np.ndarray:
+def integrate_rates(rotation: BodyRotation, sample_period: float, start_rates: np.ndarray) -> np.ndarray:
     """Local rates (n, 3) in rad/s by integration (20), from (3,) at the first sample; they drift with every error.
 
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
     mu = n.M e2 - i n.M e1, which w3 solves by quadratures alone.
     """
-    if len(spins.rate_matrix) < 4:
-        raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
-    first = np.asarray(start_rates) @ spins.array.frame
-    if not spins.array.planar:
-        return (
-            time_integral(array_angular_acceleration(spins, np.zeros((1, 3))), sample_period, first)
-            @ spins.array.frame.T
+    if len(rotation.rate_matrix) < 4:
+        raise InputError(
+            "", "readings", len(rotation.rate_matrix), "at least four samples are needed to integrate them"
         )
-    m = spins.rate_matrix
+    first = np.asarray(start_rates) @ rotation.sensors.principal_axes
+    if not rotation.sensors.is_planar:
+        return (
+            time_integral(array_angular_acceleration(rotation, np.zeros((1, 3))), sample_period, first)
+            @ rotation.sensors.principal_axes.T
+        )
+    m = rotation.rate_matrix
     w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), sample_period, first[2])
     turn = np.exp(1j * time_integral(w3, sample_period, np.array(0.0)))
     c = turn * time_integral((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, sample_period, first[0] + 1j * first[1])
-    return np.column_stack([c.real, c.imag, w3]) @ spins.array.frame.T
+    return np.column_stack([c.real, c.imag, w3]) @ rotation.sensors.principal_axes.T
 
 
 def recovered_motion(
-    array: SensorArray,
+    sensors: SensorArray,
     readings: np.ndarray,
     sample_period: float,
-    start_state: StartState | None = None,
+    start_state: BodyStartState | None = None,
     gravity_corrected: bool = False,
     rates: np.ndarray | None = None,
-    cut_offs: CutOffs | None = None,
+    cut_offs: CutOffFrequencies | None = None,
 ) -> RecoveredMotion:
     """Motion of the body's reference point and axes from accelerometer readings, steps 1 to 6 of the paper.
 
@@ -303,8 +313,8 @@ def recovered_motion(
     rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
-    start_state, cut_offs = start_state or StartState(), cut_offs or CutOffs()
-    spins = spin_from_readings(array, readings)
+    start_state, cut_offs = start_state or BodyStartState(), cut_offs or CutOffFrequencies()
+    spins = body_rotation_from_readings(sensors, readings)
     w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates
     w = _high_passed(w, sample_period, cut_offs.rotation)
     orientation = integrate_attitude(w, sample_period, np.array(start_state.orientation))
@@ -315,7 +325,7 @@ def recovered_motion(
     alpha = angular_acceleration(spins, w)
     gravity_vector = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(
-        array, readings - gravity_vector if gravity_corrected else readings, orientation, alpha, w, gravity_vector
+        sensors, readings - gravity_vector if gravity_corrected else readings, orientation, alpha, w, gravity_vector
     )
     velocity = _high_passed(
         time_integral(acceleration, sample_period, np.array(start_state.velocity)), sample_period, cut_offs.position
@@ -327,26 +337,26 @@ def recovered_motion(
 
 
 def reference_acceleration(
-    array: SensorArray,
+    sensors: SensorArray,
     readings: np.ndarray,
     orientation: np.ndarray,
     alpha: np.ndarray,
     rates: np.ndarray,
-    down: np.ndarray,
+    down_axis: np.ndarray,
 ) -> np.ndarray:
     """Global acceleration (n, 3) in m/s^2 of the body's reference point: the mean over all sensors, eq. (23)."""
-    lever = (skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates)) @ array.positions.mean(axis=0)
-    return np.einsum("nij,nj->ni", rotation_matrix(orientation), readings.mean(axis=1) - lever) + down
+    lever = (skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates)) @ sensors.positions.mean(axis=0)
+    return np.einsum("nij,nj->ni", rotation_matrix(orientation), readings.mean(axis=1) - lever) + down_axis
 
 
-def _high_passed(values: np.ndarray, sample_period: float, cut_off: float | None) -> np.ndarray:
-    return values if cut_off is None else high_pass(values, sample_period, cut_off)
+def _high_passed(samples: np.ndarray, sample_period: float, cut_off: float | None) -> np.ndarray:
+    return samples if cut_off is None else high_pass(samples, sample_period, cut_off)
 
 
-def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = GRAVITY) -> np.ndarray:
+def tilt_displacement(tilt_error: float, times: np.ndarray, gravity: float = GRAVITY) -> np.ndarray:
     """False horizontal displacement (n,) in m that gravity causes with a constant tilt error (rad): g sin(tilt) t^2 /
     2."""
-    return 0.5 * gravity * np.sin(tilt) * times**2
+    return 0.5 * gravity * np.sin(tilt_error) * times**2
 
 
 BUTTERWORTH_ORDER = 2
@@ -354,15 +364,17 @@ BUTTERWORTH_ORDER = 2
 
 
 def check_cut_off(
-    sample_count: int, sample_period: float, cut_off: float, file: str = "", key_path: str = "high-pass"
+    sample_count: int, sample_period: float, cut_off: float, scene_path: str = "", key_path: str = "high-pass"
 ) -> None:
     """Raise InputError for a cut-off frequency (Hz) that does not suit ``sample_count`` samples every ``sample_period``
     (s)."""
     if not 0 < cut_off < 0.5 / sample_period:
-        raise InputError(file, key_path, cut_off, f"the cut-off must lie between 0 and {0.5 / sample_period:g} Hz")
+        raise InputError(
+            scene_path, key_path, cut_off, f"the cut-off must lie between 0 and {0.5 / sample_period:g} Hz"
+        )
     if sample_count <= round(1 / (cut_off * sample_period)):
         raise InputError(
-            file,
+            scene_path,
             key_path,
             cut_off,
             f"a record of {(sample_count - 1) * sample_period:g} s is shorter than one period of "
@@ -370,7 +382,7 @@ def check_cut_off(
         )
 
 
-def high_pass(values: np.ndarray, sample_period: float, cut_off: float) -> np.ndarray:
+def high_pass(samples: np.ndarray, sample_period: float, cut_off: float) -> np.ndarray:
     """Values (n, ...), sampled every ``sample_period`` (s), after a high-pass filter that removes frequencies below
     ``cut_off`` (Hz).
 
@@ -380,6 +392,6 @@ def high_pass(values: np.ndarray, sample_period: float, cut_off: float) -> np.nd
     """
     from scipy.signal import butter, sosfiltfilt
 
-    check_cut_off(len(values), sample_period, cut_off)
+    check_cut_off(len(samples), sample_period, cut_off)
     sections = butter(BUTTERWORTH_ORDER, cut_off, "highpass", fs=1 / sample_period, output="sos")
-    return sosfiltfilt(sections, values, axis=0, padtype="even", padlen=round(1 / (cut_off * sample_period)))
+    return sosfiltfilt(sections, samples, axis=0, padtype="even", padlen=round(1 / (cut_off * sample_period)))

@@ -17,7 +17,7 @@ from models.machine.compiled import njit
 IntegrationRule = Literal["held", "mean", "cubic"]
 """How an angular rate runs between its samples: constant ("held"), at the mean of both, or along a cubic; order 1, 2, 4
 of the orientation in the sampling period."""
-HALF_TURN = np.pi
+HALF_TURN_ANGLE = np.pi
 """Rotation (rad) from sample to sample beyond which its direction cannot be told; the series of Magnus ends there."""
 UNIT_NORM_TOLERANCE = 1e-6
 """Largest difference of a quaternion's norm from 1."""
@@ -34,11 +34,11 @@ class GimbalLock(InputError):
     sample : index of the first such orientation; pitch : its pitch (rad).
     """
 
-    def __init__(self, sample: int, pitch: float) -> None:
-        self.sample, self.pitch = sample, pitch
+    def __init__(self, sample_index: int, pitch: float) -> None:
+        self.sample, self.pitch = sample_index, pitch
         super().__init__(
             "",
-            f"orientation, sample {sample}",
+            f"orientation, sample {sample_index}",
             None,
             "gimbal lock: at a pitch of "
             f"{np.degrees(pitch):.6g} degrees roll and yaw turn about the same axis; use the quaternion "
@@ -65,10 +65,10 @@ def conjugate_quaternion(q: np.ndarray) -> np.ndarray:
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def quaternion_of_rotation_vector(turn: np.ndarray) -> np.ndarray:
+def quaternion_of_rotation_vector(rotation_vectors: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad; exact to rounding and regular at all angles."""
-    half = 0.5 * np.linalg.norm(turn, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * turn], axis=-1)
+    half = 0.5 * np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation_vectors], axis=-1)
 
 
 def rotation_vector(q: np.ndarray) -> np.ndarray:
@@ -88,8 +88,8 @@ def turns_between_samples(
     "mean" : the mean of both neighbours; "cubic" : the integral of the cubic through four neighbours and the
     second Magnus term h^2/12 (w0 x w1), the part of the turning that comes from a turning axis. Needs 2 samples,
     for "cubic" 4. Raises ValueError for fewer, for a rate that is not finite, and InputError for a period or a rule
-    that is none and for rates that turn a body farther than HALF_TURN from one sample to the next, unless they are
-    held."""
+    that is none and for rates that turn a body farther than HALF_TURN_ANGLE from one sample to the next, unless they
+    are held."""
     if not 0.0 < sample_period < np.inf:
         raise InputError("", "period", sample_period, "must be above 0, in s")
     if integration_rule not in get_args(IntegrationRule):
@@ -113,16 +113,16 @@ def turns_between_samples(
 def _check_turned(rates: np.ndarray, sample_period: float) -> None:
     """Raise InputError for angular rates that rotate the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
-    if fastest * sample_period > HALF_TURN:
+    if fastest * sample_period > HALF_TURN_ANGLE:
         samples = f"for samples every {sample_period:g} s, half a turn from one to the next: are they in degrees?"
-        raise InputError("", "rates", fastest, f"must be at most {HALF_TURN / sample_period:.4g} rad/s {samples}")
+        raise InputError("", "rates", fastest, f"must be at most {HALF_TURN_ANGLE / sample_period:.4g} rad/s {samples}")
 
 
-def cubic_integrals(values: np.ndarray, sample_period: float) -> np.ndarray:
+def cubic_integrals(samples: np.ndarray, sample_period: float) -> np.ndarray:
     """Integrals (n - 1, ...) over each period of the cubics through four neighbouring samples (n, ...), n >= 4."""
-    inner = -values[:-3] + 13 * values[1:-2] + 13 * values[2:-1] - values[3:]
-    first_integral = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
-    last_integral = 9 * values[-1] + 19 * values[-2] - 5 * values[-3] + values[-4]
+    inner = -samples[:-3] + 13 * samples[1:-2] + 13 * samples[2:-1] - samples[3:]
+    first_integral = 9 * samples[0] + 19 * samples[1] - 5 * samples[2] + samples[3]
+    last_integral = 9 * samples[-1] + 19 * samples[-2] - 5 * samples[-3] + samples[-4]
     return sample_period / 24 * np.concatenate([first_integral[None], inner, last_integral[None]])
 
 
@@ -146,15 +146,15 @@ def integrate_attitude(
 
 
 @njit(cache=True)
-def _chained_rotations(start_attitude, steps):
+def _chained_rotations(start_attitude, rotation_steps):
     """Normalised running products of quaternions, start, start steps[0], start steps[0] steps[1] ...: from shapes (m,
     4) and (n, m, 4) to (n + 1, m, 4)."""
-    attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
-    for j in range(steps.shape[1]):
+    attitudes = np.empty((rotation_steps.shape[0] + 1, rotation_steps.shape[1], 4))
+    for j in range(rotation_steps.shape[1]):
         a, b, c, d = start_attitude[j]
         attitudes[0, j] = start_attitude[j]
-        for i in range(steps.shape[0]):
-            e, f, g, h = steps[i, j]
+        for i in range(rotation_steps.shape[0]):
+            e, f, g, h = rotation_steps[i, j]
             a, b, c, d = (
                 a * e - b * f - c * g - d * h,
                 a * f + b * e + c * h - d * g,
@@ -175,15 +175,15 @@ def rotation_matrix(q: np.ndarray) -> np.ndarray:
     return (a * a - square) * np.eye(3) + 2 * outer + 2 * a * skew_matrix(v)
 
 
-def quaternion_from_matrix(s: np.ndarray) -> np.ndarray:
+def quaternion_from_matrix(rotation_matrices: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4), scalar 0 or more, of rotation matrices (..., 3, 3). Raises ValueError if one is no
     rotation."""
-    departure = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
-    if not departure < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(s) > 0).all():
+    departure = np.abs(np.swapaxes(rotation_matrices, -1, -2) @ rotation_matrices - np.eye(3)).max()
+    if not departure < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(rotation_matrices) > 0).all():
         raise ValueError(
             f"not a rotation: S^T S departs from the identity by {departure:.3g}, or S turns left into right"
         )
-    return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
+    return Rotation.from_matrix(rotation_matrices).as_quat(canonical=True, scalar_first=True)
 
 
 def quaternion_from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray:

@@ -12,7 +12,7 @@ from models.core.discretisation import errors_of
 from models.core.errors import InputError, suggestion_phrase
 from models.core.result import Result, load
 from models.core.whole_files import whole_file
-from models.measured.channel import Channel, Source
+from models.measured.channel import FileChannel, MeasurementSource
 from models.measured.file_kinds import is_measurement
 from models.measured.formats import open_source
 from models.measured.time_shift import ChannelPair, TimeShift, time_shift
@@ -188,7 +188,7 @@ def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[s
 
 
 def _missing_channel_notes(
-    measurement_source: Source, run_quantities: Mapping[str, Quantity], engines: list[str]
+    measurement_source: MeasurementSource, run_quantities: Mapping[str, Quantity], engines: list[str]
 ) -> Iterator[str]:
     """Yield a note on each measured channel that the run does not have, with the most similar name of the run."""
     for channel in measurement_source.channels:
@@ -200,7 +200,7 @@ def _missing_channel_notes(
 
 
 def _channel_pair(
-    measurement_source: Source, channel: Channel, run_quantity: Quantity, doubts: list[str]
+    measurement_source: MeasurementSource, channel: FileChannel, run_quantity: Quantity, doubts: list[str]
 ) -> ChannelPair:
     """Times and values of a channel in the run and in the measurement, both in the run's unit; doubts about the
     measured times are appended to ``doubts``.
@@ -232,19 +232,24 @@ def _channel_match(
     None if no measured time lies within it."""
     from scipy.interpolate import CubicSpline
 
-    times = channel_pair.times - time_shift_seconds
+    times = channel_pair.measured_times - time_shift_seconds
     slack = 1e-9 * (channel_pair.run_times[-1] - channel_pair.run_times[0])
     is_within = (
-        np.isfinite(channel_pair.values)
+        np.isfinite(channel_pair.measured_values)
         & (times >= channel_pair.run_times[0] - slack)
         & (times <= channel_pair.run_times[-1] + slack)
     )
     if not is_within.any():
         return None
-    read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[is_within])
+    read = CubicSpline(channel_pair.run_times, channel_pair.run_values)(times[is_within])
     stated = errors_of(run).get(name.partition(", ")[0])
     return ChannelComparison(
-        name, unit, times[is_within], read, channel_pair.values[is_within], np.nan if stated is None else stated.error
+        name,
+        unit,
+        times[is_within],
+        read,
+        channel_pair.measured_values[is_within],
+        np.nan if stated is None else stated.error,
     )
 
 

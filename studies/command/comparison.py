@@ -405,6 +405,6 @@ def _figure(
         error_axis.set_title(wrapped_text(panel_title, share, TITLE_TEXT))
     for lowest, difference in zip(axes[-1], shown, strict=True):
         lowest.set_xlabel(difference.over)
-    legend_below(figure, axes[0, 0], columns=1)
+    legend_below(figure, axes[0, 0], column_count=1)
     add_heading(figure, f"Largest differences of {len(differences)} quantities", results)
     save(figure, path)

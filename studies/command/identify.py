@@ -10,11 +10,11 @@ import numpy as np
 
 from models.core.whole_files import write_whole
 from models.ensemble.runner import values_in_order
-from models.ensemble.store import Store, named_files
+from models.ensemble.store import BlockStore, named_files
 from models.ensemble.workers import Crew, folders_for_workers
-from models.identification.fit import Fit, fit
-from models.identification.of_scene import problem_of
-from models.identification.problem import Problem
+from models.identification.fit import ParameterFit, fit
+from models.identification.of_scene import identification_problem_of
+from models.identification.problem import IdentificationProblem
 from models.identification.uncertainty import LikelihoodProfile, Uncertainty, likelihood_profile, uncertainty
 from models.measured.time_shift import ChannelPair, time_shift
 
@@ -43,11 +43,11 @@ def identify(
     KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; folder : keeps finished stages.
     The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
-    problem = problem_of(scene, measurement, parameters, engine, low_pass)
+    problem = identification_problem_of(scene, measurement, parameters, engine, low_pass)
     with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *folders_for_workers(scene)) as pool:
         if folder is None:
             return uncertainty(fit(problem, None, report_progress, executor=pool), pool)
-        store = Store(folder / STAGES_FOLDER)
+        store = BlockStore(folder / STAGES_FOLDER)
         with store.reserved_folder(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
             return uncertainty(fit(problem, store, report_progress, executor=pool), pool)
 
@@ -74,7 +74,7 @@ def profiles_of(
 
 
 def _facts_of_stages(
-    scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float
+    scene: Any, measurement: str | Path, problem: IdentificationProblem, engine: str, low_pass: float
 ) -> dict[str, Any]:
     """Inputs on which the saved stages of an identification depend; if one of them changes, the stages are computed
     anew."""
@@ -84,7 +84,8 @@ def _facts_of_stages(
         "files": named_files([table, str(measurement)], Path(scene.folder)),
         "measurement": str(measurement),
         "parameters": [
-            [parameter.name, parameter.start, parameter.low, parameter.high] for parameter in problem.parameters
+            [parameter.name, parameter.start, parameter.lower_bound, parameter.upper_bound]
+            for parameter in problem.parameters
         ],
         "engine": engine,
         "low pass": low_pass,
@@ -129,7 +130,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
                 "at a bound": bool(is_at_bound),
             }
             for name, value, error, sure, is_at_bound in zip(
-                names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.at_bound, strict=True
+                names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.is_at_bound, strict=True
             )
         },
         "correlation": {"of": names, "rows": correlation(uncertainty).tolist()},
@@ -145,7 +146,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
         "profiles": {
             parameter.name: {
                 "values": parameter.values.tolist(),
-                "rise": parameter.rise.tolist(),
+                "rise": parameter.misfit_rise.tolist(),
                 "quadratic": parameter.is_quadratic,
             }
             for parameter in profiles
@@ -164,7 +165,7 @@ def _finite_number(number: float) -> float | None:
     return float(number) if np.isfinite(number) else None
 
 
-def relative_errors(fit: Fit) -> dict[str, float]:
+def relative_errors(fit: ParameterFit) -> dict[str, float]:
     """For each channel, ratio of the rms error of the fitted model to the rms of the measured channel."""
     weights = fit.problem.weights > 0.0
     return {
@@ -178,7 +179,7 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
     solved = uncertainty.fit
     table = [f"  {'parameter':<32}{'estimate':>13}{'standard error':>16}"]
     for k, parameter in enumerate(solved.problem.parameters):
-        error = "at its bound" if solved.at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
+        error = "at its bound" if solved.is_at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
         doubt = "" if uncertainty.is_determined[k] else "  not determined by the data"
         table.append(f"  {parameter.name:<32}{solved.values[k]:>13.6g}{error:>16}{doubt}")
     table += [
@@ -199,7 +200,7 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
         )
     for curve in profiles:
         shape = "as the standard error says" if curve.is_quadratic else "not as the standard error says"
-        curve_text = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.rise, strict=True))
+        curve_text = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.misfit_rise, strict=True))
         table.append(f"  profile of {curve.name}: {curve_text} (95 % below 3.84), {shape}")
     return table
 
@@ -226,12 +227,14 @@ def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: flo
     with the measurement shifted earlier by a time (s)."""
     shares = []
     for pair in channel_pairs:
-        shifted_times = pair.times - time_shift_seconds
+        shifted_times = pair.measured_times - time_shift_seconds
         is_within = (
-            np.isfinite(pair.values) & (shifted_times >= pair.run_times[0]) & (shifted_times <= pair.run_times[-1])
+            np.isfinite(pair.measured_values)
+            & (shifted_times >= pair.run_times[0])
+            & (shifted_times <= pair.run_times[-1])
         )
-        gap = np.interp(shifted_times[is_within], pair.run_times, pair.run) - pair.values[is_within]
-        shares.append(float(np.sqrt(np.mean(gap**2))) / (float(np.nanstd(pair.values)) or 1.0))
+        gap = np.interp(shifted_times[is_within], pair.run_times, pair.run_values) - pair.measured_values[is_within]
+        shares.append(float(np.sqrt(np.mean(gap**2))) / (float(np.nanstd(pair.measured_values)) or 1.0))
     return float(np.mean(shares))
 
 

@@ -28,9 +28,9 @@ from models.core.discretisation import largest_estimate
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed_tables
 from models.core.whole_files import write_whole
-from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
-from models.ensemble.store import Arrays, checksum_of_sources, exclusive_folder, named_files
+from models.ensemble.runner import PathBlocks, run_paths
+from models.ensemble.store import ArraysByName, checksum_of_sources, exclusive_folder, named_files
 from models.ensemble.workers import Crew
 from studies.command.asked import STUDIES_FOLDER, checked_study, engines_of, load_scene, scene_path
 from studies.command.summary_numbers import Columns, has_several_values, present_numbers, summary_scalars
@@ -61,7 +61,7 @@ class SweepJob:
     folder: Path
     error: bool = True
 
-    def __call__(self, paths: range) -> Arrays:
+    def __call__(self, paths: range) -> ArraysByName:
         """Array "record" (n,): the record of each of the n points as JSON text."""
         return _json_array(map(self.record, paths))
 
@@ -113,7 +113,7 @@ class SweepJob:
         }
 
 
-def _json_array(records: Iterable[Record]) -> Arrays:
+def _json_array(records: Iterable[Record]) -> ArraysByName:
     return {"record": np.array(list(map(json.dumps, records)))}
 
 
@@ -263,13 +263,13 @@ def _records_of_points(job: SweepJob, progress: Callable[[str, float], None], cr
     def tell(finished: Done) -> None:
         progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
 
-    def lost(points: range, reason: str) -> Arrays:
+    def lost(points: range, reason: str) -> ArraysByName:
         return _json_array(_failed_record(reason) for _ in points)
 
     if crew.cluster is not None:  # whose workers compute in folders of their own
         job = replace(job, folder=job.folder.resolve(), scene=_absolute_path(job.scene))
     with crew.at_work(len(job.values), job.folder, *([Path(job.scene)] if Path(job.scene).is_file() else [])) as pool:
-        text_records = run_paths(job, len(job.values), job.folder / RECORDS_FOLDER, pool, Blocks(1), tell, lost)[
+        text_records = run_paths(job, len(job.values), job.folder / RECORDS_FOLDER, pool, PathBlocks(1), tell, lost)[
             "record"
         ]
     records = [json.loads(str(text_of_record)) for text_of_record in text_records]

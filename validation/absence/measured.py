@@ -8,7 +8,7 @@ from unittest import mock
 import numpy as np
 
 from models.core.time_series import write_time_series
-from models.measured.faults_of_measurement import Faults
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.multibody import cut_kernel as kernel
 from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES
 from models.systems.measured import section_run
@@ -82,7 +82,7 @@ def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], 
     guides, faulty = {int(table[kernel.STABILISER]) for table in tables}, np.zeros((2, 1), bool)
     if scene.virtual is not None and exam.virtual is not None:
         samples, true = (
-            exam.virtual.samples(faults, scene.virtual.seed) for faults in (scene.virtual.faults, Faults())
+            exam.virtual.samples(faults, scene.virtual.seed) for faults in (scene.virtual.faults, SimulatedFaults())
         )
         faulty = np.array([(samples != true).any(axis=0), np.isnan(samples).any(axis=0)])
     counts = {

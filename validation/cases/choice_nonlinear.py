@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.advice.choice.choose import Chooser
+from models.advice.choice.choose import EffectChooser
 from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
@@ -54,7 +54,7 @@ def judge_choice_for_ride(nonlinear_ride: NonlinearRide) -> ChoiceCheckedByRuns:
     """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
     that the choice did not use."""
     engine = ENGINES_BY_SYSTEM["ride"][0]
-    choice = Chooser(
+    choice = EffectChooser(
         nonlinear_ride.prepared_in_time(), engine, list(nonlinear_ride.quantities), nonlinear_ride.tolerance
     ).choose()
     fresh = Variants(nonlinear_ride.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
@@ -126,7 +126,7 @@ def _refused_choice_row() -> Row:
     tolerance."""
     asked, outcome = random_nonlinear_ride(UNDERSAMPLED_SEED), "a choice"
     try:
-        Chooser(
+        EffectChooser(
             asked.prepared_in_time(FEWEST_COPIES), ENGINES_BY_SYSTEM["ride"][0], list(asked.quantities), FINE_TOLERANCE
         ).choose()
     except InputError as error:

@@ -268,7 +268,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.set(title="Library above exact theory [%], ν = 0 to 1/2", xlabel="a/b [-]", ylim=(-5, 20))
     for axes in (left, right):
         axes.axvspan(0.1, 10.0, color="0.9", zorder=0, label="range of the table")
-    legend_below(figure, left, columns=5)
+    legend_below(figure, left, column_count=5)
     add_heading(figure, "Kalker's table holds against the exact theory, and so does what leads on beyond it")
     return [
         (

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.statistics import deviation_with_error, percentiles, quantile_with_interval
-from models.ensemble.store import Arrays
+from models.ensemble.store import ArraysByName
 from models.ensemble.workers import process_pool
 from models.systems.pitch_plane.noise_paths import NoisePaths, largest_difference, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
@@ -84,7 +84,7 @@ def _quick_rows(force_folder: Path, scene: Scene, ensemble_job: NoisePaths, outp
     """Rows of a quick run: a few paths of one second, computed in threads because these start at once."""
     paths = run_paths(ensemble_job, 12)
     with ThreadPoolExecutor(2) as pool:
-        two = run_paths(ensemble_job, 12, executor=pool, blocks=Blocks(3))
+        two = run_paths(ensemble_job, 12, executor=pool, path_blocks=PathBlocks(3))
     engines, _ = _engine_rows_and_times(scene, ensemble_job.truth, output_times, paths, 2, None)
     return [
         _single_run_row(force_folder, 1.0, paths),
@@ -94,7 +94,7 @@ def _quick_rows(force_folder: Path, scene: Scene, ensemble_job: NoisePaths, outp
     ]
 
 
-def _single_run_row(force_folder: Path, duration: float, simulated_paths: Arrays) -> Row:
+def _single_run_row(force_folder: Path, duration: float, simulated_paths: ArraysByName) -> Row:
     """Row: path 7 of the ensemble equals a single run of the scene with ``path = 7``."""
     alone = simulate(_noisy_scene(force_folder, duration, noise_path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / TIME_STEP)] - simulated_paths["states"][7]).max())
@@ -107,7 +107,9 @@ def _single_run_row(force_folder: Path, duration: float, simulated_paths: Arrays
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _equal_bits_row(row_name: str, title: str, simulated_paths: Arrays, other_simulated_paths: Arrays) -> Row:
+def _equal_bits_row(
+    row_name: str, title: str, simulated_paths: ArraysByName, other_simulated_paths: ArraysByName
+) -> Row:
     """Row: two ensembles are equal to the last bit."""
     count = len(other_simulated_paths["drift_off"])
     equal = all(
@@ -125,7 +127,7 @@ def _equal_bits_row(row_name: str, title: str, simulated_paths: Arrays, other_si
     )
 
 
-def _interrupted_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_folder: Path) -> Row:
+def _interrupted_run_row(ensemble_job: NoisePaths, simulated_paths: ArraysByName, block_folder: Path) -> Row:
     """Row: an interrupted run that is continued gives the same ensemble."""
 
     def interrupt_half_way(run_progress: Any) -> None:
@@ -133,9 +135,9 @@ def _interrupted_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, bloc
             raise KeyboardInterrupt
 
     try:
-        run_paths(ensemble_job, 12, block_folder, blocks=Blocks(3), progress=interrupt_half_way)
+        run_paths(ensemble_job, 12, block_folder, path_blocks=PathBlocks(3), report_progress=interrupt_half_way)
     except KeyboardInterrupt:
-        again = run_paths(ensemble_job, 12, block_folder, blocks=Blocks(3))
+        again = run_paths(ensemble_job, 12, block_folder, path_blocks=PathBlocks(3))
         return _equal_bits_row(
             "resumed",
             "12 paths have the same bits if they are interrupted half-way and resumed",
@@ -145,7 +147,7 @@ def _interrupted_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, bloc
     raise AssertionError("the interrupt was lost")
 
 
-def _killed_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_folder: Path) -> Row:
+def _killed_run_row(ensemble_job: NoisePaths, simulated_paths: ArraysByName, block_folder: Path) -> Row:
     """Row: a run is killed after two of its blocks, then resumed, and must give the same ensemble."""
     child = get_context("spawn").Process(target=_run_slow_job, args=(ensemble_job, block_folder))
     child.start()
@@ -154,7 +156,7 @@ def _killed_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_fol
     child.kill()
     child.join()
     modification_times = {path: path.stat().st_mtime_ns for path in block_folder.glob("block*.npz")}
-    again = run_paths(ensemble_job, RECOMPUTED_PATH_COUNT, block_folder, blocks=Blocks(20))
+    again = run_paths(ensemble_job, RECOMPUTED_PATH_COUNT, block_folder, path_blocks=PathBlocks(20))
     if (
         not modification_times
         or len(modification_times) == RECOMPUTED_PATH_COUNT // 20
@@ -173,7 +175,11 @@ def _killed_run_row(ensemble_job: NoisePaths, simulated_paths: Arrays, block_fol
 def _run_slow_job(ensemble_job: NoisePaths, block_folder: Path) -> None:
     """Compute an ensemble that waits after each block, so that the run can be killed in between."""
     run_paths(
-        ensemble_job, RECOMPUTED_PATH_COUNT, block_folder, blocks=Blocks(20), progress=lambda state: time.sleep(0.1)
+        ensemble_job,
+        RECOMPUTED_PATH_COUNT,
+        block_folder,
+        path_blocks=PathBlocks(20),
+        report_progress=lambda state: time.sleep(0.1),
     )
 
 
@@ -277,7 +283,7 @@ def _engine_rows_and_times(
     scene: Scene,
     true_pitch: np.ndarray,
     output_times: np.ndarray,
-    reference_paths: Arrays,
+    reference_paths: ArraysByName,
     noise_path_count: int,
     worker_pool: Executor | None,
 ) -> tuple[list[Row], dict[str, float]]:
@@ -287,11 +293,11 @@ def _engine_rows_and_times(
     single, two = (
         mujoco_threads(scene, output_times, true_pitch, thread_count=thread_count) for thread_count in (1, 2)
     )
-    jobs_by_method: dict[str, Callable[[], Arrays]] = {
+    jobs_by_method: dict[str, Callable[[], ArraysByName]] = {
         "mujoco, 1 thread": lambda: run_paths(single, noise_path_count),
         "mujoco, 2 threads": lambda: run_paths(two, noise_path_count),
         "exudyn, 2 processes" if worker_pool else "exudyn": lambda: run_paths(
-            exudyn, noise_path_count, executor=worker_pool, blocks=Blocks(1)
+            exudyn, noise_path_count, executor=worker_pool, path_blocks=PathBlocks(1)
         ),
     }
     rows, prices = [], {}
@@ -356,7 +362,7 @@ def _half_step_row(force_folder: Path) -> Row:
 def _data_for_tables_and_figure(
     true_pitch: np.ndarray,
     output_times: np.ndarray,
-    simulated_paths: Arrays,
+    simulated_paths: ArraysByName,
     large_ensemble: Saved,
     seconds_by_method: dict[str, float],
 ) -> Saved:

@@ -16,13 +16,13 @@ from models.sensors.inertial_unit import (
     angle_variance,
     bias_path,
     error_rotation,
-    euler_mean_square,
-    euler_quaternions,
-    ito_norm,
-    mean_error,
-    mean_scalar,
-    mean_trace,
+    mean_error_rotation,
+    mean_error_scalar,
+    mean_error_trace,
+    mean_square_norm_by_euler,
     measured_attitude,
+    quaternion_norm_by_ito,
+    quaternions_by_euler_steps,
     true_attitude,
 )
 from models.sensors.rotations import integrate_attitude, quaternion_of_rotation_vector, rotation_matrix, rotation_vector
@@ -168,37 +168,37 @@ def _three_axis_noise_rows(noise_path_count: int) -> list[Row]:
     wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_ANGLE_WALKS / root, noise_path_count)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
-        mean_error(UNEQUAL_ANGLE_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
+        mean_error_rotation(UNEQUAL_ANGLE_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
     )
-    resting = mean_error(UNEQUAL_ANGLE_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
+    resting = mean_error_rotation(UNEQUAL_ANGLE_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
     all_equal = np.full(3, EQUAL_ANGLE_WALK)
-    same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
+    same = float(np.trace(mean_error_rotation(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
         _mean_value_row(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
-            mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS),
+            mean_error_trace(EQUAL_ANGLE_WALK, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
         _mean_value_row(
             "scalar",
             "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
-            mean_scalar(all_equal, RUN_SECONDS),
+            mean_error_scalar(all_equal, RUN_SECONDS),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
         _mean_value_row(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
-            mean_scalar(UNEQUAL_ANGLE_WALKS, RUN_SECONDS),
+            mean_error_scalar(UNEQUAL_ANGLE_WALKS, RUN_SECONDS),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
-            abs(same - mean_trace(EQUAL_ANGLE_WALK, RUN_SECONDS)),
+            abs(same - mean_error_trace(EQUAL_ANGLE_WALK, RUN_SECONDS)),
             "",
             "both are exact",
         ),
@@ -235,10 +235,10 @@ def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
         noise[:, :, :axes] = normal_samples(SEED, axes, steps * noise_path_count, axes, noise_source=GYRO).reshape(
             steps, noise_path_count, axes
         )
-        q = euler_quaternions(EQUAL_ANGLE_WALK * period**0.5 * noise, START_ATTITUDE)
+        q = quaternions_by_euler_steps(EQUAL_ANGLE_WALK * period**0.5 * noise, START_ATTITUDE)
         square = np.sum(q**2, axis=1)
-        law = euler_mean_square(EQUAL_ANGLE_WALK, axes, period, steps)
-        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL_ANGLE_WALK), span), q[:, 0], f"{axes} noisy axes"
+        law = mean_square_norm_by_euler(EQUAL_ANGLE_WALK, axes, period, steps)
+        scalar, true, noisy = mean_error_scalar(np.full(axes, EQUAL_ANGLE_WALK), span), q[:, 0], f"{axes} noisy axes"
         means = (
             (
                 "norm",
@@ -268,10 +268,13 @@ def _quaternion_norm_rows(noise_path_count: int) -> list[Row]:
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the explicit Euler law at 4e6 steps, {axes} noisy axes",
-                euler_mean_square(EQUAL_ANGLE_WALK, axes, 1e-6, 4_000_000) ** 0.5,
+                mean_square_norm_by_euler(EQUAL_ANGLE_WALK, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
             ).within(
-                ito_norm(np.full(axes, EQUAL_ANGLE_WALK), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"
+                quaternion_norm_by_ito(np.full(axes, EQUAL_ANGLE_WALK), span),
+                1e-6,
+                "exp(k s^2 t / 8), eq. (28)",
+                "closed form",
             ),
         ]
     return rows
@@ -424,7 +427,7 @@ def _real_car_recording_rows(noise_path_count: int) -> CaseAnswer:
     rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
     wandered = attitude_errors(rates, period, deviation, noise_path_count)
-    law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
+    law = mean_error_rotation(deviation * period**0.5, rates, period, START_ATTITUDE)
     return [
         Observed(
             "inertial_unit.recording",

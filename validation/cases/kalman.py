@@ -106,7 +106,7 @@ sample before."""
 def _consistency_test_rows(innovations: list[np.ndarray]) -> list[Row]:
     """Rows: number of correct filters that the consistency test rejects, and of wrong filters that the test accepts."""
     count = len(innovations)
-    alarms = sum(not consistency(innovation_series, ("pitch",)).consistent for innovation_series in innovations)
+    alarms = sum(not consistency(innovation_series, ("pitch",)).is_consistent for innovation_series in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "larger by a quarter": lambda w: 1.25 * w,
         f"with a mean of {PLANTED_INNOVATION_MEAN:g} deviations": lambda w: w + PLANTED_INNOVATION_MEAN,
@@ -121,7 +121,9 @@ def _consistency_test_rows(innovations: list[np.ndarray]) -> list[Row]:
         )
     ]
     for words, plant in planted.items():
-        silent = sum(consistency(plant(innovation_series), ("pitch",)).consistent for innovation_series in innovations)
+        silent = sum(
+            consistency(plant(innovation_series), ("pitch",)).is_consistent for innovation_series in innovations
+        )
         id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words} and that are not named"
         rows.append(Observed(id, SYSTEM, what, silent, "").at_most(0, f"of {count} runs", "closed form"))
     return rows

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.measured.checks import check
-from models.measured.faults_of_measurement import Faults
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import GRAVITY
 from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
@@ -253,7 +253,7 @@ def _wrong_vehicle_rows(work_folder: Path) -> list[Row]:
     weaker dampers."""
     findings_by_car = {
         name: errors_and_doubts(
-            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), work_folder
+            replace(of_recording, vehicle=r19()), of_recording.samples(SimulatedFaults(noise=NOISE), SEED), work_folder
         )
         for name, of_recording in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
     }

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.core.scene_file import parse
 from models.identification.fit import fit
-from models.identification.of_scene import problem_of
+from models.identification.of_scene import identification_problem_of
 from models.identification.uncertainty import uncertainty
 from models.systems.handling.run import run
 from models.systems.handling.scene import HandlingScene, build
@@ -74,13 +74,17 @@ def _identified_tyre_rows() -> list[Row]:
     keys = ["tyres.cornering.0=0.3:3", "tyres.cornering.1=0.3:3"]
     known = uncertainty(
         fit(
-            problem_of(
-                _drive_scene([0.0, 6.0], START_STIFFNESS_RATIOS), SIMULATED_DRIVE_FILE, keys, "mujoco", low_pass=5.0
+            identification_problem_of(
+                _drive_scene([0.0, 6.0], START_STIFFNESS_RATIOS),
+                SIMULATED_DRIVE_FILE,
+                keys,
+                "mujoco",
+                low_pass_edge=5.0,
             )
         )
     )
     off = known.fit.values - 1.0
-    scaled = off / known.fit.problem.scale
+    scaled = off / known.fit.problem.scales
     return [
         Observed(
             "measured_drive.tyres",

@@ -15,7 +15,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.noise import normal_samples
 from models.fatigue.damage import pseudo_damage
-from models.measured.channel import Source
+from models.measured.channel import MeasurementSource
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import ChannelGroup
 from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
@@ -66,7 +66,7 @@ def largest_relative_difference(read_values: np.ndarray, true_values: np.ndarray
     return float(np.nanmax(np.abs(read_values - true_values) / np.abs(true_values)))
 
 
-def preserved_metadata(measurement_source: Source) -> dict[str, bool]:
+def preserved_metadata(measurement_source: MeasurementSource) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {

@@ -13,7 +13,7 @@ from models.core.strict import read
 from models.core.systems import load
 from models.engines.cut_vehicle import ENGINES
 from models.measured.checks import check as check_recording
-from models.measured.faults_of_measurement import Faults
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.formats import write
 from models.measured.recording import Recording
 from models.systems.hub_forces.measurement import HubForces, hub_model
@@ -110,7 +110,7 @@ def measurement_of_test(chain_test: MeasurementChainTest, work_folder: Path, dur
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
-def planted_faults(converter_bits: int) -> Faults:
+def planted_faults(converter_bits: int) -> SimulatedFaults:
     """All faults that are planted in the measurement."""
     table = {
         "noise": NOISE_DEVIATIONS,
@@ -118,7 +118,7 @@ def planted_faults(converter_bits: int) -> Faults:
         "quantisation": {"bits": converter_bits},
         "dropouts": {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]},
     }
-    return read(Faults, table, "")
+    return read(SimulatedFaults, table, "")
 
 
 def recording_from_files(
@@ -380,7 +380,7 @@ def _moving_car_rows(work_folder: Path) -> list[Row]:
     findings = check_recording(recording, None, scene.places, {})
     ratio = next((f.size for f in findings if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in findings if f.check == "shift" and "roll_rate" in f.place), None)
-    up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
+    up = [recording.samples(recording.find_signals("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
     id, gyro = (
         "measured_virtual.moving",
         f"{what} ratio of the gyro's pitch rate to the derivative of the camera's angle",
@@ -401,7 +401,7 @@ def _quick_rows(work_folder: Path) -> list[Row]:
     drift."""
     chain_test = MEASUREMENT_CHAIN_TESTS[0]
     true = measurement_of_test(chain_test, work_folder, 0.6)
-    samples = true.samples(read(Faults, {"noise": NOISE_DEVIATIONS}, ""), SEED)
+    samples = true.samples(read(SimulatedFaults, {"noise": NOISE_DEVIATIONS}, ""), SEED)
     recording = recording_from_files(true, samples, chain_test.vehicle_file, "csv", work_folder / "quick")
     run = march(stabilised_run(recording, true.vehicle, chain_test.attitude_hold), work_folder / "quick" / "run")
     wrong = errors_of_run(run, true)

@@ -10,13 +10,13 @@ from models.drift.score import root_mean_square
 from models.engines.protocol import build
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
-    StartState,
+    BodyStartState,
     angular_acceleration,
+    body_rotation_from_readings,
     fit_quality,
     integrate_rates,
     rates_up_to_sign,
     recovered_motion,
-    spin_from_readings,
     tilt_displacement,
 )
 from models.sensors.rotations import skew_matrix
@@ -72,9 +72,12 @@ def _clean_reading_rows(arrangement_name: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
     array = sensor_array(SENSOR_ARRANGEMENTS[arrangement_name])
     clean = readings_on_path(array.positions)
-    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement_name.replace(',', '').replace(' ', '-')}"
+    spins, key = (
+        body_rotation_from_readings(array, clean),
+        f"motion.exact.{arrangement_name.replace(',', '').replace(' ', '-')}",
+    )
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
-    squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
+    squares = (rates_up_to_sign(spins) @ array.principal_axes) ** 2 - (PATH.rates @ array.principal_axes) ** 2
     what = f"sensors: {arrangement_name}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
@@ -85,7 +88,12 @@ def _clean_reading_rows(arrangement_name: str) -> list[Row]:
             float(np.abs(squares).max()),
             "rad^2/s^2",
         ),
-        ("consistency", "share of the readings that no rigid body explains", fit_quality(array, clean).share, ""),
+        (
+            "consistency",
+            "share of the readings that no rigid body explains",
+            fit_quality(array, clean).unexplained_share,
+            "",
+        ),
     )
     return [
         Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(CLOSED_FORM_BOUND, why, "closed form")
@@ -136,7 +144,7 @@ def _tilt_error_row() -> Row:
     """Row: false displacement by an error of the initial tilt, compared with its law."""
     array, tilt, count = sensor_array(SENSOR_ARRANGEMENTS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
-    drift = -recovered_motion(array, still, 1e-3, StartState.pitched(tilt)).position[:, 0]
+    drift = -recovered_motion(array, still, 1e-3, BodyStartState.pitched(tilt)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
     what = (
         f"relative difference of the false displacement after 10 s, {law[-1]:.4f} m, from g sin(tilt) t^2 / 2, "
@@ -157,7 +165,7 @@ def _noise_gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
             noise = normal_samples(SEED, i, sample_count, 15, noise_source=ACCELEROMETERS).reshape(sample_count, 5, 3)
-            alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((sample_count, 3)))
+            alpha = angular_acceleration(body_rotation_from_readings(array, noise), np.zeros((sample_count, 3)))
             axis = int(np.argmax(array.noise_gains()))
             law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
@@ -217,7 +225,7 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
     readings, array = readings_of(run, p), sensor_array(RIGID_SENSORS)
     felt = readings[:, :5]
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
-    acceleration = angular_acceleration(spin_from_readings(array, felt), turning)[:, 1]
+    acceleration = angular_acceleration(body_rotation_from_readings(array, felt), turning)[:, 1]
     equations = build("reference", assembly_of_scene(scene), settings_of(scene, "reference"))  # eq. (38) at every state
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = fit_quality(sensor_array(p.positions()), readings)
@@ -241,7 +249,7 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
             SYSTEM,
             f"six sensors, of which a bracket of 30 Hz carries one, {engine_name}: {100 * loose.share:.2g} "
             "% fits no rigid body",
-            f"loose: {loose.suspect}" if not loose.rigid else "rigid",
+            f"loose: {loose.suspect_sensor}" if not loose.rigid else "rigid",
             "loose: battery",
             "more than 5 % is a loose mount; the one without which it passes is named",
             "closed form",
@@ -250,7 +258,7 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
             f"motion.rigid.{engine_name}",
             SYSTEM,
             f"share of the readings that no rigid body explains, five rigid mounts, {engine_name}",
-            fit_quality(array, felt).share,
+            fit_quality(array, felt).unexplained_share,
             "",
         ).at_most(CLOSED_FORM_BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
     ]
@@ -270,7 +278,7 @@ def _recovered_motion_rows(
         sensor_arrangement,
         specific_forces,
         1e-3,
-        StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()),
+        BodyStartState.pitched(*states[0, [3, 7, 2, 6]].tolist()),
         rates=gyro_rates,
     )
     errors = (
@@ -318,7 +326,7 @@ def _random_walk_rows(noise_path_count: int) -> tuple[list[Row], dict[str, list[
     count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
     errors = np.array(
         [
-            integrate_rates(spin_from_readings(array, _noise_samples(path, count)), SAMPLE_PERIOD, np.zeros(3))
+            integrate_rates(body_rotation_from_readings(array, _noise_samples(path, count)), SAMPLE_PERIOD, np.zeros(3))
             for path in range(noise_path_count)
         ]
     )
@@ -349,7 +357,10 @@ def _symmetric_part_rows(error_curves: Saved, quick: bool) -> list[Row]:
     rates, array, clean = _turning_body(count)
     filtered = [
         filter_rates(
-            spin_from_readings(array, clean + _noise_samples(path, count)), SAMPLE_PERIOD, rates[0], NOISE_DEVIATION
+            body_rotation_from_readings(array, clean + _noise_samples(path, count)),
+            SAMPLE_PERIOD,
+            rates[0],
+            NOISE_DEVIATION,
         )
         for path in range(paths)
     ]

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from models.advice.price import runner
-from models.advice.price.problem import Problem, Setting
+from models.advice.price.problem import Setting, WorkPrecisionProblem
 from models.engines.assembly import Assembly
 from models.ensemble.workers import process_pool
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -34,7 +34,7 @@ from validation.price.tables import tables as cost_tables
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
-MakeCostProblem = Callable[[bool], Problem]
+MakeCostProblem = Callable[[bool], WorkPrecisionProblem]
 COST_PROBLEMS: tuple[MakeCostProblem, ...] = (
     road_excited.problem,
     force_excited.problem,
@@ -127,7 +127,7 @@ def _costs_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]
 
 def _coinciding_curve_rows(saved_road_problem: Saved) -> list[Row]:
     """Rows: work-precision curves that must coincide on the road, and methods that Exudyn names but does not have."""
-    road = runner.of_saved(saved_road_problem)
+    road = runner.points_from_saved(saved_road_problem)
     groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
         behaviour_row(
@@ -230,18 +230,18 @@ def tables(case_data: Saved) -> list[Table]:
     tables = [
         table
         for saved in case_data["problems"]
-        for table in (*cost_tables(runner.of_saved(saved)), *split.table(case_data["split"], saved["key"]))
+        for table in (*cost_tables(runner.points_from_saved(saved)), *split.table(case_data["split"], saved["key"]))
     ]
     return [*tables, ride.table(case_data["ride"])]
 
 
 def draw(case_data: Saved) -> Drawn:
     """Plot error over work for every problem, and for the methods of ride."""
-    problems = map(runner.of_saved, case_data["problems"])
+    problems = map(runner.points_from_saved, case_data["problems"])
     return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(case_data["ride"])]
 
 
-def _caption(measured_points: runner.MeasuredPoints) -> str:
+def _caption(measured_points: runner.WorkPrecisionPoints) -> str:
     """Caption of a figure of error over work."""
     return (
         f"{measured_points.title}: error over work and over seconds. Reference: {measured_points.reference}. "

@@ -11,8 +11,8 @@ from models.core.tables import write_table
 from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
 from models.identification.held_out import IdentifiedVehicle, ParameterSearch, identified_vehicle
-from models.identification.of_scene import problem_of
-from models.identification.problem import FitClock, Problem
+from models.identification.of_scene import identification_problem_of
+from models.identification.problem import FitClock, IdentificationProblem
 from models.identification.uncertainty import Uncertainty, uncertainty
 from models.measured.drive import read_drive
 from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
@@ -90,7 +90,7 @@ def _write_drive(work_folder: Path) -> None:
     write_table(work_folder / "known.csv", columns)
 
 
-def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
+def _noisy_problem(scene: SingleTrackScene, seed: int) -> IdentificationProblem:
     """Identification problem: the car's parameters are to be found from its noisy channels, starting from other
     values."""
     driven, random = run(scene), np.random.default_rng(seed)
@@ -100,7 +100,9 @@ def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
     }
     path = Path(scene.folder) / f"known measured {seed}.csv"
     write_table(path, {"time": ("s", DRIVE_TIMES), **columns})
-    return problem_of(_car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass=5.0)
+    return identification_problem_of(
+        _car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass_edge=5.0
+    )
 
 
 def _known_car_rows(work_folder: Path) -> list[Row]:
@@ -110,9 +112,9 @@ def _known_car_rows(work_folder: Path) -> list[Row]:
     solved = [uncertainty(fit(_noisy_problem(scene, seed))) for seed in range(NOISE_SAMPLE_COUNT)]
     distance, worst = 0.0, 0.0
     for known in solved:
-        off = (known.fit.values - truth) / known.fit.problem.scale
+        off = (known.fit.values - truth) / known.fit.problem.scales
         distance += float(off @ np.linalg.solve(known.covariance, off))
-        worst = max(worst, float(np.abs(off * known.fit.problem.scale / known.deviations).max()))
+        worst = max(worst, float(np.abs(off * known.fit.problem.scales / known.deviations).max()))
     inside = _share_inside_prediction_bands(solved)
     return [
         Observed(
@@ -170,7 +172,11 @@ def _race_car_rows(identified_car: IdentifiedVehicle) -> list[Row]:
     """Rows: prediction error, share inside the bands and width of the bands, for every channel."""
     answer, rows = identified_car.bands, []
     figures = zip(
-        RELATIVE_ERROR_AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True
+        RELATIVE_ERROR_AIMS.items(),
+        answer.relative_error(),
+        answer.share_inside(),
+        answer.relative_width(),
+        strict=True,
     )
     for (name, aim), error, inside, width in figures:
         id = f"race_car.{name.replace(' ', '_')}"

@@ -340,7 +340,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.set(title=body_point, xlabel="speed [m/s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].set_ylim(bottom=0.0)
-    legend_below(figure, axes[0], columns=2)
+    legend_below(figure, axes[0], column_count=2)
     add_heading(figure, "Which roads belong together matters most at the centre of the body")
     return [(FIGURE_CAPTION, figure)]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.advice.choice.choose import Choice as ChoiceByRuns
-from models.advice.choice.choose import Chooser as ChooserByRuns
+from models.advice.choice.choose import EffectChoice as ChoiceByRuns
+from models.advice.choice.choose import EffectChooser as ChooserByRuns
 from models.advice.ride_choice.candidates import EffectSet, largest_changes
 from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.march import longest_step

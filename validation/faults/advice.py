@@ -17,7 +17,7 @@ import numpy as np
 from models.advice.price import PricedRun, SettingLadder, recommendation, search, truth
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, SettingChoice
-from models.advice.price.truth import ReferenceTruth, values_at
+from models.advice.price.truth import ReferenceSolution, values_at
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
@@ -57,10 +57,10 @@ class Swing:
     """Test problem y' = y cos t in the form of ``models.advice.price.PricedScene``. Its error keeps growing after the
     part of the run in which settings are searched."""
 
-    title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, work_count_name = "y' = y cos t", "y", "", 0.0, "", "force calls"
     full_duration, searched_duration = 8.0, 2.0
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Settings (step sizes) of four methods of an engine: the default has order 2, and the method "broken" gives
         NaN."""
         return [
@@ -70,7 +70,7 @@ class Swing:
             SettingLadder("mujoco", "broken", STEPS_TRIED, 1),
         ]
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Settings of the reference: RK4 with successively halved steps. The coarsest is no more accurate than some
         settings to be judged."""
         return SettingLadder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
@@ -97,7 +97,7 @@ class Swing:
         times, values, calls = solution
         return PricedRun(times, values[:, None], {"force calls": calls})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select a setting; here its label."""
         return [setting.label()]
 
@@ -124,7 +124,7 @@ def _fewest_calls(tolerance: float) -> int:
     swing = Swing()
     return min(
         swing.solve(setting, swing.full_duration)[2]
-        for ladder in swing.ladders()
+        for ladder in swing.setting_ladders()
         for setting in map(ladder.setting, range(len(STEPS_TRIED)))
         if _error(setting) <= tolerance
     )
@@ -188,7 +188,7 @@ CHECKS = {
     "seconds": Check(
         "the same of the setting recommended by seconds, where a call costs the same in all",
         "",
-        recommendation.SLOWER_RATIO - 1.0,
+        recommendation.SLOWER_SECONDS_RATIO - 1.0,
         lambda: _largest_over_recommended(_excess_calls, "seconds"),
     ),
 }
@@ -216,12 +216,12 @@ def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: 
     return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
-def _mean_error(self: ReferenceTruth, other_run: PricedRun) -> float:
+def _mean_error(self: ReferenceSolution, other_run: PricedRun) -> float:
     exact = values_at(self.run, other_run.times, self.kink_period)
     return float(np.abs(other_run.values - exact).mean()) if np.isfinite(other_run.values).all() else np.inf
 
 
-def _error_without_nan(self: ReferenceTruth, other_run: PricedRun) -> float:
+def _error_without_nan(self: ReferenceSolution, other_run: PricedRun) -> float:
     exact = values_at(self.run, other_run.times, self.kink_period)
     return float(np.nanmax(np.abs(other_run.values - exact)))
 
@@ -236,7 +236,7 @@ FAULTS = (
     CampaignFault(
         "predicted error a tenth of what was measured",
         "recommendation",
-        _advice_patch("_with_finer_truth", _tenfold_smaller_errors),
+        _advice_patch("_with_finer_reference", _tenfold_smaller_errors),
     ),
     CampaignFault(
         "the most accurate setting wins, not the cheapest",
@@ -262,18 +262,18 @@ FAULTS = (
         "recommendation",
         _advice_patch(
             "_confirmed_over_whole_run",
-            lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners),
+            lambda _: lambda search, timed, winners, _executor: (search.reference_solution, timed, winners),
         ),
     ),
     CampaignFault(
         "mean difference for the largest",
         "truth",
-        _advice_patch("ReferenceTruth.error", lambda _: _mean_error, "truth"),
+        _advice_patch("ReferenceSolution.error", lambda _: _mean_error, "truth"),
     ),
     CampaignFault(
         "what is no number left out of the error",
         "truth",
-        _advice_patch("ReferenceTruth.error", lambda _: _error_without_nan, "truth"),
+        _advice_patch("ReferenceSolution.error", lambda _: _error_without_nan, "truth"),
     ),
     CampaignFault(
         "the reference's first step taken for the truth",
@@ -283,7 +283,9 @@ FAULTS = (
     CampaignFault(
         "a tolerance three times too wide",
         "search",
-        _advice_patch("Search.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
+        _advice_patch(
+            "SettingSearch.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"
+        ),
     ),
 )
 

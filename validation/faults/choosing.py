@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.choose import Chooser
-from models.advice.choice.screen import Screen
+from models.advice.choice.choose import EffectChooser
+from models.advice.choice.screen import EffectScreen
 from models.advice.ride_choice.choose import Chooser as LinearChooser
 from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
@@ -59,7 +59,9 @@ def _linear_choice_and_changes() -> tuple[RideChoice, np.ndarray, float]:
 
 def _choice_by_runs() -> ChoiceCheckedByRuns:
     """Effects chosen for the half car by simulation, checked by two further runs."""
-    return _choice_with_functions(Chooser.__init__, Chooser.confirmed_changes, Screen.relative_changes)
+    return _choice_with_functions(
+        EffectChooser.__init__, EffectChooser.confirmed_changes, EffectScreen.relative_changes
+    )
 
 
 @cache
@@ -144,10 +146,10 @@ def _tolerance_ignored(original: Any) -> Any:
     return init
 
 
-def _unconfirmed_report(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
+def _unconfirmed_report(change: Callable[[EffectChooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
     """Fault: predicted changes are reported as confirmed without a run."""
 
-    def confirmed_changes(chooser: Chooser, omitted_effects: frozenset[str]) -> np.ndarray:
+    def confirmed_changes(chooser: EffectChooser, omitted_effects: frozenset[str]) -> np.ndarray:
         step_factor = chooser.longest_step_factor(omitted_effects)
         shares = change(chooser, omitted_effects, step_factor)
         chooser._confirmed[omitted_effects] = step_factor, shares, np.zeros_like(shares)
@@ -196,7 +198,7 @@ FAULTS = (
         "predictions reported as confirmed",
         "choice by runs",
         attribute_patch(
-            f"{RUN_MODULES}.choose:Chooser.confirmed_changes",
+            f"{RUN_MODULES}.choose:EffectChooser.confirmed_changes",
             _unconfirmed_report(lambda chooser, chosen, times: chooser.change_with_longer_steps(chosen, times)),
         ),
     ),
@@ -204,20 +206,20 @@ FAULTS = (
         "confirmed against itself",
         "choice by runs",
         attribute_patch(
-            f"{RUN_MODULES}.choose:Chooser.confirmed_changes",
+            f"{RUN_MODULES}.choose:EffectChooser.confirmed_changes",
             _unconfirmed_report(lambda chooser, *_: np.zeros(len(chooser.whole.quantities))),
         ),
     ),
     CampaignFault(
         "tolerance ignored",
         "choice by runs",
-        attribute_patch(f"{RUN_MODULES}.choose:Chooser.__init__", _tolerance_ignored),
+        attribute_patch(f"{RUN_MODULES}.choose:EffectChooser.__init__", _tolerance_ignored),
     ),
     CampaignFault(
         "the least change of all quantities taken for each",
         "screen by runs",
         attribute_patch(
-            f"{RUN_MODULES}.screen:Screen.relative_changes",
+            f"{RUN_MODULES}.screen:EffectScreen.relative_changes",
             lambda real: lambda screen, change: np.full(len(screen.quantities), real(screen, change).min()),
         ),
     ),

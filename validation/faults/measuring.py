@@ -143,7 +143,7 @@ def _recovered_motion_error() -> float:
     """Relative error of the pitch rate and vertical acceleration recovered from the readings of accelerometers on a
     moving body; the larger of both."""
     array, read, _, heave = _turning_body()
-    moved_body = body.recovered_motion(array, read, SAMPLE_PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
+    moved_body = body.recovered_motion(array, read, SAMPLE_PERIOD, body.BodyStartState(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * SAMPLE_PERIOD * np.arange(SAMPLE_COUNT))
     return max(
         largest_relative_difference(moved_body.rates[:, 1], rate),
@@ -154,7 +154,7 @@ def _recovered_motion_error() -> float:
 def _unexplained_share() -> float:
     """Share of the accelerometers' readings that no rigid-body motion explains."""
     array, read, *_ = _turning_body()
-    return body.fit_quality(array, read).share
+    return body.fit_quality(array, read).unexplained_share
 
 
 def _road_variance_error() -> float:
@@ -223,7 +223,7 @@ def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
 def _readings_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Fault: the sensors' readings (n, 4, 3) are changed before motion is computed from them."""
     return attribute_patch(
-        "models.sensors.rigid_body_motion:spin_from_readings",
+        "models.sensors.rigid_body_motion:body_rotation_from_readings",
         lambda real: (
             lambda array, readings: real(
                 array, change(readings) if readings.shape[1] == len(SENSOR_PLACES) else readings

@@ -9,11 +9,11 @@ import numpy as np
 from models.core.signals import Sampled
 from models.engines.protocol import build
 from models.sensors.rigid_body_motion import (
-    StartState,
+    BodyStartState,
     angular_acceleration,
+    body_rotation_from_readings,
     fit_quality,
     recovered_motion,
-    spin_from_readings,
 )
 from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import sensor_array
@@ -91,9 +91,9 @@ def flat_floor_error(engine: str, folder: Path) -> float:
     """Case: all sensors lie on a flat floor, and the pitch axis lies in their plane. Error: that of the pitch
     acceleration, divided by its largest value."""
     felt, states, true = _readings_of_run(engine, FLOOR_SENSORS)
-    computed = angular_acceleration(spin_from_readings(sensor_array(FLOOR_SENSORS), felt), _angular_velocities(states))[
-        :, 1
-    ]
+    computed = angular_acceleration(
+        body_rotation_from_readings(sensor_array(FLOOR_SENSORS), felt), _angular_velocities(states)
+    )[:, 1]
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
@@ -109,8 +109,8 @@ def nearly_flat_floor_error(engine: str, folder: Path) -> float:
     acceleration divided by the smallest that this noise can cause."""
     felt, states, true = _readings_of_run(engine, LIFTED_SENSORS, noise=NOISE)
     array = sensor_array(LIFTED_SENSORS)
-    computed = angular_acceleration(spin_from_readings(array, felt), _angular_velocities(states))[:, 1]
-    least_gain = array.noise_gains(planar=True)[1]
+    computed = angular_acceleration(body_rotation_from_readings(array, felt), _angular_velocities(states))[:, 1]
+    least_gain = array.noise_gains(with_plane_formula=True)[1]
     return root_mean_square(computed - true) / (NOISE * least_gain)
 
 
@@ -126,10 +126,12 @@ def loose_bracket_error(engine: str, folder: Path) -> float:
     acceleration, divided by its largest value."""
     felt, states, true = _readings_of_run(engine, ROOF_SENSORS, BRACKET_SENSORS)
     sensor_positions = ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}
-    loose = fit_quality(sensor_array(sensor_positions), felt).suspect
+    loose = fit_quality(sensor_array(sensor_positions), felt).suspect_sensor
     keep = [name != loose for name in sensor_positions]
     rigid_array = sensor_array({name: position for name, position in sensor_positions.items() if name != loose})
-    computed = angular_acceleration(spin_from_readings(rigid_array, felt[:, keep]), _angular_velocities(states))[:, 1]
+    computed = angular_acceleration(
+        body_rotation_from_readings(rigid_array, felt[:, keep]), _angular_velocities(states)
+    )[:, 1]
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
@@ -160,12 +162,12 @@ def missing_reading_naive(folder: Path) -> str:
     return f"a sum over one missing reading is lost for {100 * lost:.0f} % of the record"
 
 
-def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
+def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, BodyStartState]:
     """Accelerometer readings, states and initial state of a rotating vehicle in free fall with unstressed struts."""
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
     felt, states, _ = _readings_of_run(engine, ROOF_SENSORS, initial=start)
-    return felt, states, StartState.pitched(pitch, rate)
+    return felt, states, BodyStartState.pitched(pitch, rate)
 
 
 def vertical_nose_error(engine: str, folder: Path) -> float:

@@ -9,13 +9,13 @@ import numpy as np
 from models.core.result import Result
 from models.drift.growth import drift_off_time
 from models.drift.score import (
-    Limits,
+    AcceptanceLimits,
     RunErrors,
     RunFigures,
-    blind_verdict,
     errors_of_run,
     figures_of_run,
     verdict_on_run,
+    verdict_without_true_run,
 )
 from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
@@ -61,8 +61,8 @@ def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFig
 def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
     """Words of the verdicts on a run in an engine, with and without knowledge of the true run."""
     scores, wrong = figures_and_errors(simulate(scene, engine), truth, scene)
-    known = blind_verdict(scores, scene.effects, DURATION, Limits())
-    return verdict_on_run(scores, wrong, scene.effects, Limits()).word, known.word
+    known = verdict_without_true_run(scores, scene.effects, DURATION, AcceptanceLimits())
+    return verdict_on_run(scores, wrong, scene.effects, AcceptanceLimits()).word, known.word
 
 
 def tumbled_verdict_error(engine: str, folder: Path) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
 from models.vehicles.plausible_plane import plausible_plane
@@ -66,7 +66,8 @@ def error_texts(change: ForceChange) -> list[str]:
     """Texts of the doubts that the input check finds in changed wheel forces. Raises InputError if it finds an
     error."""
     front, rear = (
-        Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
+        MeasuredSignal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0)
+        for axle in ("front", "rear")
     )
     forces = np.ascontiguousarray(change(true_forces()))
     findings = check_axle_forces(AxleForces(forces, SAMPLE_PERIOD, TWIN, ((front,), (rear,)), DURATION, FILE_REMEDIES))

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.noise import FORCES, GYRO, ROAD, SAMPLES_PER_BLOCK, normal_samples
-from models.drift.growth import SERIES_LIMIT, pitch_variance
+from models.drift.growth import SERIES_ARGUMENT_LIMIT, pitch_variance
 from models.engines.protocol import build
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
@@ -21,10 +21,10 @@ from models.road.two_track import road_excitation, road_of_level, wheels_on_trac
 from models.sensors.inertial_unit import (
     angle_random_walk_of,
     error_rotation,
-    euler_mean_square,
-    euler_quaternions,
-    mean_trace,
+    mean_error_trace,
+    mean_square_norm_by_euler,
     measured_attitude,
+    quaternions_by_euler_steps,
 )
 from models.sensors.rotations import rotation_matrix
 from models.systems.ride.of_scene import linear_vehicle
@@ -146,17 +146,18 @@ def attitude_error(implementation: str, folder: Path) -> float:
     attitudes = measured_attitude(rates, 1.0 / SAMPLING_RATE, deviation, start, range(PATHS), seed=5)[-1]
     true = measured_attitude(rates, 1.0 / SAMPLING_RATE, np.zeros(3), start, range(1))[-1]
     traces = np.trace(rotation_matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
-    wanted = mean_trace(angle_random_walk_of(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
+    wanted = mean_error_trace(angle_random_walk_of(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
 def attitude_naive(folder: Path) -> str:
     """Result without the remedy, as text: norm of a quaternion that is integrated by explicit Euler."""
     turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
-    q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
+    q = quaternions_by_euler_steps(turns, np.array([1.0, 0.0, 0.0, 0.0]))
     return (
         f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
-        f"({euler_mean_square(WALK, 3, 1.0 / SAMPLING_RATE, SAMPLES):.3f} by its law): its matrix is no rotation"
+        f"({mean_square_norm_by_euler(WALK, 3, 1.0 / SAMPLING_RATE, SAMPLES):.3f} by its law): its matrix is no "
+        "rotation"
     )
 
 
@@ -164,7 +165,19 @@ def growth_law_error(implementation: str, folder: Path) -> float:
     """Case: the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series. Error:
     relative difference from values with 60 digits."""
     worst = 0.0
-    for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES_LIMIT, np.nextafter(SERIES_LIMIT, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
+    for x in (
+        1e-12,
+        1e-6,
+        1e-3,
+        0.0999,
+        SERIES_ARGUMENT_LIMIT,
+        np.nextafter(SERIES_ARGUMENT_LIMIT, 1.0),
+        0.1001,
+        0.5,
+        1.0,
+        10.0,
+        600.0,
+    ):
         variance = float(pitch_variance(2.0, x / 4.0, 0.7))
         worst = max(worst, abs(variance / _exact_law(Decimal(x)) - 1.0))
     return max(worst, abs(float(pitch_variance(2.0, 0.0, 0.7)) / (0.7 * 8.0 / 3.0) - 1.0))

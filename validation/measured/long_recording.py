@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from models.core.noise import normal_samples
-from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults
+from models.measured.columns import SampleFile
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.measured.section_run import AttitudeHold, SectionRunSettings, run
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
@@ -35,7 +35,7 @@ SEED = 81
 
 
 @cache
-def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
+def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[MeasuredSignal, ...], np.ndarray]:
     """Signals, and their samples without noise (n, 60): one repetition of the recording, with the transition to the
     next one."""
     car = r19()
@@ -48,7 +48,7 @@ def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndar
     )
     virtual = virtual_measurement(car, table, "mujoco")
     assert len(virtual.signals) == 60
-    return virtual.signals, virtual.samples(Faults(), 1)
+    return virtual.signals, virtual.samples(SimulatedFaults(), 1)
 
 
 def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.ndarray]:
@@ -71,7 +71,7 @@ def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) ->
     """The long recording as an object, without any measurement files. Its samples are stored at ``path`` and are
     created if they are missing."""
     signals, _ = repeated_pattern(pattern_seconds)
-    columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / SAMPLE_PERIOD) + 1)
+    columns = SampleFile(path, tuple(signal.name for signal in signals), round(seconds / SAMPLE_PERIOD) + 1)
     for values in sample_blocks(seconds, pattern_seconds) if columns.done == 0 else ():
         columns.write(columns.done, values)
     assert columns.done == columns.count

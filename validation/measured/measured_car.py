@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import MeasuredSignal, Quantity
 from models.sensors.rotations import rotation_matrix
 from models.systems.measured.scene import MeasuredScene, build
 from models.vehicles.cut_vehicle import CutVehicle
@@ -60,10 +60,10 @@ def samples(path: Path) -> np.ndarray:
 
 def phone_recording(values: np.ndarray, path: Path) -> Recording:
     """A recording object for samples (n, channels). They are written to ``path``."""
-    columns = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
+    columns = SampleFile(path, tuple(name for name, *_ in CHANNELS), len(values))
     columns.write(0, values)
     signals = tuple(
-        Signal(name, "", name, quantity, "body", component, "body", 1, "", 1.0)
+        MeasuredSignal(name, "", name, quantity, "body", component, "body", 1, "", 1.0)
         for name, quantity, component in CHANNELS
     )
     return Recording(signals, columns, car.SAMPLE_PERIOD)

@@ -11,7 +11,7 @@ from scipy.interpolate import make_interp_spline
 
 from models.core.finding import Finding
 from models.measured.checks import check
-from models.measured.faults_of_measurement import Faults
+from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.signal import HUB_COMPONENTS, TransducerPlace
 from models.systems.hub_forces.scene import TwoTrackRoadTable
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
@@ -167,7 +167,7 @@ def planted_findings(
     virtual: VirtualMeasurement, folder: Path, *spoil: Spoil | None, seed: int = SEED, **faults: Any
 ) -> tuple[Finding, ...]:
     """Errors and doubts that the checks find in a recording with transducer faults and changed samples."""
-    samples = virtual.samples(Faults(**faults | {"noise": NOISE | faults.get("noise", {})}), seed)
+    samples = virtual.samples(SimulatedFaults(**faults | {"noise": NOISE | faults.get("noise", {})}), seed)
     for change in spoil:
         if change is not None:
             change(virtual, samples)
@@ -177,7 +177,7 @@ def planted_findings(
 def drifting_findings(virtual: VirtualMeasurement, clock_error: float, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts that the checks find if all signals except the hub forces come from another file. Its clock is
     too fast by the fraction ``clock_error``."""
-    samples, driving = virtual.samples(Faults(noise=NOISE), SEED), ("force", "moment")
+    samples, driving = virtual.samples(SimulatedFaults(noise=NOISE), SEED), ("force", "moment")
     clock = virtual.period * np.arange(len(samples))
     for i in (i for i, s in enumerate(virtual.signals) if s.quantity not in driving):
         samples[:, i] = make_interp_spline(clock, samples[:, i])(np.minimum(clock / (1 + clock_error), clock[-1]))

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from models.advice.price.runner import MeasuredPoints, Point
+from models.advice.price.runner import WorkPrecisionPoint, WorkPrecisionPoints
 from models.drawing.figures import (
     BLUE,
     COLOURS,
@@ -59,7 +59,7 @@ LABEL_POSITIONS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y i
 """Allowed positions of a label's left middle, in fractions of the panel, clear of the bands and texts at its edges."""
 
 
-def draw(measured_points: MeasuredPoints) -> Figure:
+def draw(measured_points: WorkPrecisionPoints) -> Figure:
     """Figure of error over force calls and over time, side by side; failed settings are marked at the top of the first
     panel."""
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 7.6), sharey=True)
@@ -67,7 +67,7 @@ def draw(measured_points: MeasuredPoints) -> Figure:
     top = 8 * max(measured_points.error(p) for p in measured_points.points if p.status == "ok")
     rounds = max(len(p.seconds) for p in measured_points.points)
     several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
-    for ax, kind in zip(axes, measured_points.costs, strict=True):
+    for ax, kind in zip(axes, measured_points.cost_kinds, strict=True):
         _shade_floor(ax, measured_points)
         _plot_front(ax, measured_points, kind)
         for curve, points in measured_points.curves().items():
@@ -81,7 +81,7 @@ def draw(measured_points: MeasuredPoints) -> Figure:
     _mark_failures(axes[0], measured_points, top)
     axes[0].set_ylabel(f"error of the {measured_points.quantity} [{measured_points.unit}]")
     axes[0].set_ylim(0.3 * measured_points.uncertainty[measured_points.quantity], 15 * top)
-    for ax, kind in zip(axes, measured_points.costs, strict=True):
+    for ax, kind in zip(axes, measured_points.cost_kinds, strict=True):
         _mark_defaults(ax, measured_points, kind)
     curve_groups = "; ".join(curve_name(group[0], [group]) for group in measured_points.coinciding_curves())
     add_heading(figure, f"What accuracy costs: {measured_points.title}")
@@ -102,7 +102,7 @@ def draw(measured_points: MeasuredPoints) -> Figure:
     return figure
 
 
-def _curve_styles(measured_points: MeasuredPoints) -> dict[str, Style]:
+def _curve_styles(measured_points: WorkPrecisionPoints) -> dict[str, Style]:
     """Style of each curve: colour by engine, marker by method, line by declared order (solid from 4 up)."""
     styles: dict[str, Style] = {}
     for curve, (first, *_) in measured_points.curves().items():
@@ -114,7 +114,7 @@ def _curve_styles(measured_points: MeasuredPoints) -> dict[str, Style]:
     return styles
 
 
-def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
+def _engine_colour(point: WorkPrecisionPoint, measured_points: WorkPrecisionPoints) -> str:
     """Colour of the engine of a measured point; engines that are not in COLOURS get one of FAMILY_COLOURS."""
     engine = point.setting.engine
     other_engines = [
@@ -123,7 +123,9 @@ def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
     return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[other_engines.index(engine) % len(FAMILY_COLOURS)]
 
 
-def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], cost_kind: str, style: Style) -> None:
+def _plot_curve(
+    ax: Axes, measured_points: WorkPrecisionPoints, points: list[WorkPrecisionPoint], cost_kind: str, style: Style
+) -> None:
     """Plot one curve. Points with errors below the accuracy of the reference are hollow; points timed once are
     small."""
     point_positions = [(p.cost(cost_kind), measured_points.error(p)) for p in points]
@@ -142,7 +144,7 @@ def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], 
             ax.plot(*point_position, **BROKEN_STYLE)
 
 
-def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
+def _shade_floor(ax: Axes, measured_points: WorkPrecisionPoints) -> None:
     """Shade the range of errors below the accuracy of the reference solution."""
     known = measured_points.uncertainty[measured_points.quantity]
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.judging_floor(), 0.25)):
@@ -151,14 +153,14 @@ def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
     ax.text(0.015, 0.012, floor_text, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
 
 
-def _plot_front(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
+def _plot_front(ax: Axes, measured_points: WorkPrecisionPoints, cost_kind: str) -> None:
     """Plot the Pareto front of error and cost as a broad pale line behind the curves."""
-    front = measured_points.front(cost_kind)
+    front = measured_points.pareto_points(cost_kind)
     costs = [p.cost(cost_kind) for p in front]
     ax.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
 
 
-def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
+def _mark_defaults(ax: Axes, measured_points: WorkPrecisionPoints, cost_kind: str) -> None:
     """Mark each engine's default setting with a ring, and label it where the panel has most space."""
     taken_positions, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
@@ -215,7 +217,7 @@ def _emptiest_corner(taken_positions: np.ndarray, setting_position: np.ndarray, 
     return np.asarray(LABEL_POSITIONS[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
-def _mark_failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
+def _mark_failures(ax: Axes, measured_points: WorkPrecisionPoints, top: float) -> None:
     """Mark each failed setting with a cross at the number of force calls that it would have needed, and list the
     failures."""
     failed = [p for p in measured_points.points if p.status != "ok"]
@@ -231,9 +233,9 @@ def _mark_failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> Non
         ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
-def _expected_calls(failed_point: Point, measured_points: MeasuredPoints) -> float:
+def _expected_calls(failed_point: WorkPrecisionPoint, measured_points: WorkPrecisionPoints) -> float:
     """Number of force calls that a failed setting made, or would need by extrapolation from its curve; 0 if unknown."""
-    work = measured_points.costs[0]
+    work = measured_points.cost_kinds[0]
     if failed_point.counts:
         return failed_point.cost(work)
     first = next(iter(measured_points.curves().get(failed_point.setting.curve, ())), None)
@@ -244,7 +246,7 @@ def _expected_calls(failed_point: Point, measured_points: MeasuredPoints) -> flo
     )
 
 
-def _methods_text(failed: list[Point], status: str) -> str:
+def _methods_text(failed: list[WorkPrecisionPoint], status: str) -> str:
     """Text for the figure that names the methods whose settings failed with a status."""
     failed_alike = [p for p in failed if p.status == status]
     if status == "flagged":
@@ -260,7 +262,7 @@ def _methods_text(failed: list[Point], status: str) -> str:
     return ", ".join(parts)
 
 
-def _legend_handles(measured_points: MeasuredPoints, styles: dict[str, Style]) -> list[Line2D]:
+def _legend_handles(measured_points: WorkPrecisionPoints, styles: dict[str, Style]) -> list[Line2D]:
     """Handles of the legend: the curves, then the Pareto front and the marks of failed settings."""
     names = sorted(styles, key=curve_name)
     handles = [Line2D([], [], **styles[curve], label=curve_name(curve)) for curve in names]

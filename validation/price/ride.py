@@ -263,7 +263,7 @@ def draw(case_data: dict[str, Any]) -> tuple[str, Figure]:
         ax.set(xscale="log", yscale="log", xlabel="time [ms] (median)", title=kind)
         ax.set_ylim(1e-16, 1.0)
     axes[0].set_ylabel("largest relative error\nof a standard deviation [-]")
-    legend_below(figure, axes[0], columns=2)
+    legend_below(figure, axes[0], column_count=2)
     add_heading(figure, f"What accuracy costs in ride: R19-ride at {SPEED:g} m/s, rear axle delayed")
     caption = "Standard deviations by every route against quadrature with the delay exact (grey: its own error)."
     return caption, figure

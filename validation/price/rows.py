@@ -1,8 +1,8 @@
 """Rows of the report that judge every work-precision problem."""
 
 from models.advice.price.curves import ToleranceCost
-from models.advice.price.problem import Problem, Setting
-from models.advice.price.runner import MeasuredPoints, Point, attempt, cheapest_curve
+from models.advice.price.problem import Setting, WorkPrecisionProblem
+from models.advice.price.runner import WorkPrecisionPoint, WorkPrecisionPoints, attempt, cheapest_curve
 from validation.common.rows import Observed, Row, System
 from validation.price.tables import curve_name
 
@@ -18,7 +18,7 @@ INTERPOLATION_FACTOR = 1.25
 """Allowed error of an interpolated cheapest setting divided by the tolerance: curves bend between two settings."""
 
 
-def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> list[Row]:
+def rows_of(problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints, quick: bool) -> list[Row]:
     """All rows of one work-precision problem; the row on the number of tried settings is part of the full report
     only."""
     points, repeated = measured_points.points, [p for p in measured_points.points if p.changed is not None]
@@ -50,7 +50,7 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
     ]
 
 
-def _setting_text(p: Point) -> str:
+def _setting_text(p: WorkPrecisionPoint) -> str:
     return f"{p.setting.curve} {p.setting.label()}"
 
 
@@ -62,7 +62,7 @@ def _offenders_row(name: str, offence_text: str, offending_settings: list[str], 
     )
 
 
-def _reference_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
+def _reference_row(problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints) -> Row:
     """Row: uncertainty of the reference solution, compared with a share of the finest tolerance."""
     quantity, share = measured_points.quantity, getattr(problem, "uncertain_share", REFERENCE_SHARE)
     return Observed(
@@ -79,7 +79,7 @@ def _reference_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
     )
 
 
-def _order_rows(measured_points: MeasuredPoints) -> list[Row]:
+def _order_rows(measured_points: WorkPrecisionPoints) -> list[Row]:
     """Rows: observed order of every fixed-step method with a declared order, for each quantity."""
     settings = {p.setting.curve: p.setting for p in measured_points.points}
     return [
@@ -102,12 +102,12 @@ def _order_rows(measured_points: MeasuredPoints) -> list[Row]:
     ]
 
 
-def _cheapest_settings_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
+def _cheapest_settings_row(problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints) -> Row:
     """Row: largest ratio of error to tolerance of the settings in the table of cheapest settings, which are run for
     it."""
     worst = 0.0
     for target in problem.tolerances:
-        best = cheapest_curve(measured_points.reaches(target, measured_points.costs[0]))
+        best = cheapest_curve(measured_points.costs_at_tolerance(target, measured_points.cost_kinds[0]))
         if best is not None:
             point = attempt(problem, _runnable_setting(problem, measured_points, *best))
             worst = max(worst, point.errors.get(measured_points.quantity, float("inf")) / target)
@@ -126,7 +126,7 @@ def _cheapest_settings_row(problem: Problem, measured_points: MeasuredPoints) ->
 
 
 def _runnable_setting(
-    problem: Problem, measured_points: MeasuredPoints, curve: str, cheapest: ToleranceCost
+    problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints, curve: str, cheapest: ToleranceCost
 ) -> Setting:
     """The setting of a curve that the table of cheapest settings names; a fixed step is changed to the nearest one that
     divides the run."""
@@ -135,7 +135,7 @@ def _runnable_setting(
     return problem.setting(like.engine, like.method, value)
 
 
-def _sweep_row(measured_points: MeasuredPoints) -> Row:
+def _sweep_row(measured_points: WorkPrecisionPoints) -> Row:
     """Row: methods that were tried with too few settings. At least six are required; from order 4 up they must span
     four decades of the setting or the error, unless the curve ends at a failure or at its smallest error."""
     tried, short = measured_points.curves(None), []
@@ -155,7 +155,7 @@ def _sweep_row(measured_points: MeasuredPoints) -> Row:
     return _offenders_row(f"price.{measured_points.key}.sweep", requirement, short, "what the study was asked to cover")
 
 
-def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
+def _loss_rows(measured_points: WorkPrecisionPoints) -> list[Row]:
     """Rows: cost of each engine's default method divided by the cost of the cheapest setting, at the middle
     tolerance."""
     return [
@@ -163,24 +163,26 @@ def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
         for owner, p in measured_points.defaults.items()
         if p.status == "ok"
         for engine_filter, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
-        for kind in measured_points.costs
+        for kind in measured_points.cost_kinds
         for row in _rows_of_loss(measured_points, owner, engine_filter, words, kind)
     ]
 
 
 def _rows_of_loss(
-    measured_points: MeasuredPoints, owner_of_default: str, engine: str, loss_words: str, cost_kind: str
+    measured_points: WorkPrecisionPoints, owner_of_default: str, engine: str, loss_words: str, cost_kind: str
 ) -> list[Row]:
-    target, unit, p = measured_points.middle, measured_points.unit, measured_points.defaults[owner_of_default]
-    lost = measured_points.loss(target, cost_kind, p.setting.curve, engine)
+    target, unit, p = measured_points.middle_tolerance, measured_points.unit, measured_points.defaults[owner_of_default]
+    lost = measured_points.loss_by_default(target, cost_kind, p.setting.curve, engine)
     if lost is None:
         return []
-    extrapolation_text = ", extrapolated by its order" if lost.how == "extrapolated" else ""
+    extrapolation_text = ", extrapolated by its order" if lost.origin == "extrapolated" else ""
     shared = [default.setting.engine for default in measured_points.defaults.values()].count(p.setting.engine) > 1
     whose = f"{p.setting.engine}.{owner_of_default}" if shared else p.setting.engine
     name = f"price.{measured_points.key}.default.{whose}.{'own' if engine else 'all'}.{cost_kind}".replace(" ", "-")
     interval_text = (
-        f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
+        f"95 % interval {lost.lower_limit:.3g} to {lost.upper_limit:.3g}"
+        if lost.lower_limit <= lost.upper_limit
+        else "too few rounds to tell"
     )
     bounds = interval_text if cost_kind == "seconds" else "exact"
     quantity = (
@@ -188,4 +190,4 @@ def _rows_of_loss(
         f"{unit}{extrapolation_text}, to {loss_words}"
     )
     why = f"at its default {p.setting.label()} its error is {measured_points.error(p):.3g} {unit}"
-    return [Observed(name, SYSTEM, quantity, lost.factor, "times").beside(bounds, why, "none")]
+    return [Observed(name, SYSTEM, quantity, lost.cost_ratio, "times").beside(bounds, why, "none")]

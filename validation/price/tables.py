@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from models.advice.price import runner
-from models.advice.price.curves import UNCERTAINTY_FACTOR, ToleranceCost
-from models.advice.price.runner import CostsAtTolerance, Loss, MeasuredPoints, Point
+from models.advice.price.curves import RESOLVED_ERROR_FACTOR, ToleranceCost
+from models.advice.price.runner import CostsAtTolerance, LossByDefault, WorkPrecisionPoint, WorkPrecisionPoints
 from models.drawing.figures import LABELS
 from models.machine.timing import describe
 from validation.common.rows import Table
@@ -16,7 +16,7 @@ from validation.common.rows import Table
 STATUS_WORDS = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
 
 
-def tables(measured_points: MeasuredPoints) -> list[Table]:
+def tables(measured_points: WorkPrecisionPoints) -> list[Table]:
     """All tables of one work-precision problem, from its measured points."""
     return [make(measured_points) for make in (cheapest_table, loss_table, curve_table, outcome_table, failure_table)]
 
@@ -32,15 +32,15 @@ def _plain_name(curve: str) -> str:
     return f"{LABELS[engine]} {method}"
 
 
-def cheapest_table(measured_points: MeasuredPoints) -> Table:
+def cheapest_table(measured_points: WorkPrecisionPoints) -> Table:
     """Table of the cheapest settings for each tolerance."""
-    work, groups = measured_points.costs[0], measured_points.coinciding_curves()
+    work, groups = measured_points.cost_kinds[0], measured_points.coinciding_curves()
     rivals = [
         engine for engine in runner.COMPARED_ENGINES if any(p.setting.engine == engine for p in measured_points.points)
     ]
     rows = []
     for target in measured_points.tolerances:
-        calls, seconds = (measured_points.reaches(target, kind) for kind in measured_points.costs)
+        calls, seconds = (measured_points.costs_at_tolerance(target, kind) for kind in measured_points.cost_kinds)
         timed = (_text_of_winner(measured_points, seconds, engine_filter, "ms") for engine_filter in ("", *rivals))
         rows.append((f"{target:g}", _text_of_winner(measured_points, calls, "", work.split()[-1], groups), *timed))
     note = (
@@ -58,7 +58,7 @@ def cheapest_table(measured_points: MeasuredPoints) -> Table:
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
-def rounds_sentence(points: list[Point]) -> str:
+def rounds_sentence(points: list[WorkPrecisionPoint]) -> str:
     """Sentence on how many settings were timed in how many rounds, and how much the times scatter."""
     answered = [p for p in points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]
@@ -72,15 +72,15 @@ def rounds_sentence(points: list[Point]) -> str:
     return (
         f"Seconds are medians of {rounds_text} settings whose seconds decide something (fewer where a run is "
         "longer than "
-        f"{1e3 * runner.SLOW_RUN_SECONDS:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
+        f"{1e3 * runner.SLOW_RUN_DURATION:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
         f"{len(answered) - len(in_rounds)} that "
-        f"are far from the cheapest, or longer than {1e3 * runner.LONG_RUN_SECONDS:g} ms and not for the middle "
+        f"are far from the cheapest, or longer than {1e3 * runner.LONG_RUN_DURATION:g} ms and not for the middle "
         "tolerance."
     )
 
 
 def _text_of_winner(
-    measured_points: MeasuredPoints,
+    measured_points: WorkPrecisionPoints,
     costs_at_tolerance: CostsAtTolerance,
     engine: str,
     unit: str,
@@ -96,10 +96,10 @@ def _text_of_winner(
 
 
 def _coarsest_text(cheapest_reach: ToleranceCost) -> str:
-    return " (coarsest)" if cheapest_reach.how == "coarsest" else ""
+    return " (coarsest)" if cheapest_reach.origin == "coarsest" else ""
 
 
-def loss_table(measured_points: MeasuredPoints) -> Table:
+def loss_table(measured_points: WorkPrecisionPoints) -> Table:
     """Table of the cost of each engine's default method divided by the cost of the cheapest setting with the same
     error."""
     owners = measured_points.defaults
@@ -107,10 +107,10 @@ def loss_table(measured_points: MeasuredPoints) -> Table:
         (
             f"{target:g}",
             *(
-                _text_of_loss(measured_points.loss(target, kind, usual.setting.curve, engine_filter))
+                _text_of_loss(measured_points.loss_by_default(target, kind, usual.setting.curve, engine_filter))
                 for usual in owners.values()
                 for engine_filter in (usual.setting.engine, "")
-                for kind in measured_points.costs
+                for kind in measured_points.cost_kinds
             ),
         )
         for target in measured_points.tolerances
@@ -119,7 +119,7 @@ def loss_table(measured_points: MeasuredPoints) -> Table:
         f"{owner} by best of {engine_filter}: {kind}"
         for owner in owners
         for engine_filter in (owner, "all")
-        for kind in measured_points.costs
+        for kind in measured_points.cost_kinds
     )
     as_is = "; ".join(
         f"{owner}: {usual.setting.method} at {usual.setting.label()}, which by itself "
@@ -134,30 +134,37 @@ def loss_table(measured_points: MeasuredPoints) -> Table:
         "The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
         f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
         "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
-        f"{runner.FEWEST_ROUNDS}."
+        f"{runner.FEWEST_TIMING_ROUNDS}."
     )
     return Table(
         "Factor that a default setting loses", note, (f"{measured_points.quantity} error at most", *heads), rows
     )
 
 
-def _text_of_loss(loss: Loss | None) -> str:
+def _text_of_loss(loss: LossByDefault | None) -> str:
     if loss is None:
         return "-"
-    factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.factor, loss.low, loss.high))
-    mark = "*" if loss.how == "extrapolated" else ""
-    interval_text = f" [{low}, {high}]" if loss.low < loss.high else ""  # none of a count, or after too few rounds
+    factor, low, high = (
+        f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.cost_ratio, loss.lower_limit, loss.upper_limit)
+    )
+    mark = "*" if loss.origin == "extrapolated" else ""
+    interval_text = (
+        (f" [{low}, {high}]") if loss.lower_limit < loss.upper_limit else ""
+    )  # none of a count, or after too few rounds
     return f"{factor}{mark}{interval_text}"
 
 
-def curve_table(measured_points: MeasuredPoints) -> Table:
+def curve_table(measured_points: WorkPrecisionPoints) -> Table:
     """Table with a row per curve: settings, errors, observed order, and cost at the middle tolerance."""
     groups, orders, work = (
         measured_points.coinciding_curves(),
         measured_points.observed_orders(measured_points.quantity),
-        measured_points.costs[0],
+        measured_points.cost_kinds[0],
     )
-    calls, seconds = (measured_points.reaches(measured_points.middle, kind) for kind in measured_points.costs)
+    calls, seconds = (
+        measured_points.costs_at_tolerance(measured_points.middle_tolerance, kind)
+        for kind in measured_points.cost_kinds
+    )
     rows = tuple(
         (
             _plain_name(curve),
@@ -174,7 +181,7 @@ def curve_table(measured_points: MeasuredPoints) -> Table:
     )
     note = (
         "Order: slope of the error over the step on the three finest settings whose error exceeds "
-        f"{UNCERTAINTY_FACTOR:g} "
+        f"{RESOLVED_ERROR_FACTOR:g} "
         "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
         "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
         "setting. ~: seconds of one run."
@@ -186,14 +193,14 @@ def curve_table(measured_points: MeasuredPoints) -> Table:
         f"{measured_points.quantity} error [{measured_points.unit}]",
         "observed order",
         "declared",
-        f"{work} for {measured_points.middle:g} {measured_points.unit}",
-        f"ms for {measured_points.middle:g} {measured_points.unit}",
+        f"{work} for {measured_points.middle_tolerance:g} {measured_points.unit}",
+        f"ms for {measured_points.middle_tolerance:g} {measured_points.unit}",
         "coincides with",
     )
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
-def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | None) -> str:
+def _mark_of_single_runs(points: list[WorkPrecisionPoint], cheapest_reach: ToleranceCost | None) -> str:
     """Text "~" if an interpolated cost depends on a setting that was timed only once, else ""."""
     return (
         "~"
@@ -211,7 +218,7 @@ def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, number_f
     )
 
 
-def outcome_table(measured_points: MeasuredPoints) -> Table:
+def outcome_table(measured_points: WorkPrecisionPoints) -> Table:
     """Table of the number of settings of each engine by status."""
     ended = Counter((p.setting.engine, status) for p in measured_points.points for status in ("", p.status))
     engines = dict.fromkeys(p.setting.engine for p in measured_points.points)
@@ -226,7 +233,7 @@ def outcome_table(measured_points: MeasuredPoints) -> Table:
     return Table("Settings by how they ended", note, ("engine", "settings", *STATUS_WORDS.values()), rows)
 
 
-def failure_table(measured_points: MeasuredPoints) -> Table:
+def failure_table(measured_points: WorkPrecisionPoints) -> Table:
     """Table of the settings without a reliable result, with their messages."""
     labels_of = defaultdict(list)
     for p in measured_points.points:

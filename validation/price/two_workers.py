@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.workers import dask_workers, process_pool
 from models.machine.timing import interleave, median, paired_ratio
 from models.systems.pitch_plane.noise_paths import noise_paths
@@ -32,7 +32,7 @@ from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import force_scene, road_scene
 
 TIMING_ROUNDS = 9
-PATHS_PER_RUN, BLOCKS_OF_RUN = 400, Blocks(25)
+PATHS_PER_RUN, BLOCKS_OF_RUN = 400, PathBlocks(25)
 """Number of paths of a timed run, and their blocks: about 3 s by two workers, and 8 blocks each."""
 SENT_COUNTS = (1_000, 50_000, 500_000)
 """Numbers of values that a block sends back, for which its cost is measured."""
@@ -80,9 +80,9 @@ def cost_of_blocks(executor: Executor) -> dict[int, float]:
     """Processor time (s) of this process per block, for each number of values that a block sends back."""
     costs = {}
     for numbers in SENT_COUNTS:
-        run_paths(Sender(numbers), 4, executor=executor, blocks=Blocks(1))
+        run_paths(Sender(numbers), 4, executor=executor, path_blocks=PathBlocks(1))
         start_time = time.process_time()
-        run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, blocks=Blocks(1))
+        run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, path_blocks=PathBlocks(1))
         costs[numbers] = (time.process_time() - start_time) / EMPTY_BLOCKS
     return costs
 
@@ -109,7 +109,7 @@ def measured_pools(round_count: int = TIMING_ROUNDS, job: Any = None) -> dict[st
         single_pools: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
         turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, single_pools, job)]
         turns += [
-            partial(run_paths, job, PATHS_PER_RUN, executor=pool, blocks=BLOCKS_OF_RUN) for pool in pools.values()
+            partial(run_paths, job, PATHS_PER_RUN, executor=pool, path_blocks=BLOCKS_OF_RUN) for pool in pools.values()
         ]
         seconds = interleave(turns, round_count)
         return {

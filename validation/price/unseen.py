@@ -18,7 +18,7 @@ from models.advice.price import PricedRun
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import (
     SHORTEST_TURN,
-    SLOWER_RATIO,
+    SLOWER_SECONDS_RATIO,
     Recommendation,
     SettingChoice,
     priced_scene,
@@ -26,7 +26,7 @@ from models.advice.price.recommendation import (
 )
 from models.advice.price.search import TriedSetting
 from models.advice.price.systems.pitch_plane import PricedPitchPlane
-from models.advice.price.truth import ReferenceTruth
+from models.advice.price.truth import ReferenceSolution
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
 from models.machine.timing import interleave, paired_ratio
@@ -238,22 +238,24 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     """Largest error of each setting over the complete run, against DOP853. All settings are compared at common times
     if their steps allow it."""
     runs = {setting: scene.priced_run(scene.solve(setting, scene.full_duration)) for setting in settings}
-    parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
+    parts = {setting: 1 if setting.adaptive else round(scene.base_step / setting.value) for setting in runs}
     common = _fine_multiple(scene, math.lcm(*parts.values()))
-    if scene.base / common < FINE_SPACING:
+    if scene.base_step / common < FINE_SPACING:
         parts = {setting: _fine_multiple(scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
     exact = {
-        n: ReferenceTruth(_accurate_solution(scene, scene.base / n), 0.0, "", 0, scene.kink_period)
+        n: ReferenceSolution(_accurate_solution(scene, scene.base_step / n), 0.0, "", 0, scene.kink_period)
         for n in set(parts.values())
     }
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
 def _fine_multiple(scene: PricedPitchPlane, part_count: int) -> int:
-    """Least multiple of ``part_count`` that divides ``scene.base`` (s) into parts of COARSE_SPACING (s) at most."""
-    return part_count * math.ceil(scene.base / part_count / COARSE_SPACING * (1 - 1e-9))
+    """Least multiple of ``part_count`` that divides ``scene.base_step`` (s) into parts of COARSE_SPACING (s) at
+    most.
+    """
+    return part_count * math.ceil(scene.base_step / part_count / COARSE_SPACING * (1 - 1e-9))
 
 
 def _accurate_solution(scene: PricedPitchPlane, spacing: float) -> PricedRun:
@@ -294,6 +296,6 @@ def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, r
         for attempt in (choice.tried, rival_setting)
     ]
     return all(
-        paired_ratio(*interleave(jobs, rounds, SHORTEST_TURN, clock=time.process_time))[1] > SLOWER_RATIO
+        paired_ratio(*interleave(jobs, rounds, SHORTEST_TURN, clock=time.process_time))[1] > SLOWER_SECONDS_RATIO
         for rounds in TIMING_ROUNDS
     )

@@ -14,7 +14,7 @@ from models.advice.price import PricedRun
 from models.advice.price.meshed import MeshedScene
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation
-from models.advice.price.truth import ReferenceTruth
+from models.advice.price.truth import ReferenceSolution
 from models.core.systems import SYSTEMS
 from validation.price.unseen import DrawnScene, Random, Verdict, verdicts_on_scene
 
@@ -110,7 +110,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
     """Largest error of each setting over the complete run, against a solution that is computed differently from the
     recommendation's reference."""
     scene: Any = recommendation.scene
-    ladder = scene.reference()
+    ladder = scene.reference_ladder()
     finer = Setting(
         ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / TRUTH_STEPS_RATIO, ladder.order
     )
@@ -121,7 +121,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
             if isinstance(scene, MeshedScene)
             else scene.priced_run(scene.solve(finer, scene.full_duration))
         )
-        return ReferenceTruth(exact, 0.0, "", 0).error(scene.priced_run(scene.solve(setting, scene.full_duration)))
+        return ReferenceSolution(exact, 0.0, "", 0).error(scene.priced_run(scene.solve(setting, scene.full_duration)))
 
     return {setting: error(setting) for setting in settings}
 
@@ -129,4 +129,4 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
 def _accurate_solution(scene: MeshedScene, setting: Setting) -> PricedRun:
     cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
-    return scene.priced_run((cells, scene.exact(cells, step, scene.full_duration)))
+    return scene.priced_run((cells, scene.exact_run(cells, step, scene.full_duration)))

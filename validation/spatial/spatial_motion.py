@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.sensors.rigid_body_motion import StartState
+from models.sensors.rigid_body_motion import BodyStartState
 from models.sensors.rotations import quaternion_from_cardan, rotation_matrix, skew_matrix
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -21,7 +21,7 @@ class RigidBodyMotion:
     orientation: np.ndarray
     acceleration: np.ndarray
     position: np.ndarray
-    start: StartState
+    start: BodyStartState
     period: float
 
 
@@ -54,7 +54,7 @@ def rigid_body_motion(sample_count: int = 2001, sample_period: float = 1e-3) -> 
     orientation = quaternion_from_cardan(roll, pitch, yaw)
     positions, velocities, accelerations = _sine_waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
     rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, positions))
-    return RigidBodyMotion(alpha, rates, orientation, accelerations, positions, StartState(*rows), sample_period)
+    return RigidBodyMotion(alpha, rates, orientation, accelerations, positions, BodyStartState(*rows), sample_period)
 
 
 def _sine_waves(t: np.ndarray, wave_shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

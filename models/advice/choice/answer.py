@@ -8,7 +8,7 @@ from scipy.special import stdtrit
 
 from models.core.errors import InputError
 
-Cases = tuple[np.ndarray, ...]
+CaseValues = tuple[np.ndarray, ...]
 """One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its time history (n,), or a single
 number (1,).
 """
@@ -18,7 +18,7 @@ ROUNDING_SHARE, ABSOLUTE_ROUNDING = 1e-10, 1e-15
 """Rounding limits: a share of the largest value in the same unit, and a value in SI units. Smaller changes are only
 rounding.
 """
-SCALAR_OF_PATH = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
+SCALAR_OF_TIME_HISTORY = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
 """Functions that make one number of a time history, by the word that asks for them, as in "rms f1"."""
 
 
@@ -30,13 +30,13 @@ class Quantity:
     """
 
     unit: str
-    cases: Cases
+    cases: CaseValues
     sampled: bool = False
 
     @property
-    def sizes(self) -> np.ndarray:
+    def reference_sizes(self) -> np.ndarray:
         """Reference sizes of the quantity, one for each case; changes are divided by them."""
-        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else scale_of_cases(self.cases)
+        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else reference_sizes_of_cases(self.cases)
 
 
 @dataclass(frozen=True)
@@ -50,27 +50,27 @@ class RunQuantities:
     counts: dict[str, int]
     seconds: float = field(compare=False)
 
-    def quantity(self, name: str, file: str = "") -> Quantity:
+    def quantity(self, quantity_name: str, scene_path: str = "") -> Quantity:
         """A quantity by its name, or the "rms" or "max" of one; InputError for an unknown name."""
-        if name in self.quantities:
-            return self.quantities[name]
-        word, _, base_name = name.partition(" ")
+        if quantity_name in self.quantities:
+            return self.quantities[quantity_name]
+        word, _, base_name = quantity_name.partition(" ")
         path = self.quantities.get(base_name)
-        if word in SCALAR_OF_PATH and path is not None and not path.sampled:
-            return Quantity(path.unit, tuple(np.array([SCALAR_OF_PATH[word](case)]) for case in path.cases))
+        if word in SCALAR_OF_TIME_HISTORY and path is not None and not path.sampled:
+            return Quantity(path.unit, tuple(np.array([SCALAR_OF_TIME_HISTORY[word](case)]) for case in path.cases))
         allowed = (
             "no such quantity in this scene, whose own are, each also with 'rms' or 'max' before it if it is a path"
         )
-        raise InputError(file, "quantities", name, allowed, tuple(self.quantities))
+        raise InputError(scene_path, "quantities", quantity_name, allowed, tuple(self.quantities))
 
 
-def scale_of_cases(full_results: Sequence[np.ndarray]) -> np.ndarray:
+def reference_sizes_of_cases(case_values: Sequence[np.ndarray]) -> np.ndarray:
     """Reference sizes by which changes are divided, one for each case: the standard deviation of a time history, the
     magnitude of a single number.
 
     A case that hardly moves compared with the others has at least the size SMALLEST_CASE_SHARE times the largest one.
     """
-    amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full_results])
+    amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in case_values])
     return np.maximum(amounts, SMALLEST_CASE_SHARE * amounts.max(initial=0.0))
 
 
@@ -91,7 +91,7 @@ in 0.15 % of the cases.
 """
 
 
-def sampled_change_and_error(differences: Cases, full_results: Cases) -> tuple[float, float]:
+def sampled_change_and_error(differences: CaseValues, full_scene_values: CaseValues) -> tuple[float, float]:
     """Largest relative change among the cases of a quantity that is a root mean square of samples, and the statistical
     error of this change.
 
@@ -99,7 +99,7 @@ def sampled_change_and_error(differences: Cases, full_results: Cases) -> tuple[f
     from it, times Student's t for m - 1.
     """
     worst = 0.0, 0.0
-    for difference, unmoved in zip(differences, full_results, strict=True):
+    for difference, unmoved in zip(differences, full_scene_values, strict=True):
         ratio = 1.0 + difference.mean() / unmoved.mean()
         if not ratio > 0.0:  # nothing is left, or no mean square at all
             return (1.0, 0.0) if not (difference + unmoved).any() else (np.inf, np.inf)
@@ -114,12 +114,14 @@ def sampled_change_and_error(differences: Cases, full_results: Cases) -> tuple[f
     return worst
 
 
-def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
+def difference_of_runs(changed_run_values: CaseValues, full_scene_values: CaseValues) -> CaseValues:
     """Differences of two runs, case by case, at the output times of the run with longer steps.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
-    for shorter_run, longer_run in (sorted(map(len, pair)) for pair in zip(run, full_results, strict=True)):
+    for shorter_run, longer_run in (
+        sorted(map(len, pair)) for pair in zip(changed_run_values, full_scene_values, strict=True)
+    ):
         if shorter_run != longer_run and (shorter_run < 2 or (longer_run - 1) % (shorter_run - 1)):
             raise InputError(
                 "",
@@ -128,27 +130,31 @@ def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
                 "paths of runs that end by themselves cannot be compared: ask for "
                 "'rms' or 'max' of them, or for another number",
             )
-    return tuple(np.subtract(*_at_common_times(*pair)) for pair in zip(run, full_results, strict=True))
+    return tuple(
+        np.subtract(*_at_common_times(*pair)) for pair in zip(changed_run_values, full_scene_values, strict=True)
+    )
 
 
-def _at_common_times(*paths: np.ndarray) -> list[np.ndarray]:
+def _at_common_times(*time_histories: np.ndarray) -> list[np.ndarray]:
     """Time histories thinned to the output times that all of them have."""
-    row_count = min(map(len, paths))
-    return [path[:: (len(path) - 1) // max(row_count - 1, 1) or 1] for path in paths]
+    row_count = min(map(len, time_histories))
+    return [path[:: (len(path) - 1) // max(row_count - 1, 1) or 1] for path in time_histories]
 
 
-def sum_of_differences(*changes: Cases) -> Cases:
+def sum_of_differences(*differences: CaseValues) -> CaseValues:
     """Sum of several differences of runs, case by case, at the output times that all of them have."""
-    return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*changes, strict=True))
+    return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*differences, strict=True))
 
 
-def largest_relative_change(differences: Cases, full_size: np.ndarray) -> float:
+def largest_relative_change(differences: CaseValues, reference_sizes: np.ndarray) -> float:
     """Largest relative change among the cases: the rms difference of a time history, or the difference of a single
     number, divided by the case's reference size.
     """
     largest_differences = np.array([float(np.sqrt(np.mean(difference**2))) for difference in differences])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(
-            full_size > 0.0, largest_differences / full_size, np.where(largest_differences > 0.0, np.inf, 0.0)
+            reference_sizes > 0.0,
+            largest_differences / reference_sizes,
+            np.where(largest_differences > 0.0, np.inf, 0.0),
         )
     return float(share.max()) if np.isfinite(largest_differences).all() else np.inf

@@ -24,35 +24,37 @@ from typing import Any
 import numpy as np
 
 from models.advice.choice.answer import sum_of_differences
-from models.advice.choice.screen import Screen
+from models.advice.choice.screen import EffectScreen
 from models.advice.choice.variants import EffectSet, Variants
 from models.core.assumptions import BrokenAssumption
 from models.core.errors import InputError
 
-PREDICTION_SHARE = 0.8
+TOLERANCE_SHARE_OF_PREDICTION = 0.8
 """Share of the tolerance that the predicted change may use."""
-SCREENED_STEP_SHARE = 0.05
+TOLERANCE_SHARE_OF_SCREENING_STEP = 0.05
 """Share of the tolerance that the longer steps of screening runs may cost."""
-SAMPLED_STEP_SHARE = 0.15
-"""Share as SCREENED_STEP_SHARE for samples that met the same roads: both compared runs have the step error."""
+TOLERANCE_SHARE_OF_SAMPLED_STEP = 0.15
+"""Share as TOLERANCE_SHARE_OF_SCREENING_STEP for samples that met the same roads: both compared runs have the step
+error.
+"""
 STEP_CHECK_REFINEMENT = 8
 """Factor by which steps are refined to find the error of the longest ones."""
-STEP_SEARCH_SHARE = 0.25
+RUN_SHARE_FOR_STEP_SEARCH = 0.25
 """Share of a run over which the longest steps of screening runs are searched."""
-NEGLIGIBLE_SHARE = 1e-3
+NEGLIGIBLE_TOLERANCE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
-STEP_REDUCTION = 2
+STEP_REDUCTION_LIMIT = 2
 """Number of times that steps become shorter after a failed confirmation, before effects are put back."""
-MOST_CONFIRMATIONS = 30
+CONFIRMATION_LIMIT = 30
 """Largest number of sets of effects that are confirmed by runs of the whole scene."""
-PAIRS_IN_ADVANCE = 16
+PAIRS_COMPUTED_IN_ADVANCE = 16
 """Number of pairs of effects whose runs the executor computes in advance at once."""
-RUN_BUDGET = 100
+SEARCH_BUDGET_IN_RUNS = 100
 """Largest cost of the search in right-hand side calls, as a multiple of one run of the whole scene."""
 
 
 @dataclass(frozen=True)
-class Choice:
+class EffectChoice:
     """Result of a choice of effects: the effects ``left_out`` of all ``candidates``, the factor ``step_factor`` by
     which the step is longer, and relative changes (quantities,).
 
@@ -83,13 +85,13 @@ class Choice:
     assumptions_barring: dict[str, list[BrokenAssumption]] = field(default_factory=dict)
 
 
-class Chooser:
+class EffectChooser:
     """Search for the effects that a scene can do without, for given quantities (see ``models.advice.choice.answer``), a
     tolerance and one implementation.
 
-    progress(share) : called with the share that is spent of the runs that the search may make. executor : computes the
-    runs without one or two effects that the screen will need; runs that confirm, and timed runs, are made by this
-    process.
+    report_progress(share) : called with the share that is spent of the runs that the search may make. executor :
+    computes the runs without one or two effects that the screen will need; runs that confirm, and timed runs, are made
+    by this process.
     """
 
     def __init__(
@@ -98,11 +100,11 @@ class Chooser:
         engine: str,
         quantities: list[str],
         tolerance: float,
-        progress: Callable[[float], None] = lambda share: None,
+        report_progress: Callable[[float], None] = lambda share: None,
         executor: Executor | None = None,
     ) -> None:
-        self.tolerance, self.progress = tolerance, progress
-        self.whole = Screen(Variants(scene, engine, executor), quantities)
+        self.tolerance, self.report_progress = tolerance, report_progress
+        self.whole = EffectScreen(Variants(scene, engine, executor), quantities)
         self.all_sampled = self.whole.sampled == set(quantities)
         partial_screen = self._partial_screen()
         self.step_factor, self.error = self._longest_screen_step(partial_screen)
@@ -115,34 +117,36 @@ class Chooser:
         self._pairs: list[EffectSet] | None = None
         self.rounds, self._sample_factors, self.ended = 0, list[float](), False
 
-    def _partial_screen(self) -> Screen:
+    def _partial_screen(self) -> EffectScreen:
         """Screen over a part of the run or over a few of its samples; over all of it if it cannot be cut."""
         all_variants = self.whole.variants
-        if not all_variants.system.WINDOWED:
+        if not all_variants.system.PART_REPRESENTS_RUN:
             return self.whole
         partial_variants = all_variants.window(
-            math.ceil(STEP_SEARCH_SHARE * all_variants.system.steps(all_variants.scene))
+            math.ceil(RUN_SHARE_FOR_STEP_SEARCH * all_variants.system.step_count(all_variants.scene))
         )
-        return self.whole if partial_variants is all_variants else Screen(partial_variants, self.whole.quantities)
+        return self.whole if partial_variants is all_variants else EffectScreen(partial_variants, self.whole.quantities)
 
-    def _coarse_screen(self, screen: Screen) -> Screen:
+    def _coarse_screen(self, screen: EffectScreen) -> EffectScreen:
         """Screen of the same runs with steps longer by the factor ``step_factor``."""
         runs = screen.variants
         coarse = Variants(runs.changed_scene(frozenset(), self.step_factor), runs.engine, runs.executor)
-        return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
+        return screen if self.step_factor == 1 else EffectScreen(coarse, screen.quantities)
 
-    def _longest_screen_step(self, screen: Screen) -> tuple[int, np.ndarray]:
+    def _longest_screen_step(self, screen: EffectScreen) -> tuple[int, np.ndarray]:
         """Longest step factor of screening runs, and the relative changes (quantities,) that it causes."""
         all_variants = self.whole.variants
         step_factors = [k for k in all_variants.step_factors() if k in screen.variants.step_factors()]
-        allowed = (SAMPLED_STEP_SHARE if self.all_sampled else SCREENED_STEP_SHARE) * self.tolerance
-        longest, error = self._longest_allowed(screen, frozenset(), step_factors, allowed)
+        allowed = (
+            TOLERANCE_SHARE_OF_SAMPLED_STEP if self.all_sampled else TOLERANCE_SHARE_OF_SCREENING_STEP
+        ) * self.tolerance
+        longest, error = self._longest_allowed_step(screen, frozenset(), step_factors, allowed)
         while all_variants.quantities_of_run(step_factor=longest) is None:  # its run fails after that part
             longest = max(k for k in step_factors if k < longest)
         return longest, error
 
-    def _longest_allowed(
-        self, screen: Screen, omitted_effects: EffectSet, step_factors: list[int], largest_change: float
+    def _longest_allowed_step(
+        self, screen: EffectScreen, omitted_effects: EffectSet, step_factors: list[int], largest_change: float
     ) -> tuple[int, np.ndarray]:
         """Longest step of ``step_factors`` that changes no quantity by more than ``largest_change``, by bisection, and
         its relative changes (quantities,). The first step is always allowed.
@@ -154,7 +158,7 @@ class Chooser:
             low, high, shares = (middle, high, tried) if (tried <= largest_change).all() else (low, middle, shares)
         return step_factors[low], shares
 
-    def share(self, omitted_effects: EffectSet) -> float:
+    def tolerance_share(self, omitted_effects: EffectSet) -> float:
         """Ratio of the largest predicted change, with an estimate of what the prediction omits, to the tolerance;
         infinite where leaving the effects out breaks an assumption that the scene keeps.
         """
@@ -182,13 +186,13 @@ class Chooser:
     def longest_step_factor(self, omitted_effects: EffectSet) -> int:
         """Longest step without these effects that the predictions allow, as a multiple of the scene's step."""
         if omitted_effects not in self._longest_step_factors:
-            left = max(0.0, PREDICTION_SHARE - self.share(omitted_effects)) * self.tolerance
-            self._longest_step_factors[omitted_effects], _ = self._longest_allowed(
+            left = max(0.0, TOLERANCE_SHARE_OF_PREDICTION - self.tolerance_share(omitted_effects)) * self.tolerance
+            self._longest_step_factors[omitted_effects], _ = self._longest_allowed_step(
                 self.screen, omitted_effects, self.step_factors, left
             )
         return self._longest_step_factors[omitted_effects]
 
-    def work(self, omitted_effects: EffectSet) -> float:
+    def predicted_work(self, omitted_effects: EffectSet) -> float:
         """Predicted work of a run without these effects with the longest allowed step; infinite if the run fails."""
         return self.screen.variants.work(omitted_effects, self.longest_step_factor(omitted_effects) // self.step_factor)
 
@@ -199,7 +203,7 @@ class Chooser:
         if omitted_effects not in self._confirmed:
             longest = self.longest_step_factor(omitted_effects)
             for step_factor in [k for k in reversed(self.whole.variants.step_factors()) if k <= longest][
-                : 1 + STEP_REDUCTION
+                : 1 + STEP_REDUCTION_LIMIT
             ]:
                 self.rounds += 1
                 change = self.whole.differences_of_runs(
@@ -227,14 +231,14 @@ class Chooser:
         work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (larger_set, current_set)]
         return work[0] < work[1]
 
-    def choose(self) -> Choice:
+    def choose(self) -> EffectChoice:
         """The choice of effects by greedy search, confirmed over the whole run."""
         no_effects: EffectSet = frozenset()
         if not self.within_tolerance(self.confirmed_changes(no_effects)):
             self._confirmed[no_effects] = 1, *np.zeros((2, len(self.whole.quantities)))
         steps_taken, refused_steps = [no_effects], set[EffectSet]()
-        while self.rounds < MOST_CONFIRMATIONS and not self.ended:
-            path = self.path(steps_taken, refused_steps)
+        while self.rounds < CONFIRMATION_LIMIT and not self.ended:
+            path = self.growing_sets(steps_taken, refused_steps)
             if path == steps_taken:
                 break
             if self.is_better(path[-1], steps_taken[-1]):
@@ -248,7 +252,7 @@ class Chooser:
             steps_taken = path[: low + 1]
         return self._refuse_too_few_samples(self._choice_of_set(steps_taken[-1]))
 
-    def _refuse_too_few_samples(self, choice: Choice) -> Choice:
+    def _refuse_too_few_samples(self, choice: EffectChoice) -> EffectChoice:
         """The choice; InputError if only the statistical errors keep all effects in the scene."""
         if not choice.sample_factor or choice.left_out or choice.step_factor > 1:
             return choice
@@ -261,7 +265,7 @@ class Chooser:
             f"{choice.sample_factor:.2g} times as many samples would tell",
         )
 
-    def _choice_of_set(self, omitted_effects: EffectSet) -> Choice:
+    def _choice_of_set(self, omitted_effects: EffectSet) -> EffectChoice:
         step_factor, shares, chance = self._confirmed[omitted_effects]
         no_effects: EffectSet = frozenset()
         shown = [(no_effects, 1), (no_effects, self._confirmed[no_effects][0]), (omitted_effects, step_factor)]
@@ -269,7 +273,7 @@ class Chooser:
             run.counts["calls"] for key in shown if (run := self.whole.variants.quantities_of_run(*key)) is not None
         ]
         seconds_per_call = [self.screen.variants.seconds_per_call(left_out) for left_out, _ in shown]
-        return Choice(
+        return EffectChoice(
             self.effects,
             tuple(sorted(omitted_effects)),
             step_factor,
@@ -300,9 +304,9 @@ class Chooser:
     def _budget_spent(self) -> bool:
         """Whether the search has used all the calls that it may make; if so, it is marked as ended early."""
         whole_run = self.whole.variants.quantities_of_run()
-        share = self._calls_so_far() / (RUN_BUDGET * whole_run.counts["calls"]) if whole_run else 1.0
+        share = self._calls_so_far() / (SEARCH_BUDGET_IN_RUNS * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
-        self.progress(min(share, 1.0))
+        self.report_progress(min(share, 1.0))
         return self.ended
 
     def change_with_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
@@ -337,18 +341,20 @@ class Chooser:
         shares, step_factor = {}, self.longest_step_factor(omitted_effects) // self.step_factor
         for effect in self.effects:
             further = omitted_effects | {effect}
-            if effect not in omitted_effects and self.screen.variants.work(further, step_factor) < self.work(
+            if effect not in omitted_effects and self.screen.variants.work(further, step_factor) < self.predicted_work(
                 omitted_effects
             ):
-                shares[effect] = self.share(further) * self.tolerance
+                shares[effect] = self.tolerance_share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
-    def path(self, first_sets: list[EffectSet], refused_steps: set[EffectSet]) -> list[EffectSet]:
-        """Growing sets of omitted effects: ``first_sets``, continued one step at a time as far as predictions allow."""
-        path = list(first_sets)
+    def growing_sets(self, sets_so_far: list[EffectSet], refused_additions: set[EffectSet]) -> list[EffectSet]:
+        """Growing sets of omitted effects: ``sets_so_far``, continued one step at a time as far as predictions
+        allow.
+        """
+        path = list(sets_so_far)
         while True:
-            step = self._best_step(path[-1], refused_steps, [frozenset([effect]) for effect in self.effects])
-            step = step or self._best_step(path[-1], refused_steps, self._promising_pairs())
+            step = self._best_addition(path[-1], refused_additions, [frozenset([effect]) for effect in self.effects])
+            step = step or self._best_addition(path[-1], refused_additions, self._promising_pairs())
             if not step:
                 return path
             path.append(path[-1] | step)
@@ -356,11 +362,11 @@ class Chooser:
     def _promising_pairs(self) -> list[EffectSet]:
         """Pairs of effects that keep to the error budget together, though one of them alone exceeds it."""
         if self._pairs is None:
-            change_alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
+            change_alone = {effect: self.tolerance_share(frozenset([effect])) for effect in self.effects}
             pairs = [
                 pair
                 for pair in combinations(self.effects, 2)
-                if max(change_alone[effect] for effect in pair) > PREDICTION_SHARE
+                if max(change_alone[effect] for effect in pair) > TOLERANCE_SHARE_OF_PREDICTION
             ]
             pairs.sort(key=lambda pair: sum(change_alone[effect] for effect in pair))
             self._pairs = self._pairs_within_budget([frozenset(pair) for pair in pairs])
@@ -372,31 +378,31 @@ class Chooser:
         for i, pair in enumerate(effect_pairs):
             if self._budget_spent():
                 break
-            if i % PAIRS_IN_ADVANCE == 0:
-                self.screen.compute_in_advance(effect_pairs[i : i + PAIRS_IN_ADVANCE])
-            within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
+            if i % PAIRS_COMPUTED_IN_ADVANCE == 0:
+                self.screen.compute_in_advance(effect_pairs[i : i + PAIRS_COMPUTED_IN_ADVANCE])
+            within += [pair] if self.tolerance_share(pair) <= TOLERANCE_SHARE_OF_PREDICTION else []
         return within
 
-    def _best_step(
-        self, omitted_effects: EffectSet, refused_steps: set[EffectSet], steps: list[EffectSet]
+    def _best_addition(
+        self, omitted_effects: EffectSet, refused_additions: set[EffectSet], additions: list[EffectSet]
     ) -> EffectSet:
         """The effect or pair that saves the most work for the predicted error that it adds; empty where none may go."""
         best, best_score = frozenset[str](), 0.0
-        current_share, work = self.share(omitted_effects), self.work(omitted_effects)
-        steps = [
+        current_share, work = self.tolerance_share(omitted_effects), self.predicted_work(omitted_effects)
+        additions = [
             step
-            for step in steps
-            if not (step <= omitted_effects or step - omitted_effects in refused_steps or step in refused_steps)
+            for step in additions
+            if not (step <= omitted_effects or step - omitted_effects in refused_additions or step in refused_additions)
         ]
-        if steps and not self._budget_spent():
-            self.screen.compute_in_advance(omitted_effects | step for step in steps)
-        for step in steps:
+        if additions and not self._budget_spent():
+            self.screen.compute_in_advance(omitted_effects | step for step in additions)
+        for step in additions:
             further = omitted_effects | step
             if self._budget_spent():
                 break
-            share = self.share(further)
-            saved = math.log(work / self.work(further)) if share <= PREDICTION_SHARE else 0.0
-            score = saved / max(share - current_share, NEGLIGIBLE_SHARE) if saved > 0.0 else 0.0
+            share = self.tolerance_share(further)
+            saved = math.log(work / self.predicted_work(further)) if share <= TOLERANCE_SHARE_OF_PREDICTION else 0.0
+            score = saved / max(share - current_share, NEGLIGIBLE_TOLERANCE_SHARE) if saved > 0.0 else 0.0
             if score > best_score:
                 best, best_score = step - omitted_effects, score
         return best

@@ -16,7 +16,7 @@ from typing import NoReturn
 import numpy as np
 
 from models.advice.choice.answer import (
-    Cases,
+    CaseValues,
     RunQuantities,
     difference_of_runs,
     largest_relative_change,
@@ -27,13 +27,13 @@ from models.advice.choice.answer import (
 from models.advice.choice.variants import EffectSet, Variants
 from models.core.errors import InputError
 
-LARGEST_SAMPLE_SHARE = 1 / 3
+LARGEST_SHARE_OF_SINGLE_SAMPLE = 1 / 3
 """Largest share that one sample may have of a sampled quantity's mean square."""
-Changes = dict[str, Cases]
+ChangesByQuantity = dict[str, CaseValues]
 """Differences of two runs, by the name of the quantity."""
 
 
-class Screen:
+class EffectScreen:
     """Predictions of how quantities change if effects are left out, from runs of ``variants`` of a scene. InputError
     for a quantity that does not move.
     """
@@ -45,22 +45,24 @@ class Screen:
             full = variants.system.computed_quantities(variants.scene, variants.engine)
         quantities_by_name = {name: full.quantity(name, variants.scene.file) for name in quantities}
         self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
-        self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
+        self.sizes = {name: quantity.reference_sizes for name, quantity in quantities_by_name.items()}
         self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
         for name, size in self.sizes.items():
             if not (np.isfinite(size).all() and (size > rounding_floor(full, quantities_by_name[name].unit)).any()):
                 self._refuse(name, "does not move in this scene, so that there is nothing to hold it to")
         for name in self.sampled:
             share = max(float(case.max() / case.sum()) for case in self.full[name])
-            if share > LARGEST_SAMPLE_SHARE:  # no error could be told of it
+            if share > LARGEST_SHARE_OF_SINGLE_SAMPLE:  # no error could be told of it
                 m = len(self.full[name][0])
                 why = f"by one sample of {m}, so that chance decides: ask for more or longer ones"
                 self._refuse(name, f"is made up to {100 * share:.0f} % {why}")
 
-    def _refuse(self, name: str, reason: str) -> NoReturn:
-        raise InputError(self.variants.scene.file, f"quantities.{name}", None, reason)
+    def _refuse(self, quantity_name: str, reason: str) -> NoReturn:
+        raise InputError(self.variants.scene.file, f"quantities.{quantity_name}", None, reason)
 
-    def differences_of_runs(self, run: RunQuantities | None, other_run: RunQuantities | None) -> Changes | None:
+    def differences_of_runs(
+        self, run: RunQuantities | None, other_run: RunQuantities | None
+    ) -> ChangesByQuantity | None:
         """Differences of two runs, by quantity; None where one of the runs or one of its quantities is missing."""
         if run is None or other_run is None:
             return None
@@ -74,15 +76,15 @@ class Screen:
                 return None  # what is left has no such quantity
             raise
 
-    def relative_changes(self, differences: Changes | None) -> np.ndarray:
+    def relative_changes(self, differences: ChangesByQuantity | None) -> np.ndarray:
         """Relative changes (quantities,) from differences of runs; infinite where ``differences`` is None."""
         return self._changes_with_errors(differences)[0]
 
-    def statistical_errors(self, differences: Changes | None) -> np.ndarray:
+    def statistical_errors(self, differences: ChangesByQuantity | None) -> np.ndarray:
         """Statistical errors (quantities,) of relative changes; zero for a quantity that is no mean of samples."""
         return self._changes_with_errors(differences)[1]
 
-    def _changes_with_errors(self, differences: Changes | None) -> np.ndarray:
+    def _changes_with_errors(self, differences: ChangesByQuantity | None) -> np.ndarray:
         """Relative changes and their statistical errors (2, quantities)."""
         if differences is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
@@ -94,15 +96,15 @@ class Screen:
         ]
         return np.array(pairs).T
 
-    def first_order_change(self, effect: str) -> Changes | None:
+    def first_order_change(self, effect: str) -> ChangesByQuantity | None:
         """First-order difference d_i of the quantities: their change if this effect alone is left out."""
         return self.predicted_difference(frozenset([effect]))
 
-    def second_order_change(self, first: str, other_effect: str) -> Changes | None:
+    def second_order_change(self, effect: str, other_effect: str) -> ChangesByQuantity | None:
         """Second-order difference e_ij of a pair of effects: the change without both, less the changes without each
         alone.
         """
-        sets = map(frozenset, ((first, other_effect), (first,), (other_effect,)))
+        sets = map(frozenset, ((effect, other_effect), (effect,), (other_effect,)))
         change_without_both, *singles = (self.predicted_difference(effects) for effects in sets)
         known = [change_of_single for change_of_single in singles if change_of_single is not None]
         if change_without_both is None or len(known) < 2:
@@ -114,15 +116,17 @@ class Screen:
             for name in self.quantities
         }
 
-    def compute_in_advance(self, sets: Iterable[EffectSet]) -> None:
+    def compute_in_advance(self, effect_sets: Iterable[EffectSet]) -> None:
         """Compute in advance the runs from which the changes without these sets of effects are predicted."""
-        self.variants.compute_in_advance((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
+        self.variants.compute_in_advance(
+            (subset, 1) for chosen in effect_sets for subset in _effect_sets_needed(chosen)
+        )
 
-    def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
+    def predicted_difference(self, omitted_effects: EffectSet) -> ChangesByQuantity | None:
         """Predicted differences of the quantities if a set of effects is left out; None where they cannot be
         predicted.
         """
-        parts: list[Changes | None] = [None]
+        parts: list[ChangesByQuantity | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
                 *map(self.first_order_change, omitted_effects),
@@ -178,12 +182,12 @@ class Screen:
         )
 
 
-def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
+def _effect_sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
     """Sets of effects whose runs are needed to predict the changes without ``omitted_effects``."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
     return [frozenset(subset) for count in (1, 2) for subset in combinations(sorted(omitted_effects), count)]
 
 
-def _negated(cases: Cases) -> Cases:
-    return tuple(-case for case in cases)
+def _negated(case_values: CaseValues) -> CaseValues:
+    return tuple(-case for case in case_values)

@@ -45,7 +45,7 @@ load code.
 """
 
 
-def system_of(scene: Any) -> ModuleType:
+def module_of_system(scene: Any) -> ModuleType:
     """The module that runs scenes of this scene's system for a price or a choice; InputError where there is none."""
     files = modules_of("models.advice.choice.systems")
     if scene.system not in files:
@@ -81,14 +81,14 @@ class Variants:
     _computed_in_advance: dict[VariantKey, VariantOutcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.system = system_of(self.scene)
-        self.scene = self.system.opened(self.scene) if self._knows_effects else self.scene
+        self.system = module_of_system(self.scene)
+        self.scene = self.system.copies_of_scene(self.scene) if self._knows_effects else self.scene
         self._job = partial(_run_variant_in_worker, self.scene, self.engine)
 
     @property
     def _knows_effects(self) -> bool:
         """Whether the system replaces the scene by an object that knows its effects and makes its own variants."""
-        return hasattr(self.system, "opened")
+        return hasattr(self.system, "copies_of_scene")
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -96,18 +96,20 @@ class Variants:
         return tuple(self.scene.effect_names) if self._knows_effects else named_effects(self.scene)
 
     @property
-    def absent_names(self) -> tuple[str, ...]:
+    def absent_effect_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene does not have."""
-        return tuple(self.scene.absent_names) if self._knows_effects else absent_effects(self.scene)
+        return tuple(self.scene.absent_effect_names) if self._knows_effects else absent_effects(self.scene)
 
-    def scene_with_effect(self, name: str) -> Any:
+    def scene_with_effect(self, effect_name: str) -> Any:
         """The scene with an absent effect added at its usual values; InputError where it cannot be added."""
-        return self.scene.with_effect(name) if self._knows_effects else with_effects(self.scene, name)
+        return self.scene.with_effect(effect_name) if self._knows_effects else with_effects(self.scene, effect_name)
 
-    def sentence_on_effect(self, name: str) -> str:
+    def sentence_on_effect(self, effect_name: str) -> str:
         """Sentence that describes an effect, or what leaving it out means."""
         sentences = self.scene.effect_sentences if self._knows_effects else {}
-        return str(sentences.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
+        return str(sentences.get(effect_name) or module_of(self.scene.system, effect_name).__doc__ or "").partition(
+            "\n"
+        )[0]
 
     def quantities_of_run(self, omitted_effects: Iterable[str] = (), step_factor: int = 1) -> RunQuantities | None:
         """Quantities of the run without these effects, with steps longer by ``step_factor``; None if the run fails."""
@@ -120,24 +122,24 @@ class Variants:
             self.calls += answer.counts["calls"] if answer else 0
         return self._quantities_of_variant[key]
 
-    def compute_in_advance(self, keys: Iterable[VariantKey]) -> None:
+    def compute_in_advance(self, variant_keys: Iterable[VariantKey]) -> None:
         """Let the executor compute runs that will probably be requested; without an executor no run is computed in
         advance.
         """
         if self.executor is not None:
             new = [
                 key
-                for key in dict.fromkeys(keys)
+                for key in dict.fromkeys(variant_keys)
                 if key not in self._quantities_of_variant and key not in self._computed_in_advance
             ]
             self._computed_in_advance |= zip(new, block_results(self._job, new, self.executor), strict=True)
 
-    def run(self, key: VariantKey) -> VariantOutcome:
+    def run(self, variant_key: VariantKey) -> VariantOutcome:
         """Run a variant, even if it was run before; returns its quantities, None where the run fails, and the
         assumptions that it breaks.
         """
         with collected_breaches() as broken:
-            return self._run(*key), broken
+            return self._run(*variant_key), broken
 
     def _run(self, omitted_effects: EffectSet, step_factor: int) -> RunQuantities | None:
         try:
@@ -163,7 +165,9 @@ class Variants:
         """Results of a variant together with their error estimates; its runs are repeated for that."""
         results: list[Result] = []
         with suppress(RunFailed), result_observer(results.append):  # raised where an error is as large as what it is of
-            self.system.computed_quantities(self.changed_scene(omitted_effects, step_factor), self.engine, error=True)
+            self.system.computed_quantities(
+                self.changed_scene(omitted_effects, step_factor), self.engine, with_error_estimate=True
+            )
         return results
 
     def changed_scene(self, omitted_effects: EffectSet, step_factor: int = 1) -> Any:
@@ -174,7 +178,7 @@ class Variants:
         if step_factor == 1:
             return scene
         table = table_without_defaults(scene)
-        self.system.coarsen(table, scene, step_factor)
+        self.system.lengthen_steps(table, scene, step_factor)
         return rebuilt_scene(table, scene)
 
     def work(self, omitted_effects: EffectSet, step_factor: int = 1) -> float:
@@ -205,28 +209,28 @@ class Variants:
 
     def step_factors(self) -> list[int]:
         """Factors by which the step may be lengthened so that a whole number of steps still fits into the run."""
-        count = self.system.divisible_steps(self.scene)
+        count = self.system.divisible_step_count(self.scene)
         return [
             step_factor for step_factor in range(1, min(count, LARGEST_STEP_FACTOR) + 1) if count % step_factor == 0
         ]
 
-    def window(self, steps: int) -> "Variants":
-        """Variants of the first part of the run, at least ``steps`` steps long; of the whole run where the part would
-        be hardly shorter.
+    def window(self, least_step_count: int) -> "Variants":
+        """Variants of the first part of the run, at least ``least_step_count`` steps long; of the whole run where the
+        part would be hardly shorter.
 
         The length is one that the scene may have, for example whole samples of a measurement.
         """
         if self._knows_effects:
-            return Variants(self.scene.with_fewer_copies(steps), self.engine, self.executor)
-        count = self.system.steps(self.scene)
-        for part_steps in (n for n in range(steps, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
+            return Variants(self.scene.with_fewer_copies(least_step_count), self.engine, self.executor)
+        count = self.system.step_count(self.scene)
+        for part_steps in (n for n in range(least_step_count, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
             table = table_without_defaults(self.scene)
-            self.system.shorten(table, self.scene, part_steps)
+            self.system.shorten_run(table, self.scene, part_steps)
             with suppress(InputError):
                 return Variants(rebuilt_scene(table, self.scene), self.engine, self.executor)
         return self
 
 
-def _run_variant_in_worker(scene: Any, engine: str, key: VariantKey) -> VariantOutcome:
+def _run_variant_in_worker(scene: Any, engine: str, variant_key: VariantKey) -> VariantOutcome:
     """Run a variant of a scene in a worker process; returns what ``Variants.run`` returns."""
-    return Variants(scene, engine).run(key)
+    return Variants(scene, engine).run(variant_key)

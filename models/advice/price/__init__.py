@@ -33,10 +33,10 @@ class SettingLadder:
     confirmation_divisor: float = 20.0
     change_text: str = ""
 
-    def setting(self, i: int) -> Setting:
-        """The solver setting on rung ``i`` of the ladder, counted from the coarsest."""
+    def setting(self, rung_index: int) -> Setting:
+        """The solver setting on rung ``rung_index`` of the ladder, counted from the coarsest."""
         owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
-        return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
+        return kind(self.engine, self.method, self.values[rung_index], self.order, self.adaptive, default=owner)
 
     def work(self, old_value: float, new_value: float) -> float:
         """Ratio of the work with the new value of a setting (step, or cell share) to the work with the old one. Cells
@@ -103,15 +103,15 @@ class PricedScene(Protocol):
         ...
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work, such as force calls."""
         ...
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of solver settings, one for each method of each requested engine."""
         ...
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference's settings, which are refined until the true quantity is known well enough; each step
         is half the previous one.
         """
@@ -133,6 +133,6 @@ class PricedScene(Protocol):
         """The quantity along a run, read from what ``solve`` returned."""
         ...
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
         ...

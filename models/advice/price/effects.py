@@ -19,19 +19,19 @@ from models.advice.choice.answer import (
     rounding_floor,
     sampled_change_and_error,
 )
-from models.advice.choice.variants import Variants, system_of
+from models.advice.choice.variants import Variants, module_of_system
 from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import describe, paired_ratio
 from models.systems.ride.of_scene import needs_run_in_time
 
-MOST_PRICED_STEPS = 960
+PRICED_STEP_LIMIT = 960
 """Number of steps of a run, at most, over which effects are priced."""
 TIMING_ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
 """Number of timing turns, in each of which every variant runs once; the fewer turns, and the total CPU seconds above
 which only these are made.
 """
-SEED = 11
+TURN_ORDER_SEED = 11
 
 
 @dataclass(frozen=True)
@@ -95,11 +95,11 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
         from models.advice.price.effects_of_ride import price_list_of_ride
 
         return price_list_of_ride(scene)
-    system = system_of(scene)
-    engine = engine or system.ENGINE
+    system = module_of_system(scene)
+    engine = engine or system.DEFAULT_ENGINE
     complete = Variants(scene, engine)
-    variants = complete.window(MOST_PRICED_STEPS)
-    short, names = variants.scene, (*variants.effects, *variants.absent_names)
+    variants = complete.window(PRICED_STEP_LIMIT)
+    short, names = variants.scene, (*variants.effects, *variants.absent_effect_names)
     with collected_breaches() as broken_alone:
         base: RunQuantities = system.computed_quantities(short, engine)
     runs: dict[str, Callable[[], RunQuantities]] = {"": partial(system.computed_quantities, short, engine)}
@@ -133,46 +133,46 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     return PriceList(
         scene.title,
         engine,
-        system.steps(short),
-        system.steps(complete.scene),
+        system.step_count(short),
+        system.step_count(complete.scene),
         base.counts,
         median_and_deviation(micros[""]),
         tuple(prices),
     )
 
 
-def _microseconds_by_turn(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
+def _microseconds_by_turn(run_functions: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (turns,) for every run; the runs take turns in random order."""
-    micros = dict[str, list[float]]({name: [] for name in runs})
-    order, names, start_time = np.random.default_rng(SEED), list(runs), time.process_time()
+    micros = dict[str, list[float]]({name: [] for name in run_functions})
+    order, names, start_time = np.random.default_rng(TURN_ORDER_SEED), list(run_functions), time.process_time()
     for i in range(TIMING_ROUNDS):
         if i >= LEAST_ROUNDS and (time.process_time() - start_time) * (i + 1) > i * LONG_ROUNDS_SECONDS:
             break
         for j in order.permutation(len(names)):
-            outcome = runs[names[j]]()
+            outcome = run_functions[names[j]]()
             micros[names[j]].append(1e6 * outcome.seconds / outcome.counts["steps"])
     return {name: np.array(values) for name, values in micros.items()}
 
 
-def median_and_deviation(values: np.ndarray) -> tuple[float, float]:
-    """Median and median absolute deviation of ``values`` (n,), in their unit."""
-    statistics = describe(values.tolist())
+def median_and_deviation(samples: np.ndarray) -> tuple[float, float]:
+    """Median and median absolute deviation of ``samples`` (n,), in their unit."""
+    statistics = describe(samples.tolist())
     return statistics["median"], statistics["mad"]
 
 
 def _price_of_effect(
     variants: Variants,
-    name: str,
+    effect_name: str,
     scene_quantities: RunQuantities,
     changed_quantities: RunQuantities | None,
     changed_microseconds: np.ndarray | None,
     scene_microseconds: np.ndarray,
-    reason: str,
+    refusal_reason: str,
 ) -> EffectPrice:
     """Price of one effect from a run of the scene and a run with this effect added or left out."""
-    is_present, says = name in variants.effects, variants.sentence_on_effect(name)
+    is_present, says = effect_name in variants.effects, variants.sentence_on_effect(effect_name)
     if changed_quantities is None or changed_microseconds is None:
-        return EffectPrice(name, is_present, says, reason)
+        return EffectPrice(effect_name, is_present, says, refusal_reason)
     quantities_without, quantities_with = (
         (changed_quantities, scene_quantities) if is_present else (scene_quantities, changed_quantities)
     )
@@ -182,7 +182,7 @@ def _price_of_effect(
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in quantities_with.quantities if key not in quantities_without.quantities)
     return EffectPrice(
-        name,
+        effect_name,
         is_present,
         says,
         "",
@@ -203,7 +203,7 @@ def _quantity_changes(scene_quantities: RunQuantities, changed_quantities: RunQu
                 change = difference_of_runs(changed_quantities.quantities[name].cases, quantity.cases)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
-            size = quantity.sizes
+            size = quantity.reference_sizes
             if quantity.sampled:
                 share, chance = sampled_change_and_error(change, quantity.cases)
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))

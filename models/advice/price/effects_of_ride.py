@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from models.advice.price.effects import (
-    SEED,
     TIMING_ROUNDS,
+    TURN_ORDER_SEED,
     EffectPrice,
     PriceList,
     QuantityChange,
@@ -70,39 +70,39 @@ def price_list_of_ride(scene: Any) -> PriceList:
     )
 
 
-def _without_effect(full_scene: FullScene, effect: OmissibleEffect) -> Reduced | str:
+def _without_effect(full_scene: FullScene, omitted_effect: OmissibleEffect) -> Reduced | str:
     """The linear ride system without an effect, or the reason why it cannot be left out."""
-    why = refusal_reason([effect])
+    why = refusal_reason([omitted_effect])
     if why:
         return why
     try:
-        return full_scene.reduced(reduced_without(full_scene.scene, [effect]))
+        return full_scene.reduced(reduced_without(full_scene.scene, [omitted_effect]))
     except InputError as error:
         return error.allowed
 
 
-def _with_added_effect(scene: Any, name: str, speed: float) -> Reduced | str:
+def _with_added_effect(scene: Any, effect_name: str, speed: float) -> Reduced | str:
     """The linear ride system with one more effect at its usual values, or the reason why it cannot be added."""
     try:
-        return FullScene(ReducedScene.complete(with_effects(scene, name)), speed).full
+        return FullScene(ReducedScene.complete(with_effects(scene, effect_name)), speed).full
     except InputError as error:
         return error.allowed
 
 
-def _counts_of_scene(system: Reduced) -> dict[str, int]:
+def _counts_of_scene(linear_system: Reduced) -> dict[str, int]:
     """Counts of a linear ride system: states, and right-hand side calls per second of motion with the longest stable
     step.
     """
-    of_run = cost(system.reduced_vehicle, system.excitation)
+    of_run = cost(linear_system.reduced_vehicle, linear_system.excitation)
     return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 
-def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
+def _microseconds_by_turn(linear_systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (TIMING_ROUNDS,) for every system; the systems take turns in random order."""
-    micros, order = {name: np.empty(TIMING_ROUNDS) for name in systems}, np.random.default_rng(SEED)
+    micros, order = {name: np.empty(TIMING_ROUNDS) for name in linear_systems}, np.random.default_rng(TURN_ORDER_SEED)
     for i in range(TIMING_ROUNDS):
-        for j in order.permutation(len(systems)):
-            name, system = list(systems.items())[j]
+        for j in order.permutation(len(linear_systems)):
+            name, system = list(linear_systems.items())[j]
             micros[name][i] = _step_microseconds(system.system.A[: system.states, : system.states])
     return micros
 
@@ -118,21 +118,23 @@ def _step_microseconds(A: np.ndarray) -> float:
 
 def _price_of_effect(
     full_scene: FullScene,
-    name: str,
+    effect_name: str,
     description: str,
     changed_system: Reduced | str,
-    micros: dict[str, np.ndarray],
+    microseconds: dict[str, np.ndarray],
     is_present: bool = True,
 ) -> EffectPrice:
     """Price of an effect. ``changed_system`` is the scene without the effect if it ``is_present``, else the scene with
     it.
     """
     if isinstance(changed_system, str):
-        return EffectPrice(name, is_present, description, changed_system)
-    without_it, with_it = ((changed_system, micros[name]), (full_scene.full, micros[""]))[:: 1 if is_present else -1]
+        return EffectPrice(effect_name, is_present, description, changed_system)
+    without_it, with_it = ((changed_system, microseconds[effect_name]), (full_scene.full, microseconds[""]))[
+        :: 1 if is_present else -1
+    ]
     gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
     return EffectPrice(
-        name,
+        effect_name,
         is_present,
         description,
         "",
@@ -144,7 +146,7 @@ def _price_of_effect(
     )
 
 
-def _deviation_changes(full_scene: FullScene, reduced: Reduced) -> tuple[QuantityChange, ...]:
+def _deviation_changes(full_scene: FullScene, reduced_system: Reduced) -> tuple[QuantityChange, ...]:
     """Changes of the outputs' standard deviations, exact; infinite where white noise reaches an output."""
     names = full_scene.full.system.names
     units = [output.unit for output in full_scene.linear.outputs]
@@ -152,7 +154,8 @@ def _deviation_changes(full_scene: FullScene, reduced: Reduced) -> tuple[Quantit
     try:
         with np.errstate(invalid="ignore"):
             full, without = (
-                np.sqrt(exact_variances(system, list(range(len(names))))) for system in (full_scene.full, reduced)
+                np.sqrt(exact_variances(system, list(range(len(names)))))
+                for system in (full_scene.full, reduced_system)
             )
     except InputError:
         return ()

@@ -7,40 +7,42 @@ import numpy as np
 
 from models.advice.price.effects import EffectPrice, PriceList, QuantityChange
 
-SHOWN_QUANTITIES = 3
+SHOWN_QUANTITY_COUNT = 3
 """Number of changed quantities of an effect that are printed; JSON has all."""
 NAME_COLUMN_WIDTH = 26
 """Width of the column of effect names, in characters."""
-ROUNDING_CHANGE = 1e-12
+NEGLIGIBLE_CHANGE = 1e-12
 """Relative change of a quantity up to which it is only rounding."""
 
 
-def price_list_lines(prices: PriceList, quantities: list[str]) -> list[str]:
+def price_list_lines(price_list: PriceList, quantity_names: list[str]) -> list[str]:
     """Text lines of a price list: the cost of the scene, then every effect with its cost and the changes that it
     makes.
     """
-    counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
-    priced_steps_text = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
+    counts = ", ".join(f"{value:,} {name}" for name, value in price_list.counts.items())
+    priced_steps_text = (
+        "" if price_list.each >= price_list.whole else f", {price_list.each:,} of {price_list.whole:,} steps priced"
+    )
     return [
-        prices.title,
-        f"  {prices.engine}, {counts}{priced_steps_text}; {_microseconds_text(prices.micros)} a step, CPU, "
+        price_list.title,
+        f"  {price_list.engine}, {counts}{priced_steps_text}; {_microseconds_text(price_list.micros)} a step, CPU, "
         "median and its deviation",
         "",
         "  effects of the scene: what each adds to it, and what leaving it out changes",
-        *(line for price in prices.prices if price.there for line in _effect_lines(price, quantities)),
-        *_absent_effect_lines(prices, quantities),
+        *(line for price in price_list.prices if price.there for line in _effect_lines(price, quantity_names)),
+        *_absent_effect_lines(price_list, quantity_names),
         "",
         "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
-        + ("; +- what chance may add, of so few samples" if _by_chance(prices) else ""),
+        + ("; +- what chance may add, of so few samples" if _has_statistical_errors(price_list) else ""),
     ]
 
 
-def _by_chance(prices: PriceList) -> bool:
-    return any(change.chance for price in prices.prices for change in price.changes)
+def _has_statistical_errors(price_list: PriceList) -> bool:
+    return any(change.chance for price in price_list.prices for change in price.changes)
 
 
-def _absent_effect_lines(prices: PriceList, quantities: list[str]) -> list[str]:
-    rows = [line for price in prices.prices if not price.there for line in _effect_lines(price, quantities)]
+def _absent_effect_lines(price_list: PriceList, quantity_names: list[str]) -> list[str]:
+    rows = [line for price in price_list.prices if not price.there for line in _effect_lines(price, quantity_names)]
     return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
 
 
@@ -48,30 +50,30 @@ def _microseconds_text(median_and_deviation: tuple[float, float]) -> str:
     return f"{_number_text(median_and_deviation[0], 3)} +- {_number_text(median_and_deviation[1], 1)} us"
 
 
-def _number_text(value: float, digits: int) -> str:
-    """A number as text with ``digits`` significant digits, without an exponent even if it is large."""
-    large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
-    return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
+def _number_text(number: float, significant_digits: int) -> str:
+    """A number as text with ``significant_digits`` significant digits, without an exponent even if it is large."""
+    large = np.isfinite(number) and abs(float(f"{number:.{significant_digits}g}")) >= 10.0**significant_digits
+    return f"{float(f'{number:.{significant_digits}g}'):,.0f}" if large else f"{number:.{significant_digits}g}"
 
 
-def _effect_lines(price: EffectPrice, quantities: list[str]) -> list[str]:
+def _effect_lines(effect_price: EffectPrice, quantity_names: list[str]) -> list[str]:
     """Text lines on an effect: its cost, the quantities that it changes, and the assumptions that it keeps."""
-    name = f"    {price.name:<{NAME_COLUMN_WIDTH}} "
-    if price.why:
-        return [f"{name}no price: {price.why}"]
-    ratio = f"{price.ratio[0]:.3g} times ({price.ratio[1]:.3g} to {price.ratio[2]:.3g})"
-    plus = "+" if price.micros[0] >= 0.0 else ""
-    cost = f"{name}{plus}{_microseconds_text(price.micros)} a step, {ratio}{_counts_text(price)}"
-    further = ", ..." if len(price.gone) > SHOWN_QUANTITIES else ""
-    new = f"; there with it alone: {', '.join(price.gone[:SHOWN_QUANTITIES])}{further}"
-    rows = [f"{_changes_text(price, quantities)}{new if price.gone else ''}"]
-    rows += [f"keeps an assumption that is broken without it: {says}" for says in price.keeps]
+    name = f"    {effect_price.name:<{NAME_COLUMN_WIDTH}} "
+    if effect_price.why:
+        return [f"{name}no price: {effect_price.why}"]
+    ratio = f"{effect_price.ratio[0]:.3g} times ({effect_price.ratio[1]:.3g} to {effect_price.ratio[2]:.3g})"
+    plus = "+" if effect_price.micros[0] >= 0.0 else ""
+    cost = f"{name}{plus}{_microseconds_text(effect_price.micros)} a step, {ratio}{_counts_text(effect_price)}"
+    further = ", ..." if len(effect_price.gone) > SHOWN_QUANTITY_COUNT else ""
+    new = f"; there with it alone: {', '.join(effect_price.gone[:SHOWN_QUANTITY_COUNT])}{further}"
+    rows = [f"{_changes_text(effect_price, quantity_names)}{new if effect_price.gone else ''}"]
+    rows += [f"keeps an assumption that is broken without it: {says}" for says in effect_price.keeps]
     return [cost, *(f"    {'':<{NAME_COLUMN_WIDTH}} {row}" for row in rows)]
 
 
-def _counts_text(price: EffectPrice) -> str:
+def _counts_text(effect_price: EffectPrice) -> str:
     """Text on the counts (steps, calls, states) that an effect changes."""
-    counts_without, counts_with = price.counts
+    counts_without, counts_with = effect_price.counts
     count_texts = [
         f"{counts_with[name] - counts_without[name]:+,} {name}"
         for name in counts_with
@@ -80,12 +82,12 @@ def _counts_text(price: EffectPrice) -> str:
     return "; " + ", ".join(count_texts) if count_texts else ""
 
 
-def _changes_text(price: EffectPrice, quantities: list[str]) -> str:
+def _changes_text(effect_price: EffectPrice, quantity_names: list[str]) -> str:
     """Text on the changes of the requested quantities, or of those that change most."""
-    requested_changes = [change for change in price.changes if change.name in quantities]
+    requested_changes = [change for change in effect_price.changes if change.name in quantity_names]
     shown = (
         requested_changes
-        or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
+        or [change for change in effect_price.changes if change.relative > NEGLIGIBLE_CHANGE][:SHOWN_QUANTITY_COUNT]
     )
     return "changes " + ("; ".join(map(_changed_quantity_text, shown)) or "nothing")
 
@@ -102,9 +104,9 @@ def _changed_quantity_text(quantity_change: QuantityChange) -> str:
     return f"{name} by {_number_text(quantity_change.absolute, 3)}{unit} ({share})"
 
 
-def as_dict(prices: PriceList) -> dict[str, Any]:
+def as_dict(price_list: PriceList) -> dict[str, Any]:
     """The price list as plain values for JSON; values that are not finite become None."""
-    plain: dict[str, Any] = _json_value(asdict(prices))
+    plain: dict[str, Any] = _json_value(asdict(price_list))
     return plain
 
 

@@ -29,7 +29,7 @@ SECOND_SOLVER_TOLERANCE = 1e-8
 """Relative tolerance of the second solver, which picks its steps itself."""
 
 
-def first_part(duration: float, longest_part: float) -> float:
+def duration_of_first_part(duration: float, longest_part: float) -> float:
     """Duration (s) of the first part of a run: at most ``longest_part`` (s), and a whole fraction of ``duration``
     (s).
     """
@@ -39,8 +39,8 @@ def first_part(duration: float, longest_part: float) -> float:
 @dataclass(frozen=True)
 class MeshedScene(ABC):
     """A priced scene with contact cells, see ``models.advice.price.PricedScene``. reference_engine : engine of the
-    reference; step : the scene's (s); longest : step (s) on the reference's first rung; cells : the scene's number
-    along a contact, 0 where its contacts have none.
+    reference; step : the scene's (s); longest_reference_step : (s), on the reference's first rung; cells : the scene's
+    number along a contact, 0 where its contacts have none.
     """
 
     title: str
@@ -52,32 +52,32 @@ class MeshedScene(ABC):
     engines: tuple[str, ...]
     reference_engine: str
     step: float
-    longest: float
+    longest_reference_step: float
     cells: int
     kink_period = 0.0
 
     @abstractmethod
-    def run(self, engine: str, cells: int, step: float, duration: float) -> Any:
+    def run(self, engine: str, cell_count: int, step: float, duration: float) -> Any:
         """Run the scene in an engine with this number of contact cells and this step (s)."""
 
     @abstractmethod
-    def exact(self, cells: int, step: float, duration: float) -> Any:
+    def exact_run(self, cell_count: int, step: float, duration: float) -> Any:
         """Run the scene by the solver DOP853 with accelerations of ``reference_engine``; output rows are ``step`` (s)
         apart.
         """
 
     @abstractmethod
-    def read(self, run: Any) -> tuple[np.ndarray, np.ndarray, int]:
+    def quantity_along_run(self, run: Any) -> tuple[np.ndarray, np.ndarray, int]:
         """Times (n,) in s and values (n, k) of the quantity along a run, and the number of contact force calls; the
         run's assumptions are judged.
         """
 
     @abstractmethod
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work: contact cells if there are any, else force calls."""
         return "contact cells" if self.cells else "force calls"
 
@@ -87,7 +87,7 @@ class MeshedScene(ABC):
         steps = dict.fromkeys(self._longest_fraction(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """A ladder of cell numbers for every engine and step or, without cells, a ladder of steps for every engine."""
         if not self.cells:
             steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, STEP_HALVINGS)))
@@ -103,13 +103,16 @@ class MeshedScene(ABC):
             for method in self.steps
         ]
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference: twice the cells on every rung and half the step on every second rung; without cells,
         half the step on every rung.
         """
         if not self.cells:
             return SettingLadder(
-                self.reference_engine, "RK4", tuple(self._longest_fraction(self.longest) / 2**k for k in range(16)), 4
+                self.reference_engine,
+                "RK4",
+                tuple(self._longest_fraction(self.longest_reference_step) / 2**k for k in range(16)),
+                4,
             )
         return SettingLadder(
             self.reference_engine,
@@ -133,38 +136,40 @@ class MeshedScene(ABC):
         cells = round(1.0 / setting.value) if self.cells else 0
         rung = round(math.log2(cells / FIRST_CELLS)) if self.cells else 0
         if setting.method == SECOND_METHOD:
-            return cells, self.exact(cells, self._step_tied_to_cells(rung) if self.cells else setting.value, duration)
+            return cells, self.exact_run(cells, self._step_of_rung(rung) if self.cells else setting.value, duration)
         if setting.method == REFINED_TOGETHER:
-            return cells, self.run(setting.engine, cells, self._step_tied_to_cells(rung), duration)
+            return cells, self.run(setting.engine, cells, self._step_of_rung(rung), duration)
         return cells, self.run(setting.engine, cells, self.steps.get(setting.method, setting.value), duration)
 
     def priced_run(self, solution: Any) -> PricedRun:
         """The quantity along a run, with the numbers of force calls and of evaluated contact cells."""
         cells, run = solution
-        times, values, calls = self.read(run)
+        times, values, calls = self.quantity_along_run(run)
         return PricedRun(times, values, {"force calls": calls, "contact cells": calls * cells**2})
 
-    def _step_tied_to_cells(self, rung_index: int) -> float:
-        return self._longest_fraction(self.longest) / 2 ** (max(0, rung_index) // 2)
+    def _step_of_rung(self, rung_index: int) -> float:
+        return self._longest_fraction(self.longest_reference_step) / 2 ** (max(0, rung_index) // 2)
 
     def _longest_fraction(self, step: float) -> float:
         """The longest whole fraction (s) of ``searched_duration`` that is at most ``step`` (s)."""
         return self.searched_duration / math.ceil(self.searched_duration / step * (1 - 1e-9))
 
 
-def checked_quantity(quantity: str, known_names: dict[str, Any]) -> str:
+def checked_quantity(quantity_name: str, known_names: dict[str, Any]) -> str:
     """The name of a quantity, unchanged; InputError where the scene has no quantity of this name."""
-    if quantity not in known_names:
-        raise InputError("--quantity", "", quantity, "is no quantity of this scene: one of them", tuple(known_names))
-    return quantity
+    if quantity_name not in known_names:
+        raise InputError(
+            "--quantity", "", quantity_name, "is no quantity of this scene: one of them", tuple(known_names)
+        )
+    return quantity_name
 
 
 def run_and_quantity(
-    quantity: str | None, default_quantity: str, runs: dict[str, Any], run_kind: str
+    quantity: str | None, default_quantity: str, runs_by_name: dict[str, Any], run_kind: str
 ) -> tuple[str, str]:
     """Names of the run and of the quantity, which a user gives as RUN.QUANTITY; the first run where none is named."""
     name, _, quantity_name = (quantity or default_quantity).rpartition(".")
-    name = name or next(iter(runs))
-    if name not in runs:
-        raise InputError("--quantity", "", quantity, f"names no {run_kind} of this scene", tuple(runs))
+    name = name or next(iter(runs_by_name))
+    if name not in runs_by_name:
+        raise InputError("--quantity", "", quantity, f"names no {run_kind} of this scene", tuple(runs_by_name))
     return name, quantity_name

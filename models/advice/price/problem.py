@@ -38,7 +38,7 @@ class Setting:
         return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
 
 
-class Solver(Protocol):
+class ProblemSolver(Protocol):
     """A model of a problem that has been built and can be run."""
 
     def run(self) -> Any:
@@ -46,7 +46,7 @@ class Solver(Protocol):
         ...
 
 
-class Problem(Protocol):
+class WorkPrecisionProblem(Protocol):
     """Protocol of a problem whose cost and error the work-precision runner measures.
 
     key : part of the rows' names; title : what is computed; note : what a reader of its figure must know;
@@ -74,7 +74,7 @@ class Problem(Protocol):
         """The solver setting of this problem that has this engine, this method, and this step (s) or tolerance."""
         ...
 
-    def build(self, setting: Setting) -> Solver:
+    def build(self, setting: Setting) -> ProblemSolver:
         """A model of the problem, ready to run with a setting; raises Refused where the engine would give a wrong
         solution.
         """

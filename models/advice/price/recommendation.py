@@ -2,8 +2,8 @@
 
 Counts are the same in every run, so the least count wins. Seconds wander: they are those of the processor, in rounds in
 which the rivals take turns, and an engine's default method that meets the tolerance is recommended unless the 95 %
-interval of its ratio to the fastest lies above SLOWER_RATIO. So what is recommended in its place is faster beyond
-doubt, and what is recommended beside it is never slower than it by more than that.
+interval of its ratio to the fastest lies above SLOWER_SECONDS_RATIO. So what is recommended in its place is faster
+beyond doubt, and what is recommended beside it is never slower than it by more than that.
 
 Whatever is timed runs in this process, with nothing beside it. What is not may be shared among workers: the first two
 settings of a reference, the runs that confirm the winners, and those whose errors are told against a finer truth.
@@ -23,33 +23,33 @@ import numpy as np
 
 from models.advice.price import PricedRun, PricedScene, SettingLadder
 from models.advice.price.problem import Setting
-from models.advice.price.search import Search, TriedSetting
-from models.advice.price.truth import ReferenceTruth, reference_truth
+from models.advice.price.search import SettingSearch, TriedSetting
+from models.advice.price.truth import ReferenceSolution, refined_reference
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, modules_of
 from models.ensemble.runner import block_results
 from models.ensemble.workers import Crew, folders_for_workers
 from models.machine.timing import interleave, paired_ratio
 
-CLOSE_SECONDS_RATIO = 2.0
+TIMED_SECONDS_RATIO = 2.0
 """Ratio to the least seconds in one run up to which settings are timed in interleaved rounds."""
-DEFAULT_SECONDS_RATIO = 8.0
-"""Ratio as CLOSE_SECONDS_RATIO for an engine's default, which must not be given up for one disturbed run."""
+TIMED_DEFAULT_SECONDS_RATIO = 8.0
+"""Ratio as TIMED_SECONDS_RATIO for an engine's default, which must not be given up for one disturbed run."""
 TIMING_ROUNDS, SHORTEST_TURN = 9, 0.002
 """Number of interleaved timing rounds, and the time (s) until which a short run is repeated in its turn."""
 FEWEST_ROUNDS, LONG_ROUNDS_SECONDS = 3, 5.0
 """Least number of timing rounds, and the total time (s) that limits the number of rounds of slow runs."""
 DROPPED_SECONDS_RATIO, DEFAULT_DROPPED_RATIO = 1.5, 3.0
 """Ratios to the engine's least seconds above which a setting, or a default, leaves after the first rounds."""
-SLOWER_RATIO = 1.05
+SLOWER_SECONDS_RATIO = 1.05
 """Ratio of seconds above which the 95 % interval must lie for a setting to count as slower."""
-MOST_CONFIRMATIONS = 6
+CONFIRMATION_LIMIT = 6
 """Largest number of settings that are tried over the whole run in search of one that meets the tolerance."""
-RESOLUTION_FACTOR = 3.0
+RESOLVED_ERROR_RATIO = 3.0
 """Ratio of errors to the uncertainty of the truth below which a finer truth is computed, if there is time."""
 UNTIMED_RUNS_AT_ONCE = 8
 """Number of untimed runs at the same time, about: two settings of a reference, or two for each engine."""
-REFINEMENT_COST = 8.0
+REFINEMENT_SECONDS_RATIO = 8.0
 """Ratio of the seconds of a finer reference to those of the last one, at most: twice the cells, half the step."""
 
 
@@ -68,7 +68,7 @@ class SettingChoice:
     rounds: tuple[float, ...] = ()
 
 
-Winners = dict[tuple[str, str], SettingChoice]
+CheapestChoices = dict[tuple[str, str], SettingChoice]
 """Cheapest settings by engine ("" for all engines) and by kind of cost ("calls" or "seconds")."""
 
 
@@ -92,9 +92,9 @@ class Recommendation:
 
     scene: PricedScene
     tolerance: float
-    search_truth: ReferenceTruth
-    truth: ReferenceTruth
-    winners: Winners
+    search_truth: ReferenceSolution
+    truth: ReferenceSolution
+    winners: CheapestChoices
     defaults: dict[str, EngineDefault]
     tried: tuple[TriedSetting, ...]
 
@@ -136,23 +136,23 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
 
     executor : computes what is not timed.
     """
-    searched = known = reference_truth(scene, tolerance, scene.searched_duration, executor=executor)
-    search = Search(scene, searched, tolerance, scene.searched_duration).search_all_ladders()
+    searched = known = refined_reference(scene, tolerance, scene.searched_duration, executor=executor)
+    search = SettingSearch(scene, searched, tolerance, scene.searched_duration).search_all_ladders()
     timed = _timed_settings(search)
-    engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
+    engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.setting_ladders()))
     winners = _cheapest_by_key(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
     if scene.full_duration > scene.searched_duration * (1 + 1e-9) and winners:
         known, timed, winners = _confirmed_over_whole_run(search, timed, winners, executor)
-    known, timed, winners = _with_finer_truth(scene, known, timed, winners, executor)
+    known, timed, winners = _with_finer_reference(scene, known, timed, winners, executor)
     defaults = {
         ladder.engine: settings
-        for ladder in scene.ladders()
+        for ladder in scene.setting_ladders()
         if ladder.default and (settings := _default_cost(search, ladder, timed)) is not None
     }
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
 
 
-def _timed_settings(search: Search) -> list[SettingChoice]:
+def _timed_settings(search: SettingSearch) -> list[SettingChoice]:
     """The coarsest setting of every method that meets the tolerance; the fastest ones are timed in several rounds."""
     curves: dict[str, TriedSetting] = {}
     for attempt in search.settings_that_meet():
@@ -175,23 +175,23 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
     ]
 
 
-def _fastest_candidates(attempts: list[TriedSetting]) -> list[TriedSetting]:
+def _fastest_candidates(tried_settings: list[TriedSetting]) -> list[TriedSetting]:
     """Settings that may be the fastest of an engine or of all; none where there is only one candidate."""
     rivals = dict[TriedSetting, None]()
-    for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
-        attempts_of_engine = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
+    for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in tried_settings)):
+        attempts_of_engine = [attempt for attempt in tried_settings if attempt.setting.engine.startswith(engine)]
         least_seconds = min(attempt.seconds for attempt in attempts_of_engine)
         near = [
             attempt
             for attempt in attempts_of_engine
             if attempt.seconds
-            <= (DEFAULT_SECONDS_RATIO if attempt.setting.default else CLOSE_SECONDS_RATIO) * least_seconds
+            <= (TIMED_DEFAULT_SECONDS_RATIO if attempt.setting.default else TIMED_SECONDS_RATIO) * least_seconds
         ]
         rivals |= dict.fromkeys(near if len(near) > 1 else [])
     return list(rivals)
 
 
-def _interleaved_seconds(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
+def _interleaved_seconds(search: SettingSearch, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
     """Seconds of each setting in a few rounds, and in more rounds for those not far behind the fastest."""
     seconds = _seconds_by_round(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
@@ -215,7 +215,7 @@ def _interleaved_seconds(search: Search, rivals: list[TriedSetting]) -> dict[Set
     }
 
 
-def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: int) -> dict[Setting, np.ndarray]:
+def _seconds_by_round(search: SettingSearch, rivals: list[TriedSetting], round_count: int) -> dict[Setting, np.ndarray]:
     """Processor seconds of each setting in every one of ``round_count`` interleaved rounds."""
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
@@ -223,9 +223,9 @@ def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: i
     return dict(zip((attempt.setting for attempt in rivals), seconds_by_setting, strict=True))
 
 
-def _cheapest_by_key(timed_choices: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
-    """The cheapest setting for each (engine, kind of cost) in ``keys``; a key without any setting is left out."""
-    return {key: best for key in keys if (best := _cheapest(timed_choices, *key)) is not None}
+def _cheapest_by_key(timed_choices: list[SettingChoice], cost_keys: Iterable[tuple[str, str]]) -> CheapestChoices:
+    """The cheapest setting for each (engine, kind of cost) of ``cost_keys``; keys without one are left out."""
+    return {key: best for key in cost_keys if (best := _cheapest(timed_choices, *key)) is not None}
 
 
 def _cheapest(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
@@ -244,38 +244,38 @@ def _cheapest(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -
     return min(usual, key=lambda choice: choice.seconds) if usual else best
 
 
-def _is_slower(choice: SettingChoice, best: SettingChoice) -> bool:
+def _is_slower(choice: SettingChoice, best_choice: SettingChoice) -> bool:
     """Whether a setting takes longer than another: significantly so, where both were timed in the same rounds."""
-    common_rounds = min(len(choice.rounds), len(best.rounds))
+    common_rounds = min(len(choice.rounds), len(best_choice.rounds))
     if common_rounds < FEWEST_ROUNDS:
-        return choice.seconds > best.seconds
-    return paired_ratio(choice.rounds[:common_rounds], best.rounds[:common_rounds])[1] > SLOWER_RATIO
+        return choice.seconds > best_choice.seconds
+    return paired_ratio(choice.rounds[:common_rounds], best_choice.rounds[:common_rounds])[1] > SLOWER_SECONDS_RATIO
 
 
-TruthAndOutcomes = tuple[ReferenceTruth, list[SettingChoice], Winners]
+ReferenceAndChoices = tuple[ReferenceSolution, list[SettingChoice], CheapestChoices]
 
 
 def _confirmed_over_whole_run(
-    search: Search, timed_choices: list[SettingChoice], winners: Winners, executor: Executor | None
-) -> TruthAndOutcomes:
+    search: SettingSearch, timed_choices: list[SettingChoice], cheapest: CheapestChoices, executor: Executor | None
+) -> ReferenceAndChoices:
     """The winners and defaults that meet the tolerance over the whole run, refined if necessary; with the truth."""
     scene = search.scene
-    rung = max(0, search.truth.rung - 1)
-    known = reference_truth(scene, search.tolerance, scene.full_duration, rung, second_method=False, executor=executor)
-    ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
-    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed_choices, winners)}
-    full_search = Search(scene, known, search.tolerance, scene.full_duration)
+    rung = max(0, search.reference_solution.rung - 1)
+    known = refined_reference(scene, search.tolerance, scene.full_duration, rung, False, executor)
+    ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.setting_ladders()}
+    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed_choices, cheapest)}
+    full_search = SettingSearch(scene, known, search.tolerance, scene.full_duration)
     blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
     confirmed = block_results(partial(_valid_over_run, full_search), blocks, executor)
     confirmed_choices = [confirmation.choice for confirmation in confirmed if confirmation.choice is not None]
     search.tried += [attempt for confirmation in confirmed for attempt in confirmation.failed]
-    return known, confirmed_choices, _cheapest_by_key(confirmed_choices, winners)
+    return known, confirmed_choices, _cheapest_by_key(confirmed_choices, cheapest)
 
 
-def _winners_and_defaults(timed_choices: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
+def _winners_and_defaults(timed_choices: list[SettingChoice], cheapest: CheapestChoices) -> list[SettingChoice]:
     """The winners and the settings of default methods, without repetition."""
     return list(
-        dict.fromkeys([*winners.values(), *(choice for choice in timed_choices if choice.tried.setting.default)])
+        dict.fromkeys([*cheapest.values(), *(choice for choice in timed_choices if choice.tried.setting.default)])
     )
 
 
@@ -289,19 +289,19 @@ class _ConfirmedSetting:
     failed: list[TriedSetting] = field(default_factory=list)
 
 
-def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _ConfirmedSetting:
+def _valid_over_run(search: SettingSearch, ladder_and_choice: tuple[SettingLadder, SettingChoice]) -> _ConfirmedSetting:
     """A setting that meets the tolerance over the whole run: that of the block, or a finer one of its method.
 
     The seconds of all attempts are scaled from the rounds in which the first one was timed.
     """
-    (ladder, choice), failed = block, list[TriedSetting]()
+    (ladder, choice), failed = ladder_and_choice, list[TriedSetting]()
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
-    for _ in range(MOST_CONFIRMATIONS):
+    for _ in range(CONFIRMATION_LIMIT):
         ratio = ladder.work(first.setting.value, ladder.values[i])
-        tried = search.attempt(ladder.setting(i))
+        tried = search.try_setting(ladder.setting(i))
         tried = replace(tried, seconds=ratio * choice.seconds) if tried.seconds else tried
         failed += [tried] if tried.status != "ok" else []
-        if search.meets(tried):
+        if search.meets_tolerance(tried):
             rounds = tuple(ratio * s for s in choice.rounds)
             return _ConfirmedSetting(
                 SettingChoice(tried, tried.error, tried.calls, tried.seconds, True, rounds), failed
@@ -314,30 +314,30 @@ def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) 
     return _ConfirmedSetting(None, failed)
 
 
-def _with_finer_truth(
+def _with_finer_reference(
     scene: PricedScene,
-    truth: ReferenceTruth,
+    reference: ReferenceSolution,
     timed_choices: list[SettingChoice],
-    winners: Winners,
+    cheapest: CheapestChoices,
     executor: Executor | None,
-) -> TruthAndOutcomes:
+) -> ReferenceAndChoices:
     """A more exact truth where the errors are close to its uncertainty, and the winners and defaults with their errors
     from it: a setting may be far better than its tolerance asks, and as good as the reference that it was compared
     with.
     """
-    shown = _winners_and_defaults(timed_choices, winners)
+    shown = _winners_and_defaults(timed_choices, cheapest)
     errors = {choice.tried.setting: choice.error for choice in shown}
-    if _is_blurred(truth, errors):
+    if _needs_finer_reference(reference, errors):
         runs = dict(zip(errors, block_results(partial(_run_over_whole_scene, scene), errors, executor), strict=True))
-        truth, errors = _finer_truth(scene, truth, runs, executor)
+        reference, errors = _finer_reference(scene, reference, runs, executor)
     choices_with_errors = {
-        choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], truth.uncertainty))
+        choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], reference.uncertainty))
         for choice in shown
     }
     return (
-        truth,
+        reference,
         [choices_with_errors.get(choice.tried.setting, choice) for choice in timed_choices],
-        {key: choices_with_errors[choice.tried.setting] for key, choice in winners.items()},
+        {key: choices_with_errors[choice.tried.setting] for key, choice in cheapest.items()},
     )
 
 
@@ -346,34 +346,36 @@ def _run_over_whole_scene(scene: PricedScene, setting: Setting) -> PricedRun:
     return scene.priced_run(scene.solve(setting, scene.full_duration))
 
 
-def _is_blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
+def _needs_finer_reference(reference: ReferenceSolution, errors: dict[Setting, float]) -> bool:
     """Whether errors are too close to the uncertainty of the truth, while a better truth would take only seconds."""
     return (
-        min(errors.values(), default=np.inf) < RESOLUTION_FACTOR * truth.uncertainty
-        and REFINEMENT_COST * truth.seconds < LONG_ROUNDS_SECONDS
+        min(errors.values(), default=np.inf) < RESOLVED_ERROR_RATIO * reference.uncertainty
+        and REFINEMENT_SECONDS_RATIO * reference.seconds < LONG_ROUNDS_SECONDS
     )
 
 
-def _finer_truth(
-    scene: PricedScene, truth: ReferenceTruth, priced_runs: dict[Setting, PricedRun], executor: Executor | None
-) -> tuple[ReferenceTruth, dict[Setting, float]]:
+def _finer_reference(
+    scene: PricedScene, reference: ReferenceSolution, priced_runs: dict[Setting, PricedRun], executor: Executor | None
+) -> tuple[ReferenceSolution, dict[Setting, float]]:
     """A truth that is exact enough for the errors of all runs, or the best that time allows, with these errors."""
-    errors = {setting: truth.error(answer) for setting, answer in priced_runs.items()}
-    while _is_blurred(truth, errors):
+    errors = {setting: reference.error(answer) for setting, answer in priced_runs.items()}
+    while _needs_finer_reference(reference, errors):
         try:
-            tolerance = scene.reference().confirmation_divisor * truth.uncertainty
-            finer = reference_truth(
-                scene, tolerance, scene.full_duration, truth.rung, second_method=False, executor=executor
+            tolerance = scene.reference_ladder().confirmation_divisor * reference.uncertainty
+            finer = refined_reference(
+                scene, tolerance, scene.full_duration, reference.rung, second_method=False, executor=executor
             )
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be
-        if not finer.uncertainty < truth.uncertainty:
+        if not finer.uncertainty < reference.uncertainty:
             break
-        truth, errors = finer, {setting: finer.error(answer) for setting, answer in priced_runs.items()}
-    return truth, errors
+        reference, errors = finer, {setting: finer.error(answer) for setting, answer in priced_runs.items()}
+    return reference, errors
 
 
-def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[SettingChoice]) -> EngineDefault | None:
+def _default_cost(
+    search: SettingSearch, ladder: SettingLadder, timed_choices: list[SettingChoice]
+) -> EngineDefault | None:
     """Error and cost of an engine's default setting, and the cost at which its method meets the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
@@ -385,7 +387,7 @@ def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[Set
     if met is not None or not clear:
         return EngineDefault(as_it_is, met, False)
     finest = min(clear, key=lambda attempt: attempt.setting.value)
-    if search.meets(finest):  # over the part that was searched, and not over the whole run
+    if search.meets_tolerance(finest):  # over the part that was searched, and not over the whole run
         return EngineDefault(as_it_is, None, False)
     finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)

@@ -10,20 +10,20 @@ from operator import attrgetter
 
 from models.advice.price import PricedScene, SettingLadder
 from models.advice.price.problem import Setting
-from models.advice.price.runner import Status
-from models.advice.price.truth import ReferenceTruth
+from models.advice.price.runner import PointStatus
+from models.advice.price.truth import ReferenceSolution
 from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 
-FIRST_STEP = 2e-3
+FIRST_TRIED_STEP = 2e-3
 """Step (s) that is tried first; an engine's default method begins with its default step."""
-FIRST_CELLS_SHARE = 1 / 11
+FIRST_TRIED_CELL_SHARE = 1 / 11
 """Ratio of a cell's length to that of the contact that is tried first."""
-FIRST_TOLERANCE = 1e-3
+FIRST_TRIED_TOLERANCE = 1e-3
 """Relative tolerance that is tried first with an adaptive method."""
-GIVEN_UP_RATIO = 2.0
+GIVEN_UP_COST_RATIO = 2.0
 """Ratio to the seconds and the force calls of its engine's best setting above which a method is given up."""
-REFINED_SECONDS = 0.05
+REFINED_RUN_DURATION = 0.05
 """Duration (s) of a run up to which an engine's default method is refined, or that of the engine's fastest setting that
 has met the tolerance, if it is longer.
 """
@@ -40,7 +40,7 @@ class TriedSetting:
     """
 
     setting: Setting
-    status: Status
+    status: PointStatus
     reason: str = ""
     error: float = float("inf")
     calls: int = 0
@@ -48,13 +48,13 @@ class TriedSetting:
 
 
 @dataclass
-class Search:
+class SettingSearch:
     """Search for settings of a scene that meet a tolerance; they are run over ``duration`` (s) and compared with the
     scene's truth.
     """
 
     scene: PricedScene
-    truth: ReferenceTruth
+    reference_solution: ReferenceSolution
     tolerance: float
     duration: float
     tried: list[TriedSetting] = field(default_factory=list)
@@ -62,19 +62,21 @@ class Search:
     @property
     def largest_allowed_error(self) -> float:
         """Largest error that a setting may show: the tolerance less the uncertainty of the truth."""
-        return self.tolerance - self.truth.uncertainty
+        return self.tolerance - self.reference_solution.uncertainty
 
-    def search_all_ladders(self) -> "Search":
+    def search_all_ladders(self) -> "SettingSearch":
         """Search every ladder of settings, methods of high order first: their cost decides where other ladders are
         given up. Returns the search.
         """
-        for ladder in {any_ladder.engine: any_ladder for any_ladder in self.scene.ladders()}.values():
+        for ladder in {any_ladder.engine: any_ladder for any_ladder in self.scene.setting_ladders()}.values():
             self._warm_up(ladder)
-        for ladder in sorted(self.scene.ladders(), key=lambda any_ladder: (any_ladder.adaptive, -any_ladder.order)):
+        for ladder in sorted(
+            self.scene.setting_ladders(), key=lambda any_ladder: (any_ladder.adaptive, -any_ladder.order)
+        ):
             self.search_ladder(ladder)
         return self
 
-    def attempt(self, setting: Setting) -> TriedSetting:
+    def try_setting(self, setting: Setting) -> TriedSetting:
         """Run the scene with a setting and record the outcome, which is returned."""
         start_time = time.process_time()
         try:
@@ -86,12 +88,12 @@ class Search:
         except RunFailed as error:
             attempt = TriedSetting(setting, "raised", str(error))
         else:
-            error_of, calls = self.truth.error(answer), answer.counts.get(self.scene.counted, 0)
+            error_of, calls = self.reference_solution.error(answer), answer.counts.get(self.scene.work_count_name, 0)
             attempt = TriedSetting(setting, "ok", "", error_of, calls, seconds)
-            if not error_of <= LARGEST_RELATIVE_ERROR * max(self.truth.size, self.tolerance):
+            if not error_of <= LARGEST_RELATIVE_ERROR * max(self.reference_solution.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
                 attempt = replace(attempt, status="SILENT", reason=why)
-            elif broken_by_setting := self.truth.newly_broken(broken):
+            elif broken_by_setting := self.reference_solution.newly_broken(broken):
                 attempt = replace(
                     attempt, status="flagged", reason="; ".join(assumption.brief() for assumption in broken_by_setting)
                 )
@@ -118,8 +120,8 @@ class Search:
                 i = min(i, self._finest_affordable_rung(ladder, last_tried))
             if i < low or self._is_hopeless(ladder, i, last_tried) or self._is_too_long(ladder, i, last_tried):
                 return
-            last_tried = self.attempt(ladder.setting(i))
-            if self.meets(last_tried):
+            last_tried = self.try_setting(ladder.setting(i))
+            if self.meets_tolerance(last_tried):
                 high = i
             elif ladder.cells and last_tried.status in ("refused", "raised"):
                 return  # its step is too long, however many cells there are
@@ -128,11 +130,15 @@ class Search:
 
     def settings_that_meet(self, engine: str = "") -> list[TriedSetting]:
         """Outcomes of the tried settings that meet the tolerance, of one engine or of all engines ("")."""
-        return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
+        return [
+            attempt
+            for attempt in self.tried
+            if self.meets_tolerance(attempt) and attempt.setting.engine.startswith(engine)
+        ]
 
-    def meets(self, attempt: TriedSetting) -> bool:
+    def meets_tolerance(self, tried_setting: TriedSetting) -> bool:
         """Whether a setting meets the tolerance and keeps the assumptions that the reference keeps."""
-        return attempt.status == "ok" and attempt.error <= self.largest_allowed_error
+        return tried_setting.status == "ok" and tried_setting.error <= self.largest_allowed_error
 
     def _value_in_another_engine(self, ladder: SettingLadder) -> float:
         """The coarsest value of the setting with which the same method meets the tolerance in another engine, 0 where
@@ -144,62 +150,68 @@ class Search:
         return max((value for value in values_of_method if value in ladder.values), default=0.0)
 
     def _finest_affordable_rung(self, ladder: SettingLadder, last_tried: TriedSetting) -> int:
-        """The finest rung whose run is expected to take no longer than REFINED_SECONDS, or than the engine's fastest
-        setting that meets the tolerance.
+        """The finest rung whose run is expected to take no longer than REFINED_RUN_DURATION, or than the engine's
+        fastest setting that meets the tolerance.
         """
         best = min(attempt.seconds for attempt in self.settings_that_meet(ladder.engine))
-        largest_work = max(REFINED_SECONDS, best) / max(last_tried.seconds, 1e-9)
+        largest_work = max(REFINED_RUN_DURATION, best) / max(last_tried.seconds, 1e-9)
         work = [ladder.work(last_tried.setting.value, value) for value in ladder.values]
         return max(i for i, work_ratio in enumerate(work) if i == 0 or work_ratio <= largest_work)
 
-    def _is_hopeless(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
-        """Whether rung ``i`` would cost far more than another setting of its engine that meets the tolerance."""
+    def _is_hopeless(self, ladder: SettingLadder, rung_index: int, last_tried: TriedSetting | None) -> bool:
+        """Whether rung ``rung_index`` would cost far more than another setting of its engine that meets the
+        tolerance.
+        """
         best = self.settings_that_meet(ladder.engine)
         if last_tried is None or not last_tried.seconds or ladder.default or not best:
             return False
-        finer = ladder.work(last_tried.setting.value, ladder.values[i])
+        finer = ladder.work(last_tried.setting.value, ladder.values[rung_index])
         return all(
-            finer * cost(last_tried) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds_of, _calls_of)
+            finer * cost(last_tried) > GIVEN_UP_COST_RATIO * min(map(cost, best)) for cost in (_seconds_of, _calls_of)
         )
 
-    def _is_too_long(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
-        """Whether rung ``i`` would take very long although another engine has met the tolerance much faster; if so,
-        this is recorded as refused.
+    def _is_too_long(self, ladder: SettingLadder, rung_index: int, last_tried: TriedSetting | None) -> bool:
+        """Whether rung ``rung_index`` would take very long although another engine has met the tolerance much faster;
+        if so, this is recorded as refused.
         """
         best = min((attempt.seconds for attempt in self.settings_that_meet()), default=float("inf"))
         seconds = (
-            0.0 if last_tried is None else ladder.work(last_tried.setting.value, ladder.values[i]) * last_tried.seconds
+            0.0
+            if last_tried is None
+            else ladder.work(last_tried.setting.value, ladder.values[rung_index]) * last_tried.seconds
         )
-        if seconds <= max(LONGEST_RUN_SECONDS, GIVEN_UP_RATIO * best):
+        if seconds <= max(LONGEST_RUN_SECONDS, GIVEN_UP_COST_RATIO * best):
             return False
         why = f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s"
-        self.tried.append(TriedSetting(ladder.setting(i), "refused", why))
+        self.tried.append(TriedSetting(ladder.setting(rung_index), "refused", why))
         return True
 
 
 _seconds_of, _calls_of = attrgetter("seconds"), attrgetter("calls")
 
 
-def _next_rung(ladder: SettingLadder, low: int, high: int, last_tried: TriedSetting | None, tolerance: float) -> int:
+def _next_rung(
+    ladder: SettingLadder, lower_rung: int, upper_rung: int, last_tried: TriedSetting | None, tolerance: float
+) -> int:
     """The rung to try next: predicted from the last outcome by the declared order, or the middle rung if that is
     impossible.
     """
     if last_tried is None:
         wanted = (
-            FIRST_TOLERANCE
+            FIRST_TRIED_TOLERANCE
             if ladder.adaptive
-            else ladder.default or (FIRST_CELLS_SHARE if ladder.cells else FIRST_STEP)
+            else ladder.default or (FIRST_TRIED_CELL_SHARE if ladder.cells else FIRST_TRIED_STEP)
         )
     elif last_tried.status == "ok" and last_tried.error > 0.0:
         wanted = last_tried.setting.value * (tolerance / last_tried.error) ** (
             1 / (1 if ladder.adaptive else ladder.order or 2)
         )
     else:
-        return (low + high) // 2
-    return _rung_for_target(ladder, wanted, low, high)
+        return (lower_rung + upper_rung) // 2
+    return _rung_for_target(ladder, wanted, lower_rung, upper_rung)
 
 
-def _rung_for_target(ladder: SettingLadder, target_value: float, low: int, high: int) -> int:
+def _rung_for_target(ladder: SettingLadder, target_value: float, lower_rung: int, upper_rung: int) -> int:
     """The coarsest of the remaining rungs whose value is at most ``target_value``."""
     i = bisect_left(ladder.values, -target_value * (1 + 1e-9), key=lambda value: -value)
-    return min(max(i, low), high - 1)
+    return min(max(i, lower_rung), upper_rung - 1)

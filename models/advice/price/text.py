@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import Recommendation, SettingChoice, Winners
+from models.advice.price.recommendation import CheapestChoices, Recommendation, SettingChoice
 from models.advice.price.search import TriedSetting
 from models.drawing.figures import LABELS
 from models.machine.seconds import cost
@@ -37,15 +37,15 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
         *([doubt] if recommendation.tolerance >= recommendation.truth.size else []),
         *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken_assumptions),
         "",
-        *(_table(recommendation) if recommendation.winners else _no_setting_lines(recommendation)),
+        *(_cheapest_settings_table(recommendation) if recommendation.winners else _no_setting_lines(recommendation)),
         *_default_lines(recommendation),
         *_failure_lines(recommendation.tried),
         *_scene_file_lines(recommendation),
     ]
 
 
-def _table(recommendation: Recommendation) -> list[str]:
-    rows, unit = [TABLE_HEADING.format(counted=recommendation.scene.counted)], recommendation.scene.unit
+def _cheapest_settings_table(recommendation: Recommendation) -> list[str]:
+    rows, unit = [TABLE_HEADING.format(counted=recommendation.scene.work_count_name)], recommendation.scene.unit
     for (engine, kinds), choice in _merged_winners(recommendation.winners).items():
         winner_text = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
@@ -64,10 +64,10 @@ def _table(recommendation: Recommendation) -> list[str]:
     ]
 
 
-def _merged_winners(winners: Winners) -> Winners:
+def _merged_winners(cheapest_choices: CheapestChoices) -> CheapestChoices:
     """The cheapest settings, with one row instead of two where the same setting is the cheapest by both costs."""
-    rows = Winners()
-    for (engine, kind), choice in winners.items():
+    rows = CheapestChoices()
+    for (engine, kind), choice in cheapest_choices.items():
         if (engine, "seconds") in rows and rows[engine, "seconds"] is choice:
             rows[engine, "both"] = rows.pop((engine, "seconds"))
         else:
@@ -107,28 +107,30 @@ def _default_lines(recommendation: Recommendation) -> list[str]:
 
 
 def _cost_of_default_text(
-    recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool
+    recommendation: Recommendation, engine: str, refined_choice: SettingChoice | None, is_extrapolated: bool
 ) -> str:
     """Text on the cost of the refined default method, as a ratio to the engine's cheapest setting and to the cheapest
     of all.
     """
-    if refined is None:
+    if refined_choice is None:
         return "; no step that was tried holds the tolerance over the whole run"
     parts = [
         f"{ratio:.3g} times the {kind} of {whose}"
         for whose, key in ((f"{LABELS[engine]}'s cheapest", engine), ("the cheapest of all", ""))
         for kind in ("calls", "seconds")
         if (best := recommendation.winners.get((key, kind))) is not None
-        and abs((ratio := getattr(refined, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > EQUAL_RATIO_MARGIN
+        and abs((ratio := getattr(refined_choice, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > EQUAL_RATIO_MARGIN
     ]
-    met = f"within the tolerance at {refined.tried.setting.label()}{' (extrapolated)' if extrapolated else ''}"
+    met = (
+        f"within the tolerance at {refined_choice.tried.setting.label()}{' (extrapolated)' if is_extrapolated else ''}"
+    )
     return f"; {met}: {', '.join(parts) or 'nothing is cheaper'}"
 
 
-def _failure_lines(tried: tuple[TriedSetting, ...]) -> list[str]:
+def _failure_lines(tried_settings: tuple[TriedSetting, ...]) -> list[str]:
     """Text lines on settings without a valid result, by method, with the reason of the last one that was tried."""
     known = defaultdict[tuple[str, str], list[TriedSetting]](list)
-    for attempt in tried:
+    for attempt in tried_settings:
         if attempt.status != "ok":
             known[attempt.status, f"{LABELS[attempt.setting.engine]} {attempt.setting.method}"].append(attempt)
     if not known:
@@ -150,7 +152,7 @@ def _scene_file_lines(recommendation: Recommendation) -> list[str]:
     if best is None:
         return []
     head = getattr(recommendation.scene, "where", "in the scene")
-    return ["", f"  {head}", *(f"    {line}" for line in recommendation.scene.lines(best.tried.setting))]
+    return ["", f"  {head}", *(f"    {line}" for line in recommendation.scene.scene_file_lines(best.tried.setting))]
 
 
 def as_dict(recommendation: Recommendation) -> dict[str, Any]:
@@ -185,7 +187,7 @@ def _choice_as_json(choice: SettingChoice) -> dict[str, Any]:
     return {**_tried_as_json(choice.tried), "error": choice.error, "calls": choice.calls, "seconds": choice.seconds}
 
 
-def _tried_as_json(attempt: TriedSetting) -> dict[str, Any]:
-    setting = {name: getattr(attempt.setting, name) for name in ("engine", "method", "value")}
-    outcome = {name: getattr(attempt, name) for name in ("status", "reason", "error", "seconds")}
-    return {**setting, **outcome, "error": attempt.error if attempt.status == "ok" else None}
+def _tried_as_json(tried_setting: TriedSetting) -> dict[str, Any]:
+    setting = {name: getattr(tried_setting.setting, name) for name in ("engine", "method", "value")}
+    outcome = {name: getattr(tried_setting, name) for name in ("status", "reason", "error", "seconds")}
+    return {**setting, **outcome, "error": tried_setting.error if tried_setting.status == "ok" else None}

@@ -17,18 +17,18 @@ from models.core.assumptions import BrokenAssumption, collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 
-AGREEMENT_FACTOR = 4.0
+AGREEMENT_TOLERANCE_DIVISOR = 4.0
 """Divisor of the tolerance that gives the largest difference allowed between the reference and a solver of another
 family.
 """
 ROW_TIME_ROUNDING = 1e-3
 """Distance from an output time, as a share of the output step, up to which a time counts as this output time."""
-MOST_ROWS = 4_000_000
+OUTPUT_ROW_LIMIT = 4_000_000
 """Largest number of output rows of a reference run; more would take gigabytes."""
 
 
 @dataclass(frozen=True)
-class ReferenceTruth:
+class ReferenceSolution:
     """The quantity along the reference run, taken as the truth. uncertainty : in the unit of the quantity; origin :
     text on its origin; rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there
     are none; seconds : of the processor that it took, a guide to how long to wait and no price; broken_assumptions :
@@ -83,14 +83,14 @@ def values_at(priced_run: PricedRun, times: np.ndarray, kink_period: float = 0.0
     return sum((w[:, None] * priced_run.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
-def reference_truth(
+def refined_reference(
     scene: PricedScene,
     tolerance: float,
     duration: float,
     first_rung: int = 0,
     second_method: bool = True,
     executor: Executor | None = None,
-) -> ReferenceTruth:
+) -> ReferenceSolution:
     """The truth of a scene's quantity over ``duration`` (s), as exact as the ladder's divisor of ``tolerance`` asks;
     ``second_method`` : whether another family of methods must confirm it.
 
@@ -99,7 +99,7 @@ def reference_truth(
     InputError where this uncertainty cannot be reached, RunFailed where two families of solvers differ or no run
     ends.
     """
-    ladder = scene.reference()
+    ladder = scene.reference_ladder()
     settled, first_rung, change, seconds, broken = _settled_answer(
         scene, ladder, tolerance, duration, first_rung, executor
     )
@@ -107,26 +107,26 @@ def reference_truth(
     second_setting = scene.second_setting(ladder.setting(first_rung)) if second_method else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
     finer = ladder.change_text or finer
-    truth_of_halving = ReferenceTruth(
+    truth_of_halving = ReferenceSolution(
         settled, change, f"{change_text}; {finer}", first_rung, scene.kink_period, seconds, tuple(broken.values())
     )
     if second_setting is None:
         return truth_of_halving
     differs = truth_of_halving.error(scene.priced_run(scene.solve(second_setting, duration)))
     both_settings = f"{change_text} and {_setting_text(second_setting)}"
-    if differs > tolerance / AGREEMENT_FACTOR:
+    if differs > tolerance / AGREEMENT_TOLERANCE_DIVISOR:
         raise RunFailed(
             "reference", f"{both_settings} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged"
         )
     return replace(truth_of_halving, uncertainty=max(change, differs), origin=f"{both_settings}, which differ by")
 
 
-def _change_by_halving(scene: PricedScene, coarse_run: PricedRun, fine_run: PricedRun) -> float:
+def _change_by_halving(scene: PricedScene, coarser_run: PricedRun, finer_run: PricedRun) -> float:
     """Largest difference between two runs, the second with half the step, at the output rows of both; the coarser run
     is interpolated between its rows.
     """
-    run_pairs = ((fine_run, coarse_run), (coarse_run, fine_run))
-    return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other_run) for run, other_run in run_pairs)
+    run_pairs = ((finer_run, coarser_run), (coarser_run, finer_run))
+    return max(ReferenceSolution(run, 0.0, "", 0, scene.kink_period).error(other_run) for run, other_run in run_pairs)
 
 
 def _setting_text(setting: Setting) -> str:
@@ -168,7 +168,7 @@ def _settled_answer(
     """
     coarser_run: PricedRun | None = None
     change, failure = float("inf"), ""
-    rungs = [i for i in range(first_rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
+    rungs = [i for i in range(first_rung, len(ladder.values)) if duration / ladder.values[i] <= OUTPUT_ROW_LIMIT]
     job = partial(_reference_on_rung, scene, duration)
     together = [ladder.setting(i) for i in rungs[:2]] if executor is not None else []
     ready = dict(zip(rungs, block_results(job, together, executor), strict=False))

@@ -32,16 +32,18 @@ def activity_by_element(full_scene: FullScene) -> dict[str, float]:
     P, A, motion = stationary_covariance(system).P[:states, :states], system.A[:states, :states], Kinematics(vehicle)
     noise, watts = np.hstack([b[n : 2 * n] for b in system.B]), dict[str, float]()
 
-    def elastic(name: str, k: float, c: float, row: np.ndarray, road: np.ndarray | float = 0.0) -> None:
-        """Add the watts of a spring and damper whose deflection is ``row`` of the coordinates less the height of the
-        ``road``.
+    def elastic(
+        element_name: str, k: float, c: float, deflection_row: np.ndarray, road_height_row: np.ndarray | float = 0.0
+    ) -> None:
+        """Add the watts of a spring and damper whose deflection is ``deflection_row`` of the coordinates less the
+        height of the ``road_height_row``.
         """
-        u = np.concatenate([row, np.zeros(states - n)]) - road
+        u = np.concatenate([deflection_row, np.zeros(states - n)]) - road_height_row
         s_u, s_v = _standard_deviation(u, P), _standard_deviation(u @ A, P)
         if k:
-            watts[f"spring {name}"] = 2 / np.pi * k * s_u * s_v
+            watts[f"spring {element_name}"] = 2 / np.pi * k * s_u * s_v
         if c:
-            watts[f"damper {name}"] = c * s_v**2
+            watts[f"damper {element_name}"] = c * s_v**2
 
     for spring in vehicle.springs:
         extension = motion.shift(spring.second_body, spring.second_point) - motion.shift(
@@ -70,6 +72,6 @@ def activity_by_element(full_scene: FullScene) -> dict[str, float]:
     return watts
 
 
-def _standard_deviation(row: np.ndarray, P: np.ndarray) -> float:
-    """Standard deviation of a linear combination ``row`` of the states with covariance P."""
-    return float(np.sqrt(max(row @ P @ row, 0.0)))
+def _standard_deviation(state_row: np.ndarray, P: np.ndarray) -> float:
+    """Standard deviation of a linear combination ``state_row`` of the states with covariance P."""
+    return float(np.sqrt(max(state_row @ P @ state_row, 0.0)))

@@ -39,10 +39,10 @@ def cached_in_object(method: Method) -> Method:
     """Decorator of a method that stores its results in the object, by the arguments of the call."""
 
     @wraps(method)
-    def answer(candidates: "Candidates", *asked: Any) -> Any:
-        key = method.__name__, *asked
+    def answer(candidates: "Candidates", *arguments: Any) -> Any:
+        key = method.__name__, *arguments
         if key not in candidates.cached_results:
-            candidates.cached_results[key] = method(candidates, *asked)
+            candidates.cached_results[key] = method(candidates, *arguments)
         return candidates.cached_results[key]
 
     return cast(Method, answer)
@@ -79,18 +79,20 @@ class Candidates:
         self.neighbourhood = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
-    def from_scene(cls, ride: RideScene) -> Self:
+    def from_scene(cls, ride_scene: RideScene) -> Self:
         """The candidates of a ride scene, for its speeds, quantities and tolerance."""
-        assert ride.speeds is not None and ride.tolerance is not None
-        return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
+        assert ride_scene.speeds is not None and ride_scene.tolerance is not None
+        return cls(
+            ReducedScene.complete(ride_scene), ride_scene.speeds.all(), ride_scene.quantities, ride_scene.tolerance
+        )
 
-    def _row_and_weighting(self, quantity: str) -> tuple[int, str]:
+    def _row_and_weighting(self, quantity_name: str) -> tuple[int, str]:
         """For a quantity, the row of the vehicle's output and the name of its weighting filter, "" if it has none."""
         weighted = {
             f"{name} {weighting_name}": (name, weighting_name)
             for name, weighting_name in self.scene.ride_scene.weighting.items()
         }
-        name, weighting_name = weighted.get(quantity, (quantity, ""))
+        name, weighting_name = weighted.get(quantity_name, (quantity_name, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), weighting_name
 
     @property
@@ -125,8 +127,8 @@ class Candidates:
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
 
     @cached_in_object
-    def _screen(self, full_scene: FullScene, reduced_scene: EffectSet) -> Screen | None:
-        reduced = self.system(full_scene, reduced_scene)
+    def _screen(self, full_scene: FullScene, omitted_effects: EffectSet) -> Screen | None:
+        reduced = self.system(full_scene, omitted_effects)
         self.solved_equations += 1 + len(self.rows)
         try:
             return None if reduced is None else Screen(reduced, self.rows)
@@ -205,32 +207,38 @@ class Candidates:
         )
         return agrees_with_motions and bool((abs(certificate_variances / variance - 1.0) <= IDENTITY_ERROR).all())
 
-    def _predicted_variances(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _predicted_variances(
+        self, full_scene: FullScene, omitted_effects: EffectSet, reduced_system: Reduced
+    ) -> np.ndarray:
         screen = self.screen(full_scene, omitted_effects)
-        return np.full(len(self.rows), inf) if screen is None else screen.predicted_variances(reduced)
+        return np.full(len(self.rows), inf) if screen is None else screen.predicted_variances(reduced_system)
 
-    def _exact_variances(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _exact_variances(
+        self, full_scene: FullScene, omitted_effects: EffectSet, reduced_system: Reduced
+    ) -> np.ndarray:
         self.solved_equations += 1
-        return exact_variances(reduced, self.rows)
+        return exact_variances(reduced_system, self.rows)
 
-    def _variances_by_modes(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _variances_by_modes(
+        self, full_scene: FullScene, omitted_effects: EffectSet, reduced_system: Reduced
+    ) -> np.ndarray:
         self.solved_equations += 1
-        variances = variances_from_modes(reduced, self.rows)
-        return exact_variances(reduced, self.rows) if variances is None else variances
+        variances = variances_from_modes(reduced_system, self.rows)
+        return exact_variances(reduced_system, self.rows) if variances is None else variances
 
     def _changes_at_speed(
         self,
         full_scene: FullScene,
         omitted_effects: EffectSet,
-        variances: Callable[[FullScene, EffectSet, Reduced], np.ndarray],
+        variance_function: Callable[[FullScene, EffectSet, Reduced], np.ndarray],
     ) -> np.ndarray:
         """Relative changes (quantities,) of standard deviations at a speed, with the variances of the reduced system by
-        the function ``variances``; inf where no system remains, or an unstable one.
+        the function ``variance_function``; inf where no system remains, or an unstable one.
         """
         reduced, full = self.system(full_scene, omitted_effects), self.full[self.full_scenes.index(full_scene)]
         left = np.full(len(full), inf)
         with suppress(InputError):  # unstable
-            left = left if reduced is None else variances(full_scene, omitted_effects, reduced)
+            left = left if reduced is None else variance_function(full_scene, omitted_effects, reduced)
         return np.asarray(np.sqrt(left / full) - 1.0)
 
     @cached_in_object

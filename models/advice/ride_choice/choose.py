@@ -260,14 +260,14 @@ class Chooser(Candidates):
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, first_sets: list[EffectSet], refused_steps: set[EffectSet]) -> list[EffectSet]:
-        """Growing sets of omitted effects: ``first_sets``, continued one step at a time as far as predictions allow.
+    def path(self, sets_so_far: list[EffectSet], refused_additions: set[EffectSet]) -> list[EffectSet]:
+        """Growing sets of omitted effects: ``sets_so_far``, continued one step at a time as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
-        path = list(first_sets)
-        while step := self._best_step(path[-1], refused_steps, self._calls_saved) or self._best_step(
-            path[-1], refused_steps, self._work_saved
+        path = list(sets_so_far)
+        while step := self._best_step(path[-1], refused_additions, self._calls_saved) or self._best_step(
+            path[-1], refused_additions, self._work_saved
         ):
             path.append(path[-1] | step)
         return path
@@ -299,7 +299,9 @@ class Chooser(Candidates):
         ]
         return self.sets_to_search + [step | damping for step in white]
 
-    def _best_step(self, omitted_effects: EffectSet, refused_steps: set[EffectSet], saving: SavingOfStep) -> EffectSet:
+    def _best_step(
+        self, omitted_effects: EffectSet, refused_additions: set[EffectSet], saving_of_addition: SavingOfStep
+    ) -> EffectSet:
         """The set of effects that saves the most for what it adds to the predicted error; empty if none keeps the
         tolerance.
         """
@@ -308,12 +310,12 @@ class Chooser(Candidates):
             further = omitted_effects | step
             if (
                 further == omitted_effects
-                or step - omitted_effects in refused_steps
-                or step in refused_steps
+                or step - omitted_effects in refused_additions
+                or step in refused_additions
                 or refusal_reason(further)
             ):
                 continue
-            saves = saving(omitted_effects, further)
+            saves = saving_of_addition(omitted_effects, further)
             if saves <= NEGLIGIBLE_SHARE * best_score:
                 continue  # whatever error it adds
             share = self.share(further)

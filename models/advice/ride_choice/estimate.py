@@ -34,14 +34,14 @@ class Estimate:
     seconds: float
 
 
-def estimate(ride: RideScene) -> Estimate:
+def estimate(ride_scene: RideScene) -> Estimate:
     """Estimate of a choice of effects for a linear ride scene at constant speeds."""
-    assert ride.speeds is not None
-    with scene_errors(ride):
-        scene = ReducedScene.complete(ride)
+    assert ride_scene.speeds is not None
+    with scene_errors(ride_scene):
+        scene = ReducedScene.complete(ride_scene)
         effects, speeds, states = (
             len(effects_of(scene)),
-            len(ride.speeds.all()),
+            len(ride_scene.speeds.all()),
             _count_of_states(scene, scene.excitation()),
         )
     screened = min(speeds, SCREENED_SPEEDS)
@@ -50,9 +50,9 @@ def estimate(ride: RideScene) -> Estimate:
     return Estimate(effects, speeds, states, problems * _eigenvalue_problem())
 
 
-def _count_of_states(scene: ReducedScene, road: Excitation) -> int:
+def _count_of_states(scene: ReducedScene, excitation: Excitation) -> int:
     """Number of states of the vehicle and of the road's filters."""
-    return 2 * len(scene.vehicle.coordinates()) + len(road.heights) * len(road.F)
+    return 2 * len(scene.vehicle.coordinates()) + len(excitation.heights) * len(excitation.F)
 
 
 def _eigenvalue_problem() -> float:

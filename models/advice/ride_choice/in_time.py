@@ -95,13 +95,13 @@ class CopiesInTime:
         return {effect.name: effect.says for effect in self.effects}
 
     @property
-    def absent_names(self) -> tuple[str, ...]:
+    def absent_effect_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene could have but does not name."""
         return absent_effects(self.scene.ride_scene)
 
-    def with_effect(self, name: str) -> "CopiesInTime":
+    def with_effect(self, effect_name: str) -> "CopiesInTime":
         """The copies with an absent effect added at its usual values; InputError where the effect cannot be added."""
-        scene = ReducedScene.complete(with_effects(self.scene.ride_scene, name))
+        scene = ReducedScene.complete(with_effects(self.scene.ride_scene, effect_name))
         _check(scene)
         return replace(self, scene=scene)
 
@@ -110,9 +110,9 @@ class CopiesInTime:
         """Number of time steps of all copies at all speeds."""
         return self.samples.copies * sum(pace.steps for pace in self.steps_at_speeds) // self.step_factor
 
-    def without(self, names: Iterable[str]) -> "CopiesInTime":
+    def without(self, effect_names: Iterable[str]) -> "CopiesInTime":
         """The copies without these effects; InputError where they may not be left out."""
-        left_out = self.left_out | set(names)
+        left_out = self.left_out | set(effect_names)
         chosen = [effect for effect in self.effects if effect.name in left_out]
         why = refusal_reason(chosen)
         if why:
@@ -124,9 +124,9 @@ class CopiesInTime:
         """The copies with steps longer by the factor ``step_factor``."""
         return replace(self, step_factor=self.step_factor * step_factor)
 
-    def with_fewer_copies(self, steps: int) -> "CopiesInTime":
-        """Fewer copies, which take about ``steps`` time steps in all, but enough copies for a standard error."""
-        copies = max(FEWEST_COPIES, -(-self.samples.copies * steps // self.steps))
+    def with_fewer_copies(self, step_count: int) -> "CopiesInTime":
+        """Fewer copies, which take about ``step_count`` time steps in all, but enough copies for a standard error."""
+        copies = max(FEWEST_COPIES, -(-self.samples.copies * step_count // self.steps))
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
 
     @cached_property
@@ -185,13 +185,15 @@ def _check(scene: ReducedScene) -> None:
     check_rates(scene.vehicle, scene.excitation(), ride.file)
 
 
-def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
-    """Time steps of the copies at a speed (m/s), each ``lasting`` (s) after settling."""
+def _copy_steps(scene: ReducedScene, speed: float, counted_duration: float) -> CopySteps:
+    """Time steps of the copies at a speed (m/s), each ``counted_duration`` (s) after settling."""
     excitation = scene.excitation()
     linear = statistically_linear(scene.vehicle.with_tyres(pushes_only=False), excitation, speed)
     half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half_step
     unit = 2.0 * half * STEP_MULTIPLE
-    settling, counted = (STEP_MULTIPLE * int(np.ceil(time / unit)) for time in (settling_time(linear.vehicle), lasting))
+    settling, counted = (
+        STEP_MULTIPLE * int(np.ceil(time / unit)) for time in (settling_time(linear.vehicle), counted_duration)
+    )
     return CopySteps(speed, half, settling, counted, linear.springs)
 
 
@@ -228,19 +230,19 @@ def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]
 
 
 def _linearised_spring(
-    spring: SpringDamper, laws: frozenset[str], motion_of_spring: dict[str, BentSpring]
+    spring: SpringDamper, nonlinear_laws: frozenset[str], motion_of_spring: dict[str, BentSpring]
 ) -> SpringDamper:
-    """The spring with gains of statistical linearisation in place of the nonlinear ``laws``."""
+    """The spring with gains of statistical linearisation in place of the nonlinear ``nonlinear_laws``."""
     motion = motion_of_spring.get(spring.name)
     if motion is None:
         return spring
-    if "travel_force" in laws and spring.travel_force:
+    if "travel_force" in nonlinear_laws and spring.travel_force:
         gain = mean_force_and_slope(spring.travel_force, motion.travel, motion.deviation)[1]
         spring = replace(spring, stiffness=spring.stiffness + gain, travel_force=None)
-    if "rate_force" in laws and spring.rate_force:
+    if "rate_force" in nonlinear_laws and spring.rate_force:
         gain = mean_force_and_slope(spring.rate_force, 0.0, motion.rate)[1]
         spring = replace(spring, damping=spring.damping + gain, rate_force=None)
-    if "friction" in laws and spring.friction:
+    if "friction" in nonlinear_laws and spring.friction:
         gain = mean_friction_slope(spring.friction, spring.friction_rate, motion.rate)
         spring = replace(spring, damping=spring.damping + gain, friction=0.0)
     return spring
@@ -249,16 +251,16 @@ def _linearised_spring(
 _stored_roads: dict[tuple[object, ...], np.ndarray] = {}
 
 
-def _road_heights(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
+def _road_heights(path: RoadPath, step_count: int, copy_samples: Samples) -> np.ndarray:
     """Heights and rates (2 steps + 1, 2 w, copies) of the road at half steps; those that were requested last are
     stored.
     """
     road = path.excitation
     arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
-    of_run = path.speed, path.half_step, steps, samples.copies, samples.seed
+    of_run = path.speed, path.half_step, step_count, copy_samples.copies, copy_samples.seed
     key = (*arrays, road.lengths, road.independent, *of_run)
     if key not in _stored_roads:
         while sum(roads.nbytes for roads in _stored_roads.values()) > ROADS_BYTES:
             del _stored_roads[next(iter(_stored_roads))]
-        _stored_roads[key] = next(path.blocks(steps, samples.copies, samples.seed))
+        _stored_roads[key] = next(path.blocks(step_count, copy_samples.copies, copy_samples.seed))
     return _stored_roads[key]

@@ -92,15 +92,15 @@ class March:
             total += self._spectral_densities(gains, waves, count[same_parity], is_independent)
         return np.sqrt(weights @ (total * abs(self._weighting_factors(omega).T) ** 2) / np.pi)
 
-    def _gains(self, half: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
+    def _gains(self, half_step_phases: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
         """Gains (w, q, m) from the states of each axle's road filter to the quantities, for waves whose phase turns by
-        ``half`` in half a step, and for waves that turn by the opposite and look the same at the steps.
+        ``half_step_phases`` in half a step, and for waves that turn by the opposite and look the same at the steps.
 
         White noise enters as its mean over a step, computed from the filters' states at the step's begin, middle and
         end.
         """
         rates, read_modes, forced = self.motions
-        road, z, end = self.reduced.excitation, step * rates, half**2
+        road, z, end = self.reduced.excitation, step * rates, half_step_phases**2
         axles, (m, k) = len(road.heights), road.G.shape
         begin, middle = 1 + z + z**2 / 2 + z**3 / 4, 4 + 2 * z + z**2 / 2
         motions = step / 6 / (end[:, None] - (1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))))
@@ -108,42 +108,46 @@ class March:
             (read_modes.T[:, :, None] * forcing[:, None, :]).reshape(len(rates), -1)
             for forcing in np.split(forced, [axles * m], axis=1)
         )
-        shape = len(half), len(read_modes), axles, m
+        shape = len(half_step_phases), len(read_modes), axles, m
         outer = motions @ (begin[:, None] * by_road) + end[:, None] * (motions @ by_road)
         outer += self.output_matrix[:, self.vehicle_state_count :].reshape(-1)
         inner = motions @ (middle[:, None] * by_road)
         noisy = by_noise.any()
-        noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, k) if noisy else None
-        for phase_factor in (half, -half):
+        noise = (
+            (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half_step_phases), -1, k)
+            if noisy
+            else None
+        )
+        for phase_factor in (half_step_phases, -half_step_phases):
             gain = (outer + phase_factor[:, None] * inner).reshape(shape)
             if noise is not None:
                 gain += (noise @ self._mean_noise(phase_factor, step)).reshape(shape)
             yield [gain[:, :, i] for i in range(axles)]
 
-    def _mean_noise(self, half: np.ndarray, step: float) -> np.ndarray:
+    def _mean_noise(self, half_step_phases: np.ndarray, step: float) -> np.ndarray:
         """Gains (w, k, m) from a filter's states at the begin of a step to the mean noise over this step."""
-        road, phase_factor = self.reduced.excitation, half[:, None, None]
+        road, phase_factor = self.reduced.excitation, half_step_phases[:, None, None]
         slope = (phase_factor**2 - 1) / step * np.eye(len(road.F)) - self.speed * road.F * (
             (1 + 4 * phase_factor + phase_factor**2) / 6
         )
         return np.asarray(np.linalg.pinv(self.speed**0.5 * road.G) @ slope)
 
     def _spectral_densities(
-        self, gains: list[np.ndarray], waves: np.ndarray, alias_weights: np.ndarray, is_independent: np.ndarray
+        self, gains: list[np.ndarray], aliased_waves: np.ndarray, alias_weights: np.ndarray, is_independent: np.ndarray
     ) -> np.ndarray:
-        """Spectral densities (w, q) of the quantities, summed over all ``waves`` (a, w) that are aliased to the same
-        frequency, each weighted with its ``alias_weights`` (a, 1).
+        """Spectral densities (w, q) of the quantities, summed over all ``aliased_waves`` (a, w) that are aliased to the
+        same frequency, each weighted with its ``alias_weights`` (a, 1).
         """
         road, speeds, total = self.reduced.excitation, np.array([self.speed]), 0.0
         late, by_noises = {}, self.filters.by_noises(gains)
         for pair in self.filters.pairs:
-            density = alias_weights * pair.density(speeds, waves.ravel()).reshape(waves.shape)
+            density = alias_weights * pair.density(speeds, aliased_waves.ravel()).reshape(aliased_waves.shape)
             axle_factor, shared = pair_factors(by_noises, pair, road.independent)
             total = total + (density.sum(axis=0)[:, None] * axle_factor).real
             for (i, j), met in shared.items():
                 length = road.lengths[i] - road.lengths[j]
                 if length not in late:
-                    late[length] = np.exp(-1j * waves * (length / self.speed)) * ~is_independent
+                    late[length] = np.exp(-1j * aliased_waves * (length / self.speed)) * ~is_independent
                 total = total + ((density * late[length]).sum(axis=0)[:, None] * met).real
         return np.asarray(total)
 
@@ -182,14 +186,14 @@ class RunInSteps(Protocol):
         """Standard deviations (q,) of the quantities, as sampled by a run with steps of ``step`` (s)."""
 
 
-def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], tolerance: float) -> float:
+def longest_step(marches: Sequence[RunInSteps], exact_deviations: list[np.ndarray], tolerance: float) -> float:
     """Longest step (s) with which runs at every speed keep all quantities within a relative tolerance of their
-    ``exact`` standard deviations.
+    ``exact_deviations`` standard deviations.
 
-    exact : standard deviations of the full scene, (q,) for each march. The result is 0 where the shortest step that is
-    tried breaks the tolerance.
+    exact_deviations : standard deviations of the full scene, (q,) for each march. The result is 0 where the shortest
+    step that is tried breaks the tolerance.
     """
-    runs = list(zip(marches, exact, strict=True))
+    runs = list(zip(marches, exact_deviations, strict=True))
 
     def share(step: float) -> float:
         """Logarithm of the ratio of the largest error to the tolerance, or that of the first march which breaks it."""
@@ -215,13 +219,13 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
 
 
 def _longest_step_below(
-    steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]
+    step_limits: tuple[float, float], error_ratios: tuple[float, float], error_ratio: Callable[[float], float]
 ) -> float:
     """Longest of ``PARTS_BETWEEN_STEPS`` logarithmically spaced steps (s) between two that keeps the tolerance.
 
     An error grows as a power of the step, so that linear interpolation of logarithms predicts where to look next.
     """
-    (low, high), (share_below, share_above) = (0, PARTS_BETWEEN_STEPS), shares
+    (low, high), (share_below, share_above) = (0, PARTS_BETWEEN_STEPS), error_ratios
     while high - low > 1:
         guess = (
             low + (high - low) * -share_below / (share_above - share_below)
@@ -229,11 +233,11 @@ def _longest_step_below(
             else (low + high) / 2
         )
         middle = int(np.clip(np.round(guess), low + 1, high - 1))
-        value = share(steps[0] * (steps[1] / steps[0]) ** (middle / PARTS_BETWEEN_STEPS))
+        value = error_ratio(step_limits[0] * (step_limits[1] / step_limits[0]) ** (middle / PARTS_BETWEEN_STEPS))
         (low, share_below), (high, share_above) = (
             ((middle, value), (high, share_above)) if value <= 0.0 else ((low, share_below), (middle, value))
         )
-    return float(steps[0] * (steps[1] / steps[0]) ** (low / PARTS_BETWEEN_STEPS))
+    return float(step_limits[0] * (step_limits[1] / step_limits[0]) ** (low / PARTS_BETWEEN_STEPS))
 
 
 @dataclass(frozen=True)

@@ -42,15 +42,15 @@ class StepComparison:
     calls: float
 
 
-def comparison_of_steps(march: March, step: float, copies: int = NUMBER_OF_COPIES) -> StepComparison:
+def comparison_of_steps(march: March, step: float, copy_count: int = NUMBER_OF_COPIES) -> StepComparison:
     """Ratio of standard deviations of a run with steps of ``step`` (s) to those of a run with shorter steps."""
     steps = max(int(min(LONGEST_RUN_SECONDS / step, LONGEST_RUN_STEPS)), 10)
-    road = _filter_states(march, step / STEP_REFINEMENT, steps * STEP_REFINEMENT, copies)
+    road = _filter_states(march, step / STEP_REFINEMENT, steps * STEP_REFINEMENT, copy_count)
     coarse, calls = _mean_squares(march, road[::STEP_REFINEMENT], step)
     fine, _ = _mean_squares(march, road, step / STEP_REFINEMENT)
     mean = fine.mean(axis=0)
     squared = coarse.mean(axis=0) / mean
-    error = (coarse - squared * fine).std(axis=0, ddof=1) / (np.sqrt(copies) * mean * 2 * np.sqrt(squared))
+    error = (coarse - squared * fine).std(axis=0, ddof=1) / (np.sqrt(copy_count) * mean * 2 * np.sqrt(squared))
     return StepComparison(np.sqrt(squared), error, calls / (steps * step))
 
 
@@ -69,31 +69,31 @@ def confirms_step(march: March, step: float) -> bool:
     )
 
 
-def _filter_states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
+def _filter_states(march: March, step: float, step_count: int, copy_count: int) -> np.ndarray:
     """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps of ``step`` (s)."""
     road = march.reduced.excitation
     axles, m = len(road.heights), len(road.F)
     axle_selectors = tuple(np.kron(np.eye(axles)[:, [i]], np.eye(m)) for i in range(axles))
     path = RoadPath(replace(road, heights=axle_selectors), march.speed, step / 2)
-    return next(path.blocks(steps, copies, SEED))[:, : axles * m]
+    return next(path.blocks(step_count, copy_count, SEED))[:, : axles * m]
 
 
-def _mean_squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
+def _mean_squares(march: March, road_states: np.ndarray, step: float) -> tuple[np.ndarray, int]:
     """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of
     right-hand side calls.
 
     A step of a linear system is a matrix; it is found by a step from the unit matrix.
     """
-    n, steps, (_, m, copies) = march.vehicle_state_count, len(road) // 2, road.shape
+    n, steps, (_, m, copies) = march.vehicle_state_count, len(road_states) // 2, road_states.shape
     move, *weights = _step_matrices(march.reduced.system.A[:n, :n], step)
     by_road = [weight @ march.reduced.system.A[:n, n : n + m] for weight in weights]
     x, first, sums = (
-        _initial_states(march, road[0]),
+        _initial_states(march, road_states[0]),
         int(np.ceil(SETTLING_SHARE * steps)),
         np.zeros((len(march.rows), copies)),
     )
     for begin in range(0, steps, STEPS_PER_BLOCK):
-        road_of_block = road[2 * begin : 2 * min(begin + STEPS_PER_BLOCK, steps) + 1]
+        road_of_block = road_states[2 * begin : 2 * min(begin + STEPS_PER_BLOCK, steps) + 1]
         forcing = (
             by_road[0] @ road_of_block[:-2:2] + by_road[1] @ road_of_block[1::2] + by_road[2] @ road_of_block[2::2]
         )
@@ -119,7 +119,7 @@ def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
     return np.split(runge_kutta_step(lambda time, x: A @ x + acting[time], 0.0, columns, step), 4, axis=1)
 
 
-def _initial_states(march: March, road: np.ndarray) -> np.ndarray:
+def _initial_states(march: March, road_states: np.ndarray) -> np.ndarray:
     """Initial states (n, copies) of the vehicle, drawn from its stationary ride for given states (m, copies) of the
     road filters.
 
@@ -129,19 +129,19 @@ def _initial_states(march: March, road: np.ndarray) -> np.ndarray:
     P = solve_continuous_lyapunov(system.A, -noise_intensity_of_system(system))[:states, :states]
     regression = P[:n, n:] @ np.linalg.pinv(P[n:, n:], hermitian=True)
     values, vectors = np.linalg.eigh(P[:n, :n] - regression @ P[n:, :n])
-    chance = np.random.default_rng(SEED).standard_normal((n, road.shape[1]))
-    return regression @ road + vectors * np.sqrt(values.clip(0.0)) @ chance
+    chance = np.random.default_rng(SEED).standard_normal((n, road_states.shape[1]))
+    return regression @ road_states + vectors * np.sqrt(values.clip(0.0)) @ chance
 
 
-def _mean_noise_force(march: March, road: np.ndarray, step: float) -> np.ndarray:
+def _mean_noise_force(march: March, road_states: np.ndarray, step: float) -> np.ndarray:
     """Mean rate of the states (steps, n, copies) due to white noise over each step, 0 where no noise reaches the
     vehicle.
     """
     roads, n = march.reduced.excitation, march.vehicle_state_count
     into = np.hstack([b[:n] for b in march.reduced.system.B])
     if not into.any():
-        return np.zeros((len(road) // 2, n, 1))
-    begin, middle, end = road[:-2:2], road[1::2], road[2::2]
+        return np.zeros((len(road_states) // 2, n, 1))
+    begin, middle, end = road_states[:-2:2], road_states[1::2], road_states[2::2]
     path, back = (
         np.kron(np.eye(len(roads.heights)), filter_matrix)
         for filter_matrix in (march.speed * roads.F, np.linalg.pinv(march.speed**0.5 * roads.G))

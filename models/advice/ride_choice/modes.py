@@ -77,75 +77,75 @@ def modes_of(A: np.ndarray) -> Modes | None:
         return None
 
 
-def modes_of_cascade(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
+def modes_of_cascade(driver_modes: Modes | None, coupling: np.ndarray, system_modes: Modes | None) -> Modes | None:
     """Modes of the coupled system u' = A_u u, x' = A_x x + coupling u with state (u, x); None where an eigenvalue
     belongs to both.
     """
-    if driver is None or system is None:
+    if driver_modes is None or system_modes is None:
         return None
-    rate_differences = driver.rates - system.rates[:, None]
+    rate_differences = driver_modes.rates - system_modes.rates[:, None]
     if not rate_differences.all():
         return None
-    coupling_in_modes = (system.W @ coupling @ driver.V) / rate_differences
-    rates = np.concatenate([driver.rates, system.rates])
+    coupling_in_modes = (system_modes.W @ coupling @ driver_modes.V) / rate_differences
+    rates = np.concatenate([driver_modes.rates, system_modes.rates])
     return Modes(
         rates,
-        _block_triangular(driver.V, system.V @ coupling_in_modes, system.V),
-        _block_triangular(driver.W, -coupling_in_modes @ driver.W, system.W),
+        _block_triangular(driver_modes.V, system_modes.V @ coupling_in_modes, system_modes.V),
+        _block_triangular(driver_modes.W, -coupling_in_modes @ driver_modes.W, system_modes.W),
     )
 
 
-def _block_triangular(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarray:
+def _block_triangular(upper_block: np.ndarray, corner_block: np.ndarray, lower_block: np.ndarray) -> np.ndarray:
     """Block matrix [[upper, 0], [corner, lower]]."""
-    n = len(upper)
-    full = np.zeros((n + len(lower),) * 2, complex)
-    full[:n, :n], full[n:, :n], full[n:, n:] = upper, corner, lower
+    n = len(upper_block)
+    full = np.zeros((n + len(lower_block),) * 2, complex)
+    full[:n, :n], full[n:, :n], full[n:, n:] = upper_block, corner_block, lower_block
     return full
 
 
-def modes_with_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
+def modes_with_road(A: np.ndarray, vehicle_modes: Modes | None, F: np.ndarray, axle_count: int) -> Modes | None:
     """Modes of a vehicle together with the road filters F (m, m) of its axles, for the state (x, f) and its matrix A;
     None where they are unreliable.
     """
-    n, road = len(A) - axles * len(F), _modes_of_filters(F.tobytes(), len(F), axles)
-    if road is None or vehicle is None:
+    n, road = len(A) - axle_count * len(F), _modes_of_filters(F.tobytes(), len(F), axle_count)
+    if road is None or vehicle_modes is None:
         return None
-    coupled_modes = modes_of_cascade(road, A[:n, n:], vehicle)
+    coupled_modes = modes_of_cascade(road, A[:n, n:], vehicle_modes)
     if coupled_modes is None:
         return None
     order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
     return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).reliable_for(A)
 
 
-def modes_with_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
+def modes_with_weightings(A: np.ndarray, system_modes: Modes | None, weighting_names: tuple[str, ...]) -> Modes | None:
     """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A; None
     where they are unreliable.
     """
-    filters = _modes_of_weightings(names)
-    if system is None or filters is None:
+    filters = _modes_of_weightings(weighting_names)
+    if system_modes is None or filters is None:
         return None
-    n = len(system.rates)
-    coupled_modes = modes_of_cascade(system, A[n:, :n], filters)
+    n = len(system_modes.rates)
+    coupled_modes = modes_of_cascade(system_modes, A[n:, :n], filters)
     return None if coupled_modes is None else coupled_modes.reliable_for(A)
 
 
 @lru_cache(maxsize=256)
-def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
+def _modes_of_filters(F: bytes, filter_size: int, axle_count: int) -> Modes | None:
     """Modes of the road filters of all axles; None where they are unreliable."""
     modes_of_filter = modes_of(np.frombuffer(F).reshape(filter_size, filter_size))
     if modes_of_filter is None:
         return None
     return Modes(
-        np.tile(modes_of_filter.rates, axles),
-        block_diag(*[modes_of_filter.V] * axles),
-        block_diag(*[modes_of_filter.W] * axles),
+        np.tile(modes_of_filter.rates, axle_count),
+        block_diag(*[modes_of_filter.V] * axle_count),
+        block_diag(*[modes_of_filter.W] * axle_count),
     )
 
 
 @lru_cache(maxsize=64)
-def _modes_of_weightings(names: tuple[str, ...]) -> Modes | None:
+def _modes_of_weightings(weighting_names: tuple[str, ...]) -> Modes | None:
     """Modes of the weighting filters of these names; None where they are unreliable."""
-    parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in names]
+    parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in weighting_names]
     filters = [filter_modes for filter_modes in parts if filter_modes]
     if len(filters) < len(parts):
         return None
@@ -153,13 +153,13 @@ def _modes_of_weightings(names: tuple[str, ...]) -> Modes | None:
     return Modes(np.concatenate([filter_modes.rates for filter_modes in filters]), V, W)
 
 
-def stable_step(values: np.ndarray) -> float:
+def stable_step(eigenvalues: np.ndarray) -> float:
     """Largest stable step (s) of the classical Runge-Kutta method: |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step
     times every eigenvalue (1/s).
     """
-    values = values[(abs(values) > 0) & (values.imag >= 0)]  # those of a pair allow the same step
-    z = values[:, None] / abs(values)[:, None] * STEP_TIMES_EIGENVALUE
+    eigenvalues = eigenvalues[(abs(eigenvalues) > 0) & (eigenvalues.imag >= 0)]  # those of a pair allow the same step
+    z = eigenvalues[:, None] / abs(eigenvalues)[:, None] * STEP_TIMES_EIGENVALUE
     grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
     first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(STEP_TIMES_EIGENVALUE))
     reach = np.where(first > 0, STEP_TIMES_EIGENVALUE[np.maximum(first, 1) - 1], 0.0)
-    return float((reach / abs(values)).min(initial=np.inf))
+    return float((reach / abs(eigenvalues)).min(initial=np.inf))

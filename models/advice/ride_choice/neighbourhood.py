@@ -82,14 +82,16 @@ class Neighbourhood:
         self._shifts: dict[Hashable, Shifts] = {}
         self.full_variances, self.spectra_at_slope_speeds = self._variances(scene, self.vehicles), self._slopes(scene)
 
-    def changes(self, reduced_scene: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
-        """Relative changes (v, q) of standard deviations from the full to the reduced scene; ``factors`` : of
+    def changes(
+        self, reduced_scene: ReducedScene, parameter_factors: Mapping[Parameter, float] | None = None
+    ) -> np.ndarray:
+        """Relative changes (v, q) of standard deviations from the full to the reduced scene; ``parameter_factors`` : of
         parameters that are off in both scenes.
         """
-        if not factors:
+        if not parameter_factors:
             return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.full_variances) - 1.0)
         scene, reduced_scene = (
-            replace(any_scene, vehicle=scaled_vehicle(any_scene.vehicle, factors))
+            replace(any_scene, vehicle=scaled_vehicle(any_scene.vehicle, parameter_factors))
             for any_scene in (self.scene, reduced_scene)
         )
         vehicles = Vehicles(scene.vehicle, float(self.speeds[0]), self.vehicles.roads)

@@ -33,17 +33,17 @@ def uncertain_parameters(vehicle: SpatialVehicle) -> list[Parameter]:
     ]
 
 
-def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
+def scaled_vehicle(vehicle: SpatialVehicle, parameter_factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with its parameters multiplied by these factors; factors of parameters that it does not have are
     ignored.
     """
 
-    def scaled_part(group_name: str, original_part: Any) -> Any:
-        known = [key for key in PARAMETERS_OF_PARTS[group_name] if (group_name, original_part.name, key) in factors]
+    def scaled_part(group_name: str, part: Any) -> Any:
+        known = [key for key in PARAMETERS_OF_PARTS[group_name] if (group_name, part.name, key) in parameter_factors]
         changed_values = {
-            key: _multiplied(getattr(original_part, key), factors[group_name, original_part.name, key]) for key in known
+            key: _multiplied(getattr(part, key), parameter_factors[group_name, part.name, key]) for key in known
         }
-        return replace(original_part, **changed_values) if changed_values else original_part
+        return replace(part, **changed_values) if changed_values else part
 
     groups: dict[str, Any] = {
         group: tuple(scaled_part(group, each) for each in getattr(vehicle, group)) for group in PARAMETERS_OF_PARTS

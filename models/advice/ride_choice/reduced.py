@@ -102,9 +102,9 @@ class IndexNumbers:
             )
         return known[1]
 
-    def indices_of_attributes(self, known_object: Any, *names: str) -> tuple[int, ...]:
+    def indices_of_attributes(self, known_object: Any, *attribute_names: str) -> tuple[int, ...]:
         """Index numbers of an object's attributes; copies of an object share most attributes."""
-        parts = [getattr(known_object, name) for name in names]
+        parts = [getattr(known_object, name) for name in attribute_names]
         return tuple(self.index_of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
 
 
@@ -221,29 +221,36 @@ class FullScene:
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
 
-    def reduced(self, scene: ReducedScene) -> Reduced:
+    def reduced(self, reduced_scene: ReducedScene) -> Reduced:
         """The linear system of a reduced scene, stored for later requests; InputError where no meaningful system
         remains.
         """
-        key = self.vehicles.number(scene.vehicle), self.vehicles.roads.number(scene), scene.limits
+        key = (
+            self.vehicles.number(reduced_scene.vehicle),
+            self.vehicles.roads.number(reduced_scene),
+            reduced_scene.limits,
+        )
         reduced_system = self._stored.get(key)
         if reduced_system is None:
-            reduced_system = self._stored[key] = self._weighted(self._make(scene))
+            reduced_system = self._stored[key] = self._weighted(self._make(reduced_scene))
         return reduced_system
 
-    def _weighted(self, reduced: Reduced) -> Reduced:
+    def _weighted(self, reduced_system: Reduced) -> Reduced:
         """The system with the weighting filters of the scene's outputs added."""
         weightings = self.scene.ride_scene.weighting
         if not weightings:
-            return reduced
-        system = system_with_weightings(reduced.system, weightings)
-        unit_matrix, names = np.eye(len(system.A) - reduced.states), tuple(weightings.values())
-        T, left = block_diag(reduced.T, unit_matrix), block_diag(reduced.left, unit_matrix)
-        return replace(reduced, system=system, T=T, left=left, weightings=names)
+            return reduced_system
+        system = system_with_weightings(reduced_system.system, weightings)
+        unit_matrix, names = np.eye(len(system.A) - reduced_system.states), tuple(weightings.values())
+        T, left = block_diag(reduced_system.T, unit_matrix), block_diag(reduced_system.left, unit_matrix)
+        return replace(reduced_system, system=system, T=T, left=left, weightings=names)
 
-    def _make(self, scene: ReducedScene) -> Reduced:
+    def _make(self, reduced_scene: ReducedScene) -> Reduced:
         """The linear system of the reduced scene before the weighting filters of outputs are added."""
-        vehicle, (excitation, Tf, left_f) = self.vehicles.reduced_vehicle_of(scene, self.speed), self._heights(scene)
+        vehicle, (excitation, Tf, left_f) = (
+            self.vehicles.reduced_vehicle_of(reduced_scene, self.speed),
+            self._heights(reduced_scene),
+        )
         states, N = vehicle.states, vehicle.N
         system, Tq = first_order_system(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
@@ -254,16 +261,16 @@ class FullScene:
         left[2 * inert : road, :n], left[road:, 2 * n :] = states.integrated_part @ vehicle.residual_flexibility, left_f
         return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
-    def road(self, scene: ReducedScene) -> Excitation:
+    def road(self, reduced_scene: ReducedScene) -> Excitation:
         """The road excitation of the reduced scene."""
-        return self._heights(scene)[0]
+        return self._heights(reduced_scene)[0]
 
-    def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
+    def _heights(self, reduced_scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
         """The road excitation of the reduced scene, and the matrices of ``_filter_state_maps`` for it."""
-        key = self.vehicles.roads.number(scene)
+        key = self.vehicles.roads.number(reduced_scene)
         if key not in self._roads:
-            excitation = self.vehicles.roads.excitation_of(scene)
-            self._roads[key] = (excitation, *_filter_state_maps(self.scene, self.excitation, scene, excitation))
+            excitation = self.vehicles.roads.excitation_of(reduced_scene)
+            self._roads[key] = (excitation, *_filter_state_maps(self.scene, self.excitation, reduced_scene, excitation))
         return self._roads[key]
 
 

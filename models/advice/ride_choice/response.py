@@ -27,9 +27,9 @@ class OutputFactors(NamedTuple):
     by_road: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of_rows(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
+    def of_rows(cls, vehicle: LinearVehicle, output_rows: Sequence[int]) -> "OutputFactors":
         """Factors of the vehicle's outputs with these row indices."""
-        read, row_list = vehicle.read, list(rows)
+        read, row_list = vehicle.read, list(output_rows)
         return cls(
             (read.displacement_factors[row_list], read.rate_factors[row_list], read.acceleration_factors[row_list]),
             (read.road_factors[row_list], read.road_rate_factors[row_list]),
@@ -39,8 +39,8 @@ class OutputFactors(NamedTuple):
 class Response:
     """Transfer functions H (w, q, wheels) from road heights to outputs at angular frequencies (w,) in rad/s."""
 
-    def __init__(self, vehicle: ReducedVehicle, rows: Sequence[int], omega: np.ndarray) -> None:
-        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of_rows(vehicle.linear, rows)
+    def __init__(self, vehicle: ReducedVehicle, output_rows: Sequence[int], omega: np.ndarray) -> None:
+        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of_rows(vehicle.linear, output_rows)
         self.by_heights = vehicle.linear.road_stiffness, vehicle.linear.road_damping
         self.motions = self._fractions()
         self.H = self._modal_product(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)

@@ -49,18 +49,18 @@ class StationarySolution:
     variance: np.ndarray
 
 
-def solve(system: DelayedSystem, rows: list[int]) -> StationarySolution:
+def solve(linear_system: DelayedSystem, output_rows: list[int]) -> StationarySolution:
     """Stationary covariance P and adjoints L of a system in which every mode is damped; InputError for a mode without a
     restoring force.
 
     Noise and outputs stay in extended precision in the coordinates of the modes, too: where these are nearly parallel,
     a variance is a small difference of large terms.
     """
-    split = split_marginal(system.A)
+    split = split_marginal(linear_system.A)
     if split.count_of_marginal_states:
         raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
-    V, W, C = split.V, split.W, system.C[rows]
-    P = V @ lyapunov_solution(split.S, W @ noise_intensity_of_system(system) @ W.T)[0] @ V.T
+    V, W, C = split.V, split.W, linear_system.C[output_rows]
+    P = V @ lyapunov_solution(split.S, W @ noise_intensity_of_system(linear_system) @ W.T)[0] @ V.T
     L = np.array([W.T @ lyapunov_solution(split.S.T, np.outer(c, c))[0] @ W for c in C @ V])
     return StationarySolution(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
 
@@ -70,9 +70,9 @@ class Screen:
     ``base``. Quantities are given by their rows of C.
     """
 
-    def __init__(self, reduced_scene: Reduced, rows: list[int]) -> None:
-        self.base, self.rows = reduced_scene, rows
-        A, C, modes = reduced_scene.system.A, reduced_scene.system.C[rows], reduced_scene.modes
+    def __init__(self, reduced_scene: Reduced, output_rows: list[int]) -> None:
+        self.base, self.rows = reduced_scene, output_rows
+        A, C, modes = reduced_scene.system.A, reduced_scene.system.C[output_rows], reduced_scene.modes
         if has_undamped_motion(modes.rates if modes else np.linalg.eigvals(A)):
             raise InputError(
                 "",
@@ -92,23 +92,23 @@ class Screen:
         """Stationary solution for the system ``base`` in extended precision, for the certificate."""
         return solve(self.base.system, self.rows)
 
-    def predicted_variances(self, reduced: Reduced) -> np.ndarray:
+    def predicted_variances(self, reduced_system: Reduced) -> np.ndarray:
         """Predicted variances (quantities,) of the reduced system; inf where white noise reaches a quantity
         directly.
         """
-        system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
+        system, left, T = reduced_system.system, reduced_system.left @ self.base.T, self.base.left @ reduced_system.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
         half = system.A @ P
-        excess_noise = half + half.T + reduced.noise
+        excess_noise = half + half.T + reduced_system.noise
         J = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", T.T @ self.L @ T, excess_noise)
         white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
         return np.where(white, np.inf, np.maximum(J, 0.0))
 
-    def certificate_sides(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
+    def certificate_sides(self, reduced_system: Reduced) -> tuple[np.ndarray, np.ndarray]:
         """Variances (quantities,) of the reduced system in two ways, which a certificate compares: from the covariance
         of ``base`` with the adjoints of the reduced system, and from the reduced covariance.
         """
-        system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
+        system, left = reduced_system.system, (reduced_system.left @ self.base.T).astype(np.longdouble)
         covariance = solve(system, self.rows)
         P = left @ self.extended_solution.P @ left.T
         half = system.A.astype(np.longdouble) @ P
@@ -118,52 +118,58 @@ class Screen:
         return variance.astype(float), covariance.variance.astype(float)
 
 
-def has_undamped_motion(rates: np.ndarray, slowest: float = SLOWEST_DECAY) -> bool:
-    """Whether one of the eigenvalues (1/s) has almost no damping: ``slowest`` is the least ratio of decay to the
-    fastest rate.
+def has_undamped_motion(eigenvalues: np.ndarray, least_decay_ratio: float = SLOWEST_DECAY) -> bool:
+    """Whether one of the eigenvalues (1/s) has almost no damping: ``least_decay_ratio`` is the least ratio of decay to
+    the fastest rate.
     """
-    return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
+    return bool(eigenvalues.real.max(initial=-np.inf) > -least_decay_ratio * abs(eigenvalues).max(initial=0.0))
 
 
-def variances_from_modes(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
+def variances_from_modes(reduced_system: Reduced, output_rows: list[int]) -> np.ndarray | None:
     """Variances (quantities,) from the eigenmodes of the reduced system; None where only the exact solution is
     reliable.
 
     J = C P C' + tr(L (A P + P A' + Q)), which is exact for any P: where the second term, of all outputs, is more than
     rounding, where noise reaches a quantity at once, or where a motion hardly dies out, motions are not to be trusted.
     """
-    system, modes = reduced.system, reduced.modes
-    if modes is None or has_undamped_motion(modes.rates, EXACT_SOLVE_LIMIT) or any(d[rows].any() for d in system.D):
+    system, modes = reduced_system.system, reduced_system.modes
+    if (
+        modes is None
+        or has_undamped_motion(modes.rates, EXACT_SOLVE_LIMIT)
+        or any(d[output_rows].any() for d in system.D)
+    ):
         return None
-    P, C = modes.covariance(reduced.noise), system.C
+    P, C = modes.covariance(reduced_system.noise), system.C
     half = system.A @ P
-    modal_noise = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
+    modal_noise = modes.W @ (half + half.T + reduced_system.noise) @ modes.W.conj().T
     variance = ((C @ P) * C).sum(axis=1)
     missing = (modes.modal_adjoint(C) * modal_noise.T).sum(axis=(1, 2)).real
     is_certain = np.isfinite(system.D).all(axis=(0, 2)) & (variance > rounding_thresholds(C, P))
     if (
         not (abs(missing[is_certain]) <= TRUSTED_VARIANCE_SHARE * variance[is_certain]).all()
-        or not is_certain[rows].all()
+        or not is_certain[output_rows].all()
     ):
         return None
-    return np.asarray((variance + missing)[rows])
+    return np.asarray((variance + missing)[output_rows])
 
 
-def exact_variances(reduced: Reduced, rows: list[int]) -> np.ndarray:
+def exact_variances(reduced_system: Reduced, output_rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solution of the reduced system, inf where a quantity has none. Raises
     InputError for an unstable system.
     """
-    return row_variances(stationary_covariance(reduced.system), rows)
+    return row_variances(stationary_covariance(reduced_system.system), output_rows)
 
 
-def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarray:
+def row_variances(covariance: StationaryCovariance, output_rows: list[int]) -> np.ndarray:
     """Variances (quantities,) of the outputs with these row indices, inf where an output has none."""
-    return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
+    return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in output_rows])
 
 
-def variances_and_rounding(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
+def variances_and_rounding(reduced_system: Reduced, output_rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Variances (quantities,) by the exact solution, and levels (quantities,) below which variances are only
     rounding.
     """
-    covariance = stationary_covariance(reduced.system)
-    return row_variances(covariance, rows), rounding_thresholds(reduced.system.C[rows], covariance.P)
+    covariance = stationary_covariance(reduced_system.system)
+    return row_variances(covariance, output_rows), rounding_thresholds(
+        reduced_system.system.C[output_rows], covariance.P
+    )

@@ -28,11 +28,11 @@ class Shifts:
 
     @classmethod
     def from_vehicles(
-        cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]
+        cls, vehicle: LinearVehicle, shifted_vehicles: Sequence[LinearVehicle], output_rows: Sequence[int]
     ) -> "Shifts":
         """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these row indices."""
         matrices, *changed_matrices = (
-            [*_matrices_and_readings(linear_vehicle, rows)] for linear_vehicle in (vehicle, *other_vehicles)
+            [*_matrices_and_readings(linear_vehicle, output_rows)] for linear_vehicle in (vehicle, *shifted_vehicles)
         )
         changes = [
             np.array([linear_vehicle[i] for linear_vehicle in changed_matrices]) - matrix
@@ -48,9 +48,9 @@ class Shifts:
         )
 
 
-def _matrices_and_readings(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
+def _matrices_and_readings(vehicle: LinearVehicle, output_rows: Sequence[int]) -> Iterator[np.ndarray]:
     """Matrices of a vehicle, then factors of its outputs, in the order of the fields of ``Shifts``."""
-    read = OutputFactors.of_rows(vehicle, rows)
+    read = OutputFactors.of_rows(vehicle, output_rows)
     yield from (vehicle.stiffness, vehicle.damping, vehicle.mass, vehicle.road_stiffness, vehicle.road_damping)
     yield from (*read.by_motion, *read.by_road)
 
@@ -74,14 +74,14 @@ class Sensitivity:
         self.by_row = [each[:, :, r, :r] @ N.T for each in sums]
         self.by_road = [each[:, :, r, r:] for each in sums[:2]]
 
-    def slopes(self, shifts: Shifts, inert: np.ndarray) -> np.ndarray:
+    def slopes(self, shifts: Shifts, is_inertial: np.ndarray) -> np.ndarray:
         """First-order changes of variances (v, q, p) by each matrix change. A change of mass counts only for parameters
-        that are ``inert`` (p,).
+        that are ``is_inertial`` (p,).
         """
-        stiffness = (*shifts.stiffness[:2], shifts.stiffness[2] * inert[:, None, None])
+        stiffness = (*shifts.stiffness[:2], shifts.stiffness[2] * is_inertial[:, None, None])
         forces = [(self.by_force, stiffness, -1.0), (self.by_column, shifts.by_heights, 1.0)]
         outputs = [(self.by_row, shifts.by_motion), (self.by_road, shifts.by_road)]
-        total = np.zeros((*self.by_road[0].shape[:2], len(inert)))
+        total = np.zeros((*self.by_road[0].shape[:2], len(is_inertial)))
         for sums, matrix_changes, sign in forces:
             for sensitivity, matrices in zip(sums, matrix_changes, strict=True):
                 if matrices.any():
@@ -93,9 +93,9 @@ class Sensitivity:
         return total
 
 
-def _by_outputs(products: np.ndarray) -> np.ndarray:
+def _by_outputs(complex_products: np.ndarray) -> np.ndarray:
     """Real, then imaginary parts (v, q, 2 w, j) of complex products (v, w, q, j)."""
-    return np.concatenate([products.real, products.imag], axis=1).transpose(0, 2, 1, 3).copy()
+    return np.concatenate([complex_products.real, complex_products.imag], axis=1).transpose(0, 2, 1, 3).copy()
 
 
 def _frequency_sums(adjoint_responses: np.ndarray, products: np.ndarray) -> np.ndarray:

@@ -22,17 +22,19 @@ count as meeting independent roads, since sums over quick turns vanish.
 """
 
 
-def frequency_panels(rates: np.ndarray, delay: float, frequency_limits: tuple[float, float]) -> tuple[np.ndarray, ...]:
+def frequency_panels(
+    motion_rates: np.ndarray, longest_delay: float, frequency_limits: tuple[float, float]
+) -> tuple[np.ndarray, ...]:
     """Angular frequencies (w,) in rad/s from 0 to the upper limit, weights (w,) of a sum that approximates the integral
     over them, and whether axles are treated as independent (w,).
 
-    rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; frequency_limits : of the panels
-    that are equal on a logarithmic axis; the first panel extends to 0.
+    motion_rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; frequency_limits : of the
+    panels that are equal on a logarithmic axis; the first panel extends to 0.
     """
     low, high = frequency_limits
-    swinging = rates[rates.imag > 0]
+    swinging = motion_rates[motion_rates.imag > 0]
     near = (swinging.imag[:, None] - swinging.real[:, None] * RESONANCE_EDGES).ravel()
-    late = PANEL_ANGLE / delay * np.arange(1, NARROW_PANELS + 1) if delay > 0 else np.array([np.inf])
+    late = PANEL_ANGLE / longest_delay * np.arange(1, NARROW_PANELS + 1) if longest_delay > 0 else np.array([np.inf])
     inner = np.concatenate([near, late])
     even = np.geomspace(low, high, max(2, round(PER_DECADE * np.log10(high / low))))
     edges = np.unique(np.concatenate([[0.0], even, inner[(inner > low) & (inner < high)]]))

@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 
 from models.core.finding import Finding, Weight
 from models.measured.checks import clipped, drift, faults, gaps, gravity, noise, rigid, spikes, swapped, turning, weight
-from models.measured.checks.evidence import Evidence
+from models.measured.checks.evidence import CheckedRecording
 from models.measured.recording import Recording
 from models.measured.signal import TransducerPlace
 from models.vehicles.cut_vehicle import CutVehicle
 
-CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
+CHECKS: tuple[Callable[[CheckedRecording], list[Finding]], ...] = (
     gaps.check,
     clipped.check,
     spikes.check,
@@ -58,14 +58,14 @@ def check(
     vehicle : None for one that is not in space; places : of accelerometers and gyros by name; claimed : white noise
     (SI) on every sample that is stated, by name of signal.
     """
-    return findings_of_all_checks(Evidence(recording, vehicle, places or {}, claimed or {}))
+    return findings_of_all_checks(CheckedRecording(recording, vehicle, places or {}, claimed or {}))
 
 
-def findings_of_all_checks(evidence: Evidence) -> tuple[Finding, ...]:
+def findings_of_all_checks(checked_recording: CheckedRecording) -> tuple[Finding, ...]:
     """Findings of all checks on a recording, errors first; the caller can use the same evidence for figures."""
-    said = list(evidence.recording.findings)
+    said = list(checked_recording.recording.findings)
     for look in CHECKS:
-        said += [finding for finding in look(evidence) if not _already_named(finding, said)]
+        said += [finding for finding in look(checked_recording) if not _already_named(finding, said)]
     return tuple(sorted(said, key=lambda finding: WEIGHT_ORDER.index(finding.weight)))
 
 

@@ -6,56 +6,57 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from models.measured.checks.agreement import Agreement, MeasurementFault
+from models.measured.checks.agreement import MeasurementFault, MotionAgreement
 from models.measured.checks.response import AXIS_INDEX, SensorResponse, component_index
-from models.measured.checks.spectra import Spectra, cross_spectra, white_noise, windowed_means
+from models.measured.checks.spectra import CrossSpectra, cross_spectra, white_noise, windowed_means
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
-from models.measured.signal import Signal, TransducerPlace
+from models.measured.signal import MeasuredSignal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
 COMPARED_BAND = 1.0, 25.0
 """Frequency band (Hz) in which forces and motion are compared: above the drift of a free vehicle, below the bending of
 its body."""
-LEAST_MEAN_SHARE = 5e-4
+LEAST_TELLING_MEAN_SHARE = 5e-4
 """Share of a static load or of gravity below which a mean says nothing of unit and sign."""
 INERTIAL_QUANTITIES = ("acceleration", "angular rate", "angle")
 """Quantities of the inertial signals."""
 
 
 @dataclass(frozen=True)
-class Evidence:
+class CheckedRecording:
     """Data on which the checks of a recording work. places : of accelerometers and gyros by name; stated_noise : stated
     white noise (SI), by name of signal.
 
-    plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
+    pitch_plane_parameters : those of the pitch-plane vehicle, if the recording drives one instead of a vehicle in
+    space.
     """
 
     recording: Recording
     vehicle: CutVehicle | None
     places: Mapping[str, TransducerPlace] = field(default_factory=dict)
     stated_noise: Mapping[str, float] = field(default_factory=dict)
-    plane: Parameters | None = None
+    pitch_plane_parameters: Parameters | None = None
 
     @cached_property
-    def forces(self) -> tuple[Signal, ...]:
+    def forces(self) -> tuple[MeasuredSignal, ...]:
         """Signals of the forces and moments at the vehicle's hubs."""
         hubs, signals = self.vehicle.hubs if self.vehicle else (), self.recording.signals
         acting = [s for s in signals if s.quantity in ("force", "moment") and s.component in ("x", "y", "z")]
         return tuple(s for s in acting if s.at in hubs)
 
     @cached_property
-    def inertial(self) -> tuple[Signal, ...]:
+    def inertial_signals(self) -> tuple[MeasuredSignal, ...]:
         """Accelerations, angular rates and angles measured at a known place on the vehicle."""
         moving = [s for s in self.recording.signals if s.quantity in INERTIAL_QUANTITIES and s.component in AXIS_INDEX]
-        return tuple(s for s in moving if self.place(s) is not None)
+        return tuple(s for s in moving if self.transducer_place(s) is not None)
 
-    def vertical(self) -> dict[str, Signal]:
+    def vertical_force_signals(self) -> dict[str, MeasuredSignal]:
         """Signal of the vertical force at each hub that has one."""
         return {s.at: s for s in self.forces if s.quantity == "force" and s.component == "z"}
 
-    def place(self, signal: Signal) -> TransducerPlace | None:
+    def transducer_place(self, signal: MeasuredSignal) -> TransducerPlace | None:
         """Position at which a signal is measured; None where neither the scene nor the vehicle gives it."""
         if signal.at in self.places or self.vehicle is None:
             return self.places.get(signal.at)
@@ -69,10 +70,10 @@ class Evidence:
         """Phrase on the data that are missing for comparing forces with motion; empty if none are."""
         if self.vehicle is None:
             return "a vehicle in space"
-        bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical()]
+        bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical_force_signals()]
         if bare:
             return f"the vertical force of {', '.join(bare)}"
-        if not self.inertial:
+        if not self.inertial_signals:
             return "an accelerometer or gyro whose place on the vehicle is known"
         if self.constant_signals:
             return f"life in {', '.join(self.constant_signals)}"
@@ -81,64 +82,76 @@ class Evidence:
     @cached_property
     def constant_signals(self) -> tuple[str, ...]:
         """Names of force and inertial signals whose measured samples all have the same value."""
-        samples = ((s.name, self.recording.samples(s)) for s in (*self.forces, *self.inertial))
+        samples = ((s.name, self.recording.samples(s)) for s in (*self.forces, *self.inertial_signals))
         known = ((name, values[np.isfinite(values)]) for name, values in samples)
         return tuple(name for name, values in known if (values == values[:1]).all())
 
     @cached_property
-    def coarse_factors(self) -> dict[Signal, float]:
+    def factors_from_means(self) -> dict[MeasuredSignal, float]:
         """Ratio of recorded to true value of signals whose mean alone shows a wrong sign or unit.
 
         Means of vertical forces are compared with static loads, and those of vertical accelerometers with gravity.
         """
         loads = dict(zip(self.vehicle.hubs, self.vehicle.loads, strict=True)) if self.vehicle else {}
-        ratios = {s: self.mean(s) / loads[hub] for hub, s in self.vertical().items() if not self.empty(s)}
-        ratios |= {s: self.mean(s) / GRAVITY for s in self.recording.find("acceleration", "", "z") if s.gravity}
+        ratios = {
+            s: self.mean_of_signal(s) / loads[hub]
+            for hub, s in self.vertical_force_signals().items()
+            if not self.has_negligible_mean(s)
+        }
+        ratios |= {
+            s: self.mean_of_signal(s) / GRAVITY
+            for s in self.recording.find_signals("acceleration", "", "z")
+            if s.gravity
+        }
         return {
             s: ratio
             for s, ratio in ratios.items()
-            if probable_mistake(ratio, s)[0] in ("sign", "unit") and abs(ratio) > LEAST_MEAN_SHARE
+            if probable_mistake(ratio, s)[0] in ("sign", "unit") and abs(ratio) > LEAST_TELLING_MEAN_SHARE
         }
 
-    def mean(self, signal: Signal) -> float:
+    def mean_of_signal(self, signal: MeasuredSignal) -> float:
         """Mean of all samples of a signal, weighted by a window."""
         return float(windowed_means([partial(self.recording.samples, signal)])[0][0])
 
-    def empty(self, signal: Signal) -> bool:
+    def has_negligible_mean(self, signal: MeasuredSignal) -> bool:
         """Whether a force varies more than its mean, which then does not reveal the sign or unit."""
-        return abs(self.mean(signal)) <= float(np.nanstd(self.recording.samples(signal)))
+        return abs(self.mean_of_signal(signal)) <= float(np.nanstd(self.recording.samples(signal)))
 
     @cached_property
-    def _spectra(self) -> Spectra | None:
+    def _spectra(self) -> CrossSpectra | None:
         """Cross spectra of forces and inertial signals in the compared band; None if the recording is too short or has
         gaps."""
         top = min(COMPARED_BAND[1], 0.4 / self.recording.period)
-        return cross_spectra(self.recording, (*self.forces, *self.inertial), (COMPARED_BAND[0], top))
+        return cross_spectra(self.recording, (*self.forces, *self.inertial_signals), (COMPARED_BAND[0], top))
 
     @cached_property
-    def agreement(self) -> Agreement | None:
+    def agreement(self) -> MotionAgreement | None:
         """Comparison of recorded forces and motion, after correction of signs and units that means reveal; None where
         data are lacking."""
         if self.missing_data_text:
             return None
         assert self.vehicle is not None and self._spectra is not None
         measured_spectra, c = self._spectra, len(self.forces)
-        places = [place for s in self.inertial if (place := self.place(s)) is not None]
-        response = SensorResponse(self.vehicle, self.frame).at(measured_spectra.frequencies, self.inertial, places)
+        places = [place for s in self.inertial_signals if (place := self.transducer_place(s)) is not None]
+        response = SensorResponse(self.vehicle, self.frame).transfer_functions(
+            measured_spectra.frequencies, self.inertial_signals, places
+        )
         numbers = [component_index(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
         forces, felt = (
-            np.array([self.coarse_factors.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial)
+            np.array([self.factors_from_means.get(s, 1.0) for s in each])
+            for each in (self.forces, self.inertial_signals)
         )
-        return Agreement(
+        return MotionAgreement(
             measured_spectra.frequencies,
             self.forces,
-            self.inertial,
-            measured_spectra.cross[:, :c, :c],
-            measured_spectra.cross[:, c:, :c],
-            np.einsum("fkk->fk", measured_spectra.cross[:, c:, c:]).real,
+            self.inertial_signals,
+            measured_spectra.cross_spectra[:, :c, :c],
+            measured_spectra.cross_spectra[:, c:, :c],
+            np.einsum("fkk->fk", measured_spectra.cross_spectra[:, c:, c:]).real,
             response[:, :, numbers] / forces * felt[:, None],
             measured_spectra.independent_averages,
-            measured_spectra.white_noise_power * np.square([white_noise(self.recording, s) for s in self.inertial]),
+            measured_spectra.white_noise_power
+            * np.square([white_noise(self.recording, s) for s in self.inertial_signals]),
         )
 
     @property
@@ -147,9 +160,9 @@ class Evidence:
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property
-    def agreement_and_faults(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
+    def agreement_and_faults(self) -> tuple[MotionAgreement, tuple[MeasurementFault, ...]] | None:
         """The agreement of forces and motion after correction of its faults, and these faults, the worst one first."""
-        return self.agreement.search() if self.agreement else None
+        return self.agreement.search_faults() if self.agreement else None
 
     @property
     def faults(self) -> tuple[MeasurementFault, ...]:
@@ -162,7 +175,7 @@ class Evidence:
         compared."""
         return self.agreement_and_faults[0].detectable_sizes() if self.agreement_and_faults else {}
 
-    def hub(self, signal: Signal) -> str:
+    def corrected_hub(self, signal: MeasuredSignal) -> str:
         """Hub at which a force signal acts after exchanged hubs are corrected."""
         for fault in self.faults:
             if fault.kind == "swapped" and signal.at in dict(fault.exchanged_hubs):

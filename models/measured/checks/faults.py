@@ -7,33 +7,37 @@ about the contact patch, or a plane of the transducer.
 
 from models.core.finding import Finding, Weight
 from models.measured.checks.agreement import MeasurementFault
-from models.measured.checks.evidence import Evidence
+from models.measured.checks.evidence import CheckedRecording
 from models.measured.checks.spikes import spike_positions
 from models.measured.ratios import cause_and_sentence
 
-FACTOR_ERRORS = 0.02, 0.1
+STATED_FACTOR_ERRORS = 0.02, 0.1
 """Relative errors of a factor for which it is stated in how many channels they would be seen."""
-UNCHECKED_SHIFT = 3e-3
+UNCHECKED_TIME_SHIFT = 3e-3
 """Time shift (s) below which a shift need not be visible; a channel in which only larger ones would be seen is named as
 not checked."""
 WHEEL_RADIUS_RANGE = 0.2, 0.6
 """Range (m) of wheel radii; a lever of this size is explained by the wheel's radius."""
 
 
-def factor_findings(evidence: Evidence) -> list[Finding]:
+def factor_findings(checked_recording: CheckedRecording) -> list[Finding]:
     """Findings on wrong factors. Sizes are shares in %, or the ratio of recorded to true value where sign or unit is
     wrong. A finding is only a doubt where a spike may be the cause."""
-    if evidence.missing_data_text:
+    if checked_recording.missing_data_text:
         what = "Signs, units and factors were not checked by the motion of the vehicle"
-        return [Finding("factor", "note", "", f"{what}: this needs {evidence.missing_data_text}.")]
-    findings = [_factor_finding(evidence, fault) for fault in evidence.faults if fault.kind == "factor"]
-    least = [wrong for _, wrong in evidence.detectable_sizes.values()]
-    parts = " and ".join(f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in FACTOR_ERRORS)
+        return [Finding("factor", "note", "", f"{what}: this needs {checked_recording.missing_data_text}.")]
+    findings = [
+        _factor_finding(checked_recording, fault) for fault in checked_recording.faults if fault.kind == "factor"
+    ]
+    least = [wrong for _, wrong in checked_recording.detectable_sizes.values()]
+    parts = " and ".join(
+        f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in STATED_FACTOR_ERRORS
+    )
     text = f"A factor that is wrong {parts} of {len(least)} channels would be seen by the motion."
     return [*findings, Finding("gain", "note", "", text)]
 
 
-def _factor_finding(evidence: Evidence, fault: MeasurementFault) -> Finding:
+def _factor_finding(checked_recording: CheckedRecording, fault: MeasurementFault) -> Finding:
     """Finding on a wrong factor, sign or unit of one or several channels."""
     kind, text = cause_and_sentence(
         fault.size, fault.signals[0], "what the motion of the vehicle and all other channels tell"
@@ -43,21 +47,21 @@ def _factor_finding(evidence: Evidence, fault: MeasurementFault) -> Finding:
     if kind in ("gain", "size"):
         text += f" The factor is {fault.size:.4g} +- {2 * fault.error:.2g} (95 %), if the vehicle file is right."
         return Finding("gain", "doubt", fault.name, text, 100 * (fault.size - 1), "%", fault.names)
-    spiky = any(len(spike_positions(evidence.recording.samples(s))[0]) for s in fault.signals)
+    spiky = any(len(spike_positions(checked_recording.recording.samples(s))[0]) for s in fault.signals)
     weight: Weight = "doubt" if spiky else "error"
     return Finding(kind, weight, fault.name, text, fault.size, "1", fault.names)
 
 
-def shift_findings(evidence: Evidence) -> list[Finding]:
+def shift_findings(checked_recording: CheckedRecording) -> list[Finding]:
     """Findings on time shifts, from the motion that the hub forces predict. Sizes are in s, positive where a channel is
     late."""
-    if evidence.agreement is None:
+    if checked_recording.agreement is None:
         what = "Shifts in time were not checked by the motion of the vehicle"
-        return [Finding("shift", "note", "", f"{what}: this needs {evidence.missing_data_text}.")]
-    findings = [_shift_finding(fault) for fault in evidence.faults if fault.kind == "late"]
-    blind = [name for name, (late, _) in evidence.detectable_sizes.items() if not late < UNCHECKED_SHIFT]
-    seen = f"{len(evidence.detectable_sizes) - len(blind)} of {len(evidence.detectable_sizes)}"
-    text = f"A shift of {1e3 * UNCHECKED_SHIFT:g} ms would be seen in {seen} channels by the motion of the vehicle"
+        return [Finding("shift", "note", "", f"{what}: this needs {checked_recording.missing_data_text}.")]
+    findings = [_shift_finding(fault) for fault in checked_recording.faults if fault.kind == "late"]
+    blind = [name for name, (late, _) in checked_recording.detectable_sizes.items() if not late < UNCHECKED_TIME_SHIFT]
+    seen = f"{len(checked_recording.detectable_sizes) - len(blind)} of {len(checked_recording.detectable_sizes)}"
+    text = f"A shift of {1e3 * UNCHECKED_TIME_SHIFT:g} ms would be seen in {seen} channels by the motion of the vehicle"
     text += f"; too little of it comes from {', '.join(blind)}." if blind else "."
     return [*findings, Finding("shift", "note", "", text)]
 
@@ -74,10 +78,10 @@ def _shift_finding(fault: MeasurementFault) -> Finding:
     return Finding("shift", "doubt", fault.name, text, fault.size, "s", fault.names)
 
 
-def lever_findings(evidence: Evidence) -> list[Finding]:
+def lever_findings(checked_recording: CheckedRecording) -> list[Finding]:
     """Findings on hub moments that refer to another point than the hub, from the motion that the hub forces predict.
     Sizes are the point's height above the hub, m."""
-    return [_lever_finding(fault) for fault in evidence.faults if fault.kind == "lever"]
+    return [_lever_finding(fault) for fault in checked_recording.faults if fault.kind == "lever"]
 
 
 def _lever_finding(fault: MeasurementFault) -> Finding:

@@ -9,25 +9,25 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.engines.cut_vehicle import HubModel, build
-from models.measured.signal import Signal, TransducerPlace
+from models.measured.signal import MeasuredSignal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.kinematics import Kinematics
 
-MODEL_STEP = 1e-3
+MODEL_TIME_STEP = 1e-3
 """Step (s) of the model, whose half steps hold the trial forces."""
-STATE_DIFFERENCE = 1e-5
+STATE_DIFFERENCE_STEP = 1e-5
 """Step (m and rad, m/s and rad/s) of the finite differences by the state; the equations are smooth over metres."""
-FORCE_DIFFERENCE = 100.0
+FORCE_DIFFERENCE_STEP = 100.0
 """Step (N and N m) of the finite differences by forces, in which the equations are linear."""
 AXIS_INDEX = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
 """Index of each component's axis."""
 
 
-def component_index(signal: Signal, hub: int) -> int:
-    """Index of a force signal's component among the components of all hubs; ``hub`` is the index of its hub."""
-    return WRENCH * hub + 3 * (signal.quantity == "moment") + AXIS_INDEX[signal.component]
+def component_index(signal: MeasuredSignal, hub_index: int) -> int:
+    """Index of a force signal's component among the components of all hubs; ``hub_index`` is the index of its hub."""
+    return WRENCH * hub_index + 3 * (signal.quantity == "moment") + AXIS_INDEX[signal.component]
 
 
 class SensorResponse:
@@ -37,26 +37,35 @@ class SensorResponse:
     def __init__(self, vehicle: CutVehicle, frame: str) -> None:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
         model, n = _static_model(vehicle, frame), vehicle.size
-        rest, moved = np.zeros(n), STATE_DIFFERENCE * np.eye(n)
+        rest, moved = np.zeros(n), STATE_DIFFERENCE_STEP * np.eye(n)
         at = model.acceleration
-        self.stiff = np.column_stack([(at(0.0, d, rest) - at(0.0, -d, rest)) / (2 * STATE_DIFFERENCE) for d in moved])
-        self.damped = np.column_stack([(at(0.0, rest, d) - at(0.0, rest, -d)) / (2 * STATE_DIFFERENCE) for d in moved])
+        self.stiff = np.column_stack(
+            [(at(0.0, d, rest) - at(0.0, -d, rest)) / (2 * STATE_DIFFERENCE_STEP) for d in moved]
+        )
+        self.damped = np.column_stack(
+            [(at(0.0, rest, d) - at(0.0, rest, -d)) / (2 * STATE_DIFFERENCE_STEP) for d in moved]
+        )
         still, hubs = at(0.0, rest, rest), range(WRENCH * len(vehicle.hubs))
         self.pushed = np.column_stack(
-            [(at((i + 1) * MODEL_STEP / 2, rest, rest) - still) / FORCE_DIFFERENCE for i in hubs]
+            [(at((i + 1) * MODEL_TIME_STEP / 2, rest, rest) - still) / FORCE_DIFFERENCE_STEP for i in hubs]
         )
 
-    def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[TransducerPlace]) -> np.ndarray:
+    def transfer_functions(
+        self, frequencies: np.ndarray, signals: Sequence[MeasuredSignal], transducer_places: Sequence[TransducerPlace]
+    ) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) from the forces at h hubs to the signals, each at its place, at
         frequencies (f,) in Hz."""
         laplace, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
         q = np.linalg.solve(
             laplace**2 * np.eye(n) - laplace * self.damped - self.stiff, self.pushed[None].astype(complex)
         )
-        rows = np.stack([self._row(laplace[:, 0], s, place) for s, place in zip(signals, places, strict=True)], axis=1)
+        rows = np.stack(
+            [self._sensor_row(laplace[:, 0], s, place) for s, place in zip(signals, transducer_places, strict=True)],
+            axis=1,
+        )
         return np.asarray(rows @ q)
 
-    def _row(self, i_omega: np.ndarray, signal: Signal, transducer: TransducerPlace) -> np.ndarray:
+    def _sensor_row(self, i_omega: np.ndarray, signal: MeasuredSignal, transducer: TransducerPlace) -> np.ndarray:
         """Row (f, n) that maps the n coordinates to a sensor's reading, with ``i_omega`` (f, 1) the factor of a time
         derivative."""
         axis, turn = AXIS_INDEX[signal.component], self.motion.turn(transducer.body)
@@ -76,5 +85,5 @@ def _static_model(vehicle: CutVehicle, frame: str) -> HubModel:
     hubs = WRENCH * len(vehicle.hubs)
     rows = np.zeros((hubs + 1, hubs))
     rows[:, 2::WRENCH] = vehicle.loads
-    rows[1:] += FORCE_DIFFERENCE * np.eye(hubs)
-    return build("reference", vehicle, HubInputs(rows, frame), MODEL_STEP, MODEL_STEP * (hubs // 2))
+    rows[1:] += FORCE_DIFFERENCE_STEP * np.eye(hubs)
+    return build("reference", vehicle, HubInputs(rows, frame), MODEL_TIME_STEP, MODEL_TIME_STEP * (hubs // 2))

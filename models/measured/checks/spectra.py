@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 
 SEGMENT_LENGTH = 4.0
 """Length (s) of a segment, which resolves the modes of a car; shorter in a short recording."""
@@ -21,43 +21,46 @@ MOST_SEGMENTS = 300
 """Most segments that are evaluated, spread evenly: ten minutes."""
 OVERLAP_FACTOR = 0.75
 """Number of independent averages per half-overlapping segment under a Hann window, about."""
-TOP_BAND = 0.7, 0.95
+HIGHEST_LINES_SHARE = 0.7, 0.95
 """Band of the noise estimate as shares of the highest frequency: above what vehicles do, below the edge of filters and
 converters."""
 PIECE_LENGTH, MOST_PIECES = 1024, 40
 """Number of samples of a piece for the noise estimate, and most pieces, spread evenly."""
-SIDE_LINES = range(2, 5)
+SIDE_LINE_RANGE = range(2, 5)
 """Spectral lines beside the main lobe of the window, whose power is taken for that at 0 Hz."""
 
 
 @dataclass(frozen=True)
-class Spectra:
-    """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz, for n
-    signals.
+class CrossSpectra:
+    """Cross spectra averaged over segments: cross_spectra (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz,
+    for n signals.
 
     independent_averages : how many independent ones; segments with a sample that is missing are left out.
     white_noise_power : power in every line of white noise of variance 1.
     """
 
     frequencies: np.ndarray
-    cross: np.ndarray
+    cross_spectra: np.ndarray
     independent_averages: float
     white_noise_power: float
 
 
 def cross_spectra(
-    recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
-) -> Spectra | None:
+    recording: Recording,
+    signals: tuple[MeasuredSignal, ...],
+    frequency_band: Sequence[float],
+    sample_range: tuple[int, int] | None = None,
+) -> CrossSpectra | None:
     """Cross spectra of signals in a band (Hz), in SI units squared by window sums squared; None if too few segments are
     complete, or if the band contains too few frequency lines.
 
-    stretch : first sample and number of samples that are looked at; else all.
+    sample_range : first sample and number of samples that are looked at; else all.
     """
-    begin, count = stretch or (0, recording.count)
+    begin, count = sample_range or (0, recording.count)
     length = min(round(SEGMENT_LENGTH / recording.period), 2 * count // (FEWEST_SEGMENTS + 1))
     firsts = np.arange(begin, begin + count - length + 1, max(length // 2, 1))
     frequencies = np.fft.rfftfreq(length, recording.period)
-    in_band = (frequencies >= band[0]) & (frequencies <= band[1])
+    in_band = (frequencies >= frequency_band[0]) & (frequencies <= frequency_band[1])
     window, names = np.hanning(length + 1)[:length, None], tuple(s.name for s in signals)
     cross, segments = np.zeros((in_band.sum(), len(signals), len(signals)), complex), 0
     for first in firsts[:: -(-len(firsts) // MOST_SEGMENTS)] if length > 1 else ():
@@ -68,12 +71,12 @@ def cross_spectra(
             segments += 1
     if segments < FEWEST_SEGMENTS or np.count_nonzero(in_band) < FEWEST_FREQUENCIES:
         return None
-    return Spectra(
+    return CrossSpectra(
         frequencies[in_band], cross / segments, max(1.0, OVERLAP_FACTOR * segments), float(np.sum(window**2))
     )
 
 
-def white_noise(recording: Recording, signal: Signal) -> float:
+def white_noise(recording: Recording, signal: MeasuredSignal) -> float:
     """Standard deviation (SI) of the white noise on every sample of a signal; NaN if no piece is complete.
 
     By the median power of the highest lines, whose mean exponential noise makes 1 / log 2 times as large. Of filtered
@@ -87,11 +90,11 @@ def white_noise(recording: Recording, signal: Signal) -> float:
     if not len(whole):
         return float("nan")
     lines = np.fft.rfft(window * (whole - whole.mean(axis=1, keepdims=True)))
-    low, high = (int(part * lines.shape[1]) for part in TOP_BAND)
+    low, high = (int(part * lines.shape[1]) for part in HIGHEST_LINES_SHARE)
     return float(np.sqrt(np.median(np.abs(lines[:, low:high]) ** 2) / np.log(2) / np.sum(window**2)))
 
 
-def windowed_means(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def windowed_means(column_readers: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     """Means (k,), weighted by a Hann window, of the columns (n,) that the k functions read, and the covariance (k, k)
     of the means' errors.
 
@@ -100,15 +103,15 @@ def windowed_means(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndar
     lobe: that of vehicles falls towards 0 Hz, so that it is rather too large. InputError is not raised: all NaN gives
     NaN.
     """
-    good = np.isfinite(columns[0]())
-    for read in columns[1:]:
+    good = np.isfinite(column_readers[0]())
+    for read in column_readers[1:]:
         good &= np.isfinite(read())
     n = len(good)
     window = np.where(good, np.hanning(n + 2)[1:-1], 0.0)
     window = window / window.sum() if good.any() else np.full(n, np.nan)
-    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in SIDE_LINES]
-    centre, lines = np.empty(len(columns)), np.empty((len(waves), len(columns)), complex)
-    for i, read in enumerate(columns):
+    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in SIDE_LINE_RANGE]
+    centre, lines = np.empty(len(column_readers)), np.empty((len(waves), len(column_readers)), complex)
+    for i, read in enumerate(column_readers):
         values = np.where(good, read(), 0.0)
         centre[i] = window @ values
         rest = np.where(good, values - centre[i], 0.0)

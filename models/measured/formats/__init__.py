@@ -7,7 +7,7 @@ from pathlib import Path
 
 from models.core.errors import InputError, similar_file
 from models.core.finding import Finding
-from models.measured.channel import Source
+from models.measured.channel import MeasurementSource
 from models.measured.file_kinds import KNOWN_FORMATS, extension_phrase, format_of, usual_kind_of_extension
 from models.measured.formats.csv import open_csv
 from models.measured.formats.mdf4 import open_mdf
@@ -30,42 +30,49 @@ DRIVE_FILE_ADVICE = (
 """Advice on drive files of a test rig."""
 
 
-def open_source(path: str | Path) -> Source:
+def open_source(measurement_path: str | Path) -> MeasurementSource:
     """The open measurement file at a path, for reading.
 
     Parameters
     ----------
-    path : the file; its first bytes decide what it is, and an extension that says otherwise is noticed
+    measurement_path : the file; its first bytes decide what it is, and an extension that says otherwise is noticed
 
     Raises
     ------
     InputError : naming the file, and the byte, line or sample where it cannot be read
     """
-    path = Path(path)
-    form = format_of(path, _first_bytes(path))
+    measurement_path = Path(measurement_path)
+    form = format_of(measurement_path, _first_bytes(measurement_path))
     try:
-        source = READER_OF_FORMAT[form](path)
+        source = READER_OF_FORMAT[form](measurement_path)
     except InputError as error:  # what is said of text that is no CSV knows the extension
-        if form != "CSV" or not extension_phrase(path):
+        if form != "CSV" or not extension_phrase(measurement_path):
             raise
-        raise InputError(path, error.place, error.value, error.allowed + extension_phrase(path)) from None
-    usual, said = usual_kind_of_extension(path.suffix.lower(), form), list[Finding]()
+        raise InputError(
+            measurement_path, error.place, error.value, error.allowed + extension_phrase(measurement_path)
+        ) from None
+    usual, said = usual_kind_of_extension(measurement_path.suffix.lower(), form), list[Finding]()
     if usual != form:
-        text = f"the extension {path.suffix} is that of {usual}, but the file is read as {form}"
-        said.append(flaw_finding(path, "doubt", text))
-    if form == "RPC III" and path.suffix.lower() == ".drv":
-        said.append(flaw_finding(path, "doubt", DRIVE_FILE_ADVICE))
+        text = f"the extension {measurement_path.suffix} is that of {usual}, but the file is read as {form}"
+        said.append(flaw_finding(measurement_path, "doubt", text))
+    if form == "RPC III" and measurement_path.suffix.lower() == ".drv":
+        said.append(flaw_finding(measurement_path, "doubt", DRIVE_FILE_ADVICE))
     return replace(source, findings=(*said, *source.findings))
 
 
-def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | None = None, comment: str = "") -> Path:
+def write(
+    measurement_path: str | Path,
+    channel_groups: Sequence[ChannelGroup],
+    start_time: datetime | None = None,
+    comment: str = "",
+) -> Path:
     """Write channels to a new file, in the format of its extension, block by block, whole or not at all.
 
     Parameters
     ----------
-    path : .csv, .mf4, .rsp or .tdms; it must not exist
-    groups : channels of one clock each; CSV and RPC III hold one group. Times are counted from ``start``
-    start : when the first samples were, with its zone
+    measurement_path : .csv, .mf4, .rsp or .tdms; it must not exist
+    channel_groups : channels of one clock each; CSV and RPC III hold one group. Times are counted from ``start_time``
+    start_time : when the first samples were, with its zone
     comment : of the file
 
     Resolution: every bit in CSV, MDF and TDMS, 2^-24 of a value in RPC III.
@@ -75,28 +82,34 @@ def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | No
     InputError : the file exists or cannot be written, or the format has no room for a name, a unit or a value; where
         that can be known beforehand, before any block is taken
     """
-    path = Path(path)
-    if path.suffix.lower() not in WRITER_OF_EXTENSION:
+    measurement_path = Path(measurement_path)
+    if measurement_path.suffix.lower() not in WRITER_OF_EXTENSION:
         raise InputError(
-            path, "extension", path.suffix, "a format that can be written is needed", tuple(WRITER_OF_EXTENSION)
+            measurement_path,
+            "extension",
+            measurement_path.suffix,
+            "a format that can be written is needed",
+            tuple(WRITER_OF_EXTENSION),
         )
-    check_groups(path, groups, start)
-    with new_file(path) as part:
-        WRITER_OF_EXTENSION[path.suffix.lower()](path, part, groups, start, comment)
-    return path
+    check_groups(measurement_path, channel_groups, start_time)
+    with new_file(measurement_path) as part:
+        WRITER_OF_EXTENSION[measurement_path.suffix.lower()](
+            measurement_path, part, channel_groups, start_time, comment
+        )
+    return measurement_path
 
 
-def _first_bytes(path: Path) -> bytes:
+def _first_bytes(measurement_path: Path) -> bytes:
     """First bytes of a file; raises InputError if it is missing, empty or unreadable."""
-    if not path.exists():
-        raise InputError(path, "", None, f"the file does not exist{similar_file(path)}")
-    if not path.is_file():
-        raise InputError(path, "", None, f"this is not a file; {KNOWN_FORMATS}")
+    if not measurement_path.exists():
+        raise InputError(measurement_path, "", None, f"the file does not exist{similar_file(measurement_path)}")
+    if not measurement_path.is_file():
+        raise InputError(measurement_path, "", None, f"this is not a file; {KNOWN_FORMATS}")
     try:
-        with path.open("rb") as file:
+        with measurement_path.open("rb") as file:
             head = file.read(256)
     except OSError as error:
-        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+        raise InputError(measurement_path, "", None, f"the file cannot be read: {error.strerror}") from None
     if not head:
-        raise InputError(path, "", None, "the file is empty")
+        raise InputError(measurement_path, "", None, "the file is empty")
     return head

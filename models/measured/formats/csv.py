@@ -23,7 +23,7 @@ from models.core.csv_header import TableHead, name_and_unit
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.tables import SECONDS
-from models.measured.channel import Channel
+from models.measured.channel import FileChannel
 from models.measured.formats.csv_layout import (
     TIME_UNITS,
     Remarks,
@@ -33,7 +33,7 @@ from models.measured.formats.csv_layout import (
     find_units,
     read_first_lines,
 )
-from models.measured.formats.csv_rows import ROWS_PER_MARK, Layout, find_rows, numbers_of_rows, one_byte_text
+from models.measured.formats.csv_rows import ROWS_PER_MARK, CsvLayout, find_rows, numbers_of_rows, one_byte_text
 from models.measured.formats.opened import (
     OpenFile,
     SampleSpan,
@@ -46,68 +46,71 @@ from models.measured.formats.opened import (
 
 @dataclass(frozen=True)
 class CsvFile(OpenFile):
-    """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, and its last element is the end of the
-    used rows.
+    """Reader of a CSV file; ``row_positions[k]`` is the byte where row 1000 k begins, and its last element is the end
+    of the used rows.
 
-    clock : column of time among those of numbers, None where times are those of the clock. factor : to s. columns :
-    of the channels, among those of numbers.
+    time_column : column of time among those of numbers, None where times are those of the clock. seconds_per_unit : of
+    that column. channel_columns : of the channels, among those of numbers.
     """
 
-    layout: Layout
-    rows: np.ndarray
-    clock: int | None
-    factor: float
-    columns: tuple[int, ...]
+    layout: CsvLayout
+    row_positions: np.ndarray
+    time_column: int | None
+    seconds_per_unit: float
+    channel_columns: tuple[int, ...]
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of the rows of each span."""
-        columns = [self.columns[i] for i in channel_indices]
+        columns = [self.channel_columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
-            for first, count in spans:
+            for first, count in sample_spans:
                 table, times = numbers_of_rows(self.path, self.layout, self._bytes_of_rows(file, first, count), first)
-                yield self.factor * table[:, self.clock] if times is None else times, table[:, columns]
+                yield self.seconds_per_unit * table[:, self.time_column] if times is None else times, table[:, columns]
 
-    def _bytes_of_rows(self, file: io.BufferedReader, first: int, count: int) -> bytes:
-        """Bytes of ``count`` rows from row ``first`` on."""
-        low, high = first // ROWS_PER_MARK, min(-(-(first + count) // ROWS_PER_MARK), len(self.rows) - 1)
-        file.seek(int(self.rows[low]))
-        text = file.read(int(self.rows[high] - self.rows[low]))
+    def _bytes_of_rows(self, open_file: io.BufferedReader, first_row: int, row_count: int) -> bytes:
+        """Bytes of ``row_count`` rows from row ``first_row`` on."""
+        low, high = (
+            first_row // ROWS_PER_MARK,
+            min(-(-(first_row + row_count) // ROWS_PER_MARK), len(self.row_positions) - 1),
+        )
+        open_file.seek(int(self.row_positions[low]))
+        text = open_file.read(int(self.row_positions[high] - self.row_positions[low]))
         unit = self.layout.unit
         ends = np.flatnonzero(np.frombuffer(text, unit) == ord("\n"))
-        skipped = first - low * ROWS_PER_MARK
+        skipped = first_row - low * ROWS_PER_MARK
         begin = 0 if skipped == 0 else int(ends[skipped - 1]) + 1
-        return text[begin * unit.itemsize : (int(ends[skipped + count - 1]) + 1) * unit.itemsize]
+        return text[begin * unit.itemsize : (int(ends[skipped + row_count - 1]) + 1) * unit.itemsize]
 
 
-def open_csv(path: Path) -> CsvFile:
+def open_csv(csv_path: Path) -> CsvFile:
     """``CsvFile`` of a path: headings read, rows counted, notation determined; raises InputError."""
-    with library_errors_as_input(path):
-        first_lines = read_first_lines(path)
-        head, clock, remarks, findings = find_headings_and_clock(path, first_lines)
-        units, unit_findings = find_units(path, first_lines, head, clock)
-        layout, notes = find_layout(path, first_lines, head, clock, units)
-        rows, count, left = find_rows(path, layout)
-        findings += notes + unit_findings + _findings_on_end(path, layout, remarks, count, left)
-        factor = 1.0 if layout.time_stamps else _factor_to_seconds(path, head, clock, units[clock])
-        start, notes = start_with_zone(path, remarks.start) if remarks.start else (layout.start, [])
+    with library_errors_as_input(csv_path):
+        first_lines = read_first_lines(csv_path)
+        head, clock, remarks, findings = find_headings_and_clock(csv_path, first_lines)
+        units, unit_findings = find_units(csv_path, first_lines, head, clock)
+        layout, notes = find_layout(csv_path, first_lines, head, clock, units)
+        rows, count, left = find_rows(csv_path, layout)
+        findings += notes + unit_findings + _findings_on_end(csv_path, layout, remarks, count, left)
+        factor = 1.0 if layout.time_stamps else _factor_to_seconds(csv_path, head, clock, units[clock])
+        start, notes = start_with_zone(csv_path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
         if not columns:
             raise InputError(
-                path,
+                csv_path,
                 f"line {head.header.number} (header)",
                 ", ".join(head.names),
                 "a column of numbers beside time is needed",
             )
         groups = head.groups()
         families = [groups[i] if groups else "" for i in columns]
-        names, repeated = distinct_names(path, [name_and_unit(head.names[i])[0] for i in columns], families)
+        names, repeated = distinct_names(csv_path, [name_and_unit(head.names[i])[0] for i in columns], families)
         channels = tuple(
-            Channel(
+            FileChannel(
                 name,
                 unit_of(head.names[i]) or units[i],
-                "\n".join(remarks.of_channels.get(name, [])),
+                "\n".join(remarks.channel_comments.get(name, [])),
                 0,
                 count,
                 None,
@@ -117,7 +120,7 @@ def open_csv(path: Path) -> CsvFile:
         )
         places = {column: i for i, column in enumerate(layout.numbers)}
         return CsvFile(
-            path,
+            csv_path,
             channels,
             start,
             "\n".join(remarks.comments),
@@ -130,11 +133,11 @@ def open_csv(path: Path) -> CsvFile:
         )
 
 
-def unit_of(text: str) -> str:
+def unit_of(heading: str) -> str:
     """Unit in a column heading: in brackets, or in parentheses if the text there is a unit of a quantity that can be
     mapped."""
-    unit = name_and_unit(text)[1]
-    bracketed = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", text) if "[" not in text else None
+    unit = name_and_unit(heading)[1]
+    bracketed = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", heading) if "[" not in heading else None
     if bracketed is None:
         return unit
     from models.measured.units import quantities_of_unit
@@ -142,30 +145,34 @@ def unit_of(text: str) -> str:
     return bracketed[1].strip() if quantities_of_unit(bracketed[1]) else ""
 
 
-def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, byte_count_left: int) -> list[Finding]:
+def _findings_on_end(
+    csv_path: Path, layout: CsvLayout, remarks: Remarks, row_count: int, byte_count_left: int
+) -> list[Finding]:
     """Findings on a file that does not end as a complete file does."""
-    if count == 0:
-        raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
-    findings, samples = list[Finding](), remarks.samples
+    if row_count == 0:
+        raise InputError(csv_path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
+    findings, samples = list[Finding](), remarks.sample_count
     if byte_count_left:
-        with path.open("rb") as file:
+        with csv_path.open("rb") as file:
             file.seek(-byte_count_left, io.SEEK_END)
-            is_whole = one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
+            is_whole = (
+                one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.cells_per_row
+            )
         ends = "may be" if is_whole else "is"
-        text = f"the last line has no line end and {ends} cut off: it is left out, and {count} rows are used"
-        findings.append(flaw_finding(path, "note" if is_whole else "doubt", text))
-    if samples is not None and samples > count:
-        text = f"the header announces {samples} rows, but {count} are there: the file is cut off"
-        findings.append(flaw_finding(path, "doubt", text))
-    if samples is not None and samples < count:
-        raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
+        text = f"the last line has no line end and {ends} cut off: it is left out, and {row_count} rows are used"
+        findings.append(flaw_finding(csv_path, "note" if is_whole else "doubt", text))
+    if samples is not None and samples > row_count:
+        text = f"the header announces {samples} rows, but {row_count} are there: the file is cut off"
+        findings.append(flaw_finding(csv_path, "doubt", text))
+    if samples is not None and samples < row_count:
+        raise InputError(csv_path, "samples", samples, f"the header announces fewer rows than there are ({row_count})")
     return findings
 
 
-def _factor_to_seconds(path: Path, header: TableHead, clock: int, unit: str) -> float:
+def _factor_to_seconds(csv_path: Path, table_head: TableHead, time_column: int, unit: str) -> float:
     """Factor from the unit of the column of times to seconds."""
-    name, given = clock_heading(header.names[clock])
+    name, given = clock_heading(table_head.names[time_column])
     if (given or unit).casefold() not in TIME_UNITS:
-        place = f"line {header.header.number} (header), column {name!r}, unit"
-        raise InputError(path, place, given or unit, f"write {name} [s]", tuple(SECONDS))
+        place = f"line {table_head.header.number} (header), column {name!r}, unit"
+        raise InputError(csv_path, place, given or unit, f"write {name} [s]", tuple(SECONDS))
     return TIME_UNITS[(given or unit).casefold()]

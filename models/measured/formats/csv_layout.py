@@ -24,7 +24,7 @@ from models.core.csv_header import (
 )
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
-from models.measured.formats.csv_rows import Layout
+from models.measured.formats.csv_rows import CsvLayout
 from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import flaw_finding
 
@@ -34,7 +34,7 @@ FIRST_ROWS_LINES = 2000
 """Number of lines at the beginning of a file that must contain the first rows of numbers."""
 TIME_COLUMN_NAMES = ("time", "zeit", "t")
 """Usual names of the column of time."""
-OTHER_CLOCKS = (
+OTHER_TIME_COLUMN_NAMES = (
     "timestamp",
     "timestamps",
     "time stamp",
@@ -82,7 +82,7 @@ _DATE_PATTERN = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _NUMBER_START_PATTERN = re.compile(r"[+-]?[.,]?\d")
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
 """Byte-order marks with which text begins, and the encoding that each shows."""
-NEEDED_HEADER_TEXT = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
+NEEDED_HEADINGS_TEXT = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
 
 @dataclass
@@ -108,35 +108,35 @@ class Remarks:
 
     comments: list[str] = field(default_factory=list)
     start: str = ""
-    samples: int | None = None
-    of_channels: dict[str, list[str]] = field(default_factory=dict)
+    sample_count: int | None = None
+    channel_comments: dict[str, list[str]] = field(default_factory=dict)
 
-    def add(self, path: Path, line_number: int, text: str) -> None:
+    def add(self, csv_path: Path, line_number: int, comment_text: str) -> None:
         """Evaluate one comment line, given without its ``#``."""
-        key, _, value = text.partition(":")
+        key, _, value = comment_text.partition(":")
         if key == "start":
             self.start = value.strip()
         elif key == "samples":
             if not value.strip().isdecimal():
-                raise InputError(path, f"line {line_number}, samples", value.strip(), "a number of rows is needed")
-            self.samples = int(value)
-        elif (remark := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', text)) is not None:
-            self.of_channels.setdefault(_name_in_quotes(path, line_number, remark[1]), []).append(remark[2])
+                raise InputError(csv_path, f"line {line_number}, samples", value.strip(), "a number of rows is needed")
+            self.sample_count = int(value)
+        elif (remark := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', comment_text)) is not None:
+            self.channel_comments.setdefault(_name_in_quotes(csv_path, line_number, remark[1]), []).append(remark[2])
         else:
-            self.comments.append(value.removeprefix(" ") if key == "comment" else text)
+            self.comments.append(value.removeprefix(" ") if key == "comment" else comment_text)
 
 
-def _name_in_quotes(path: Path, line_number: int, quoted: str) -> str:
+def _name_in_quotes(csv_path: Path, line_number: int, quoted_name: str) -> str:
     """A channel's name from a JSON string in quotes."""
     try:
-        return str(json.loads(quoted))
+        return str(json.loads(quoted_name))
     except ValueError:
-        raise InputError(path, f"line {line_number}", quoted, "a channel's name in quotes is needed") from None
+        raise InputError(csv_path, f"line {line_number}", quoted_name, "a channel's name in quotes is needed") from None
 
 
-def read_first_lines(path: Path) -> FirstLines:
+def read_first_lines(csv_path: Path) -> FirstLines:
     """``FirstLines`` of a file; raises InputError where no line is text."""
-    with path.open("rb") as file:
+    with csv_path.open("rb") as file:
         data = file.read(FIRST_ROWS_BYTES)
     codec, mark = next(
         ((codec, mark) for mark, codec in BYTE_ORDER_MARKS.items() if data.startswith(mark)), ("utf-8", b"")
@@ -152,47 +152,48 @@ def read_first_lines(path: Path) -> FirstLines:
             first_lines.lines.append(line)
     if first_lines.separator and first_lines.separator not in SEPARATORS:
         raise InputError(
-            path, "line 1", first_lines.separator, f"{', '.join(SEPARATORS.values())} can part the columns"
+            csv_path, "line 1", first_lines.separator, f"{', '.join(SEPARATORS.values())} can part the columns"
         )
     if not first_lines.lines and not (first_lines.comment_lines and not first_lines.unreadable_line):
         old = b"\r" in data and b"\n" not in data
         hint = ": lines end as on an old Macintosh, and have to be saved with line ends of today" if old else ""
         raise InputError(
-            path,
+            csv_path,
             f"line {first_lines.unreadable_line or len(first_lines.comment_lines) + 1}",
             None,
-            NEEDED_HEADER_TEXT + hint,
+            NEEDED_HEADINGS_TEXT + hint,
         )
     return first_lines
 
 
-def _complete_lines(data: bytes, begin: int, codec: str, first_lines: FirstLines) -> Iterator[FileLine]:
+def _complete_lines(file_bytes: bytes, first_byte: int, codec: str, first_lines: FirstLines) -> Iterator[FileLine]:
     """Complete lines of text, up to the first one that contains a zero character or has no line end."""
     size = first_lines.unit.itemsize
-    ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], first_lines.unit) == ord("\n")) + 1) * size
+    characters = np.frombuffer(file_bytes[: len(file_bytes) // size * size], first_lines.unit)
+    ends = (np.flatnonzero(characters == ord("\n")) + 1) * size
     for number, end in enumerate(ends[:FIRST_ROWS_LINES].tolist(), start=1):
         try:
-            text, foreign = data[begin:end].decode(codec), False
+            text, foreign = file_bytes[first_byte:end].decode(codec), False
         except UnicodeDecodeError:
-            text, foreign = data[begin:end].decode("cp1252", errors="replace"), True
+            text, foreign = file_bytes[first_byte:end].decode("cp1252", errors="replace"), True
         if "\0" in text:
             first_lines.unreadable_line = number
             return
-        line = FileLine(number, text.rstrip("\r\n"), begin, end)
+        line = FileLine(number, text.rstrip("\r\n"), first_byte, end)
         if foreign:
             first_lines.undecodable_lines.append(line)
         yield line
-        begin = end
+        first_byte = end
     first_lines.unreadable_line = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
 
 
-def find_headings_and_clock(path: Path, first_lines: FirstLines) -> tuple[TableHead, int, Remarks, list[Finding]]:
+def find_headings_and_clock(csv_path: Path, first_lines: FirstLines) -> tuple[TableHead, int, Remarks, list[Finding]]:
     """Headings above the numbers, index of the column of time, facts in the comments, and findings on these lines."""
-    head, known = _table_head(path, first_lines)
+    head, known = _table_head(csv_path, first_lines)
     clocks = [i for i, name in enumerate(head.names) if known(name)]
     if len(clocks) != 1:
         raise InputError(
-            path,
+            csv_path,
             f"line {head.header.number} (header)",
             ", ".join(head.names),
             f"one column time [s] is needed, found {len(clocks)}",
@@ -205,7 +206,7 @@ def find_headings_and_clock(path: Path, first_lines: FirstLines) -> tuple[TableH
     ]
     for line in sorted(above):
         if line in first_lines.comment_lines:
-            remarks.add(path, line.number, line.text.strip()[1:].strip())
+            remarks.add(csv_path, line.number, line.text.strip()[1:].strip())
         else:
             remarks.comments.append(line.text.strip(' ",;\t'))
     foreign = {
@@ -214,12 +215,12 @@ def find_headings_and_clock(path: Path, first_lines: FirstLines) -> tuple[TableH
         if passage.number <= head.line_before_numbers
     }
     odd = "is not UTF-8 and is read as Windows-1252"
-    said = [flaw_finding(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
+    said = [flaw_finding(csv_path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
     if first_lines.unit.itemsize > 1:
-        said.append(flaw_finding(path, "note", "the text is UTF-16"))
+        said.append(flaw_finding(csv_path, "note", "the text is UTF-16"))
     if head.titles:
         text = f"{len(head.titles)} line(s) above the headings in line {head.header.number} are kept as the comment"
-        said.append(flaw_finding(path, "note", text))
+        said.append(flaw_finding(csv_path, "note", text))
     return head, clocks[0], remarks, said
 
 
@@ -227,7 +228,7 @@ IsClock = Callable[[str], bool]
 """Function that tells whether a heading means the column of time."""
 
 
-def _table_head(path: Path, first_lines: FirstLines) -> tuple[TableHead, IsClock]:
+def _table_head(csv_path: Path, first_lines: FirstLines) -> tuple[TableHead, IsClock]:
     """Headings above the numbers, determined by the first method that gives exactly one result. Lines behind # count
     too, since numpy writes headings there."""
     signs = (first_lines.separator,) if first_lines.separator else tuple(SEPARATORS)
@@ -242,15 +243,15 @@ def _table_head(path: Path, first_lines: FirstLines) -> tuple[TableHead, IsClock
                 what = " and ".join(SEPARATORS[head.separator] for head in heads)
                 place, text = f"line {heads[0].header.number} (header)", heads[0].header.text
                 raise InputError(
-                    path, place, text, f"commas alone (or semicolons, or tabs) must part the columns, found {what}"
+                    csv_path, place, text, f"commas alone (or semicolons, or tabs) must part the columns, found {what}"
                 )
-    raise _no_clock_error(path, first_lines, signs)
+    raise _no_clock_error(csv_path, first_lines, signs)
 
 
-def _no_clock_error(path: Path, first_lines: FirstLines, signs: tuple[str, ...]) -> InputError:
+def _no_clock_error(csv_path: Path, first_lines: FirstLines, tried_signs: tuple[str, ...]) -> InputError:
     """InputError that says why no line can be the headings, and what the user has to write."""
     lines = first_lines.lines or first_lines.comment_lines
-    first = next((line for line in lines if any(sign in line.text for sign in signs)), lines[0])
+    first = next((line for line in lines if any(sign in line.text for sign in tried_signs)), lines[0])
     place, text = f"line {first.number} (header)", first.text.strip()
     rate = next(
         (line for line in (*first_lines.lines, *first_lines.comment_lines) if _RATE_PATTERN.search(line.text)), None
@@ -260,100 +261,99 @@ def _no_clock_error(path: Path, first_lines: FirstLines, signs: tuple[str, ...])
             f"one column time [s] is needed, found 0: line {rate.number} ({rate.text.strip()[:40]!r}) speaks of the "
             "sampling; write the time of every row"
         )
-    elif not any(sign in first.text for sign in signs):
+    elif not any(sign in first.text for sign in tried_signs):
         needed = (
-            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED_HEADER_TEXT}"
+            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED_HEADINGS_TEXT}"
         )
-    elif any(all(map(is_number, cells)) for sign in signs if len(cells := split_cells(text, sign)) > 1):
+    elif any(all(map(is_number, cells)) for sign in tried_signs if len(cells := split_cells(text, sign)) > 1):
         needed = "the file begins with numbers: write a header line time [s], name [unit], ... above them"
     else:
         needed = "one column time [s] is needed, found 0: call it so in the header line"
-    return InputError(path, place, text, needed)
+    return InputError(csv_path, place, text, needed)
 
 
-def clock_heading(text: str) -> tuple[str, str]:
+def clock_heading(heading: str) -> tuple[str, str]:
     """Name and unit in the heading of a column of time; the unit is in brackets, or as in ``time (s)``, ``time / s``,
     ``time_s``."""
-    name, unit = name_and_unit(text)
+    name, unit = name_and_unit(heading)
     in_name = re.fullmatch(r"(.*?)\s*(?:\(([^()]*)\)|[/_,]\s*([^\W\d]+))", name) if not unit else None
     if in_name is not None and (in_name[2] is not None or in_name[3].casefold() in TIME_UNITS):
         return in_name[1], (in_name[2] or in_name[3] or "").strip()
     return name, unit
 
 
-def is_clock(text: str) -> bool:
+def is_clock(heading: str) -> bool:
     """Whether a heading is a usual name of the column of time."""
-    return clock_heading(text)[0].casefold() in TIME_COLUMN_NAMES
+    return clock_heading(heading)[0].casefold() in TIME_COLUMN_NAMES
 
 
-def is_other_clock(text: str) -> bool:
+def is_other_clock(heading: str) -> bool:
     """Whether a heading can mean the column of time, in a file where no heading is a usual name of it."""
-    name = clock_heading(text)[0]
+    name = clock_heading(heading)[0]
     parted = (name, re.sub(r"([a-z])([A-Z])", r"\1 \2", name))
-    return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
+    return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_TIME_COLUMN_NAMES for words in parted)
 
 
-def first_cells(first_lines: FirstLines, header: TableHead) -> list[list[str]]:
+def first_cells(first_lines: FirstLines, table_head: TableHead) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; rows of another width are skipped here and reported later."""
-    lines = [line for line in first_lines.lines if line.number > header.line_before_numbers]
-    rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
-    return [[row[i] for row in rows] for i in range(len(header.names))]
+    lines = [line for line in first_lines.lines if line.number > table_head.line_before_numbers]
+    rows = [cells for line in lines if len(cells := split_cells(line.text, table_head.separator)) == table_head.width]
+    return [[row[i] for row in rows] for i in range(len(table_head.names))]
 
 
 def find_layout(
-    path: Path, first_lines: FirstLines, header: TableHead, clock: int, units: tuple[str, ...]
-) -> tuple[Layout, list[Finding]]:
-    """``Layout`` of the rows of a CSV file, from the first rows, and findings; raises InputError where two
+    csv_path: Path, first_lines: FirstLines, table_head: TableHead, time_column: int, column_units: tuple[str, ...]
+) -> tuple[CsvLayout, list[Finding]]:
+    """``CsvLayout`` of the rows of a CSV file, from the first rows, and findings; raises InputError where two
     interpretations are possible."""
-    columns = first_cells(first_lines, header)
-    first = next(iter(columns[clock]), "")
-    stamps = find_stamps(path, first, header.line_before_numbers + 1, header.names[clock]) if is_stamp(first) else None
-    nameless = tuple(i for i, name in enumerate(header.names) if not name_and_unit(name)[0])
-    texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
-    taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
+    columns, first_row = first_cells(first_lines, table_head), table_head.line_before_numbers + 1
+    first = next(iter(columns[time_column]), "")
+    stamps = find_stamps(csv_path, first, first_row, table_head.names[time_column]) if is_stamp(first) else None
+    nameless = tuple(i for i, name in enumerate(table_head.names) if not name_and_unit(name)[0])
+    texts = tuple(i for i, cells in enumerate(columns) if i not in (time_column, *nameless) and _is_text(cells))
+    taken = tuple(sorted({*texts, *nameless, *((time_column,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
-    decimal = decimal_sign(path, header.line_before_numbers + 1, header.separator, list(numbers))
-    layout = Layout(
-        header.separator,
+    decimal = decimal_sign(csv_path, first_row, table_head.separator, list(numbers))
+    layout = CsvLayout(
+        table_head.separator,
         decimal,
-        header.numbers_begin,
-        header.line_before_numbers,
-        header.names,
-        header.width,
+        table_head.numbers_begin,
+        table_head.line_before_numbers,
+        table_head.names,
+        table_head.width,
         taken,
-        clock,
+        time_column,
         stamps,
         first_lines.unit,
     )
     said = list[Finding]()
     for i in texts:
-        weight: Weight = "doubt" if units[i] or name_and_unit(header.names[i])[1] else "note"
-        said.append(flaw_finding(path, weight, f"left out, no numbers: {header.names[i]!r}"))
+        weight: Weight = "doubt" if column_units[i] or name_and_unit(table_head.names[i])[1] else "note"
+        said.append(flaw_finding(csv_path, weight, f"left out, no numbers: {table_head.names[i]!r}"))
     for i in nameless:
         cells = columns[i]
         counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
         weight = "note" if counts else "doubt"
-        said.append(flaw_finding(path, weight, f"column {i + 1} has no name and is left out"))
-    return layout, said + [flaw_finding(path, "note", text) for text in _layout_remarks(layout, list(numbers))]
+        said.append(flaw_finding(csv_path, weight, f"column {i + 1} has no name and is left out"))
+    return layout, said + [flaw_finding(csv_path, "note", text) for text in _layout_remarks(layout, list(numbers))]
 
 
-def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
+def _layout_remarks(layout: CsvLayout, cells: list[str]) -> Iterator[str]:
     """Sentences on deviations from the usual form: commas between columns of numbers with decimal points."""
     stamps = layout.time_stamps
     if stamps is not None:
         wraps = "; they go on past midnight" if stamps.notation == "hh:mm:ss.fff" else ""
         yield (
-            f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.notation}); seconds are "
-            "counted from the "
-            f"first, {stamps.first}{wraps}"
+            f"{layout.names[layout.time_column]!r} holds times of the clock ({stamps.notation}); seconds are "
+            f"counted from the first, {stamps.first_text}{wraps}"
         )
     marks = [
         repr(cell) for cell in cells if cell.casefold() not in ("", "nan") and MISSING_VALUE_PATTERN.fullmatch(cell)
     ]
     if marks:
         yield f"cells {', '.join(marks)} are read as not measured"
-    sign = "comma" if layout.decimal == "," else "point"
-    if layout.separator != "," or layout.decimal == ",":
+    sign = "comma" if layout.decimal_sign == "," else "point"
+    if layout.separator != "," or layout.decimal_sign == ",":
         yield f"{SEPARATORS[layout.separator]} part the columns and the decimal sign is a {sign}"
 
 
@@ -362,9 +362,9 @@ def is_stamp(cell: str) -> bool:
     return not is_number(cell) and CLOCK_TIME_PATTERN.fullmatch(cell) is not None
 
 
-def _is_text(cells: list[str]) -> bool:
+def _is_text(column_cells: list[str]) -> bool:
     """Whether a column holds text or dates, so that no cell in it can be a number."""
-    said = [cell for cell in cells if not MISSING_VALUE_PATTERN.fullmatch(cell)]
+    said = [cell for cell in column_cells if not MISSING_VALUE_PATTERN.fullmatch(cell)]
     return bool(said) and all(
         CLOCK_TIME_PATTERN.fullmatch(cell) or _DATE_PATTERN.fullmatch(cell) or not _NUMBER_START_PATTERN.match(cell)
         for cell in said
@@ -372,26 +372,26 @@ def _is_text(cells: list[str]) -> bool:
 
 
 def find_units(
-    path: Path, first_lines: FirstLines, header: TableHead, clock: int
+    csv_path: Path, first_lines: FirstLines, table_head: TableHead, time_column: int
 ) -> tuple[tuple[str, ...], list[Finding]]:
     """Units of the columns from a row below the headings, empty texts if there is no such row, and findings."""
-    stamped = any(map(is_stamp, first_cells(first_lines, header)[clock][:1]))
-    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.rows_between]
-    known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)
-    unit_row = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
+    stamped = any(map(is_stamp, first_cells(first_lines, table_head)[time_column][:1]))
+    rows = [(line, [_bare_unit(cell) for cell in table_head.cells(line)]) for line in table_head.rows_between]
+    known = {*TIME_UNITS, "", "-"} if clock_heading(table_head.names[time_column])[1] else set(TIME_UNITS)
+    unit_row = next((row for row in rows if row[1][time_column].casefold() in known or stamped), None)
     if unit_row is None:
         said = [
             flaw_finding(
-                path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}"
+                csv_path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}"
             )
             for line, _ in rows
         ]
-        return ("",) * len(header.names), said
+        return ("",) * len(table_head.names), said
     line, units = unit_row
-    for i, (name, unit) in enumerate(zip(header.names, units, strict=True)):
-        if unit not in ("", "-") and name_and_unit(name)[1] not in ("", unit) and not (stamped and i == clock):
-            raise InputError(path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
-    return tuple(units), [flaw_finding(path, "note", f"line {line.number}, beneath the headings, is read as units")]
+    for i, (name, unit) in enumerate(zip(table_head.names, units, strict=True)):
+        if unit not in ("", "-") and name_and_unit(name)[1] not in ("", unit) and not (stamped and i == time_column):
+            raise InputError(csv_path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
+    return tuple(units), [flaw_finding(csv_path, "note", f"line {line.number}, beneath the headings, is read as units")]
 
 
 def _bare_unit(cell: str) -> str:

@@ -32,7 +32,7 @@ class TimeStamps:
     notation: str
     zone: str
     first_time: int
-    first: str
+    first_text: str
 
     @property
     def start(self) -> datetime | None:
@@ -42,16 +42,16 @@ class TimeStamps:
         text = str(np.datetime64(self.first_time, "ns").astype("datetime64[us]"))
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
-    def seconds(self, path: Path, cells: list[str], line_number: int, name: str) -> np.ndarray:
+    def seconds(self, csv_path: Path, time_cells: list[str], line_number: int, column_name: str) -> np.ndarray:
         """Seconds (n,) since the first time stamp, for the cells of some rows, of which the first is line
         ``line_number``.
 
         Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
         """
         try:
-            stamps = np.array([self._cell_for_numpy(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
+            stamps = np.array([self._cell_for_numpy(cell) for cell in time_cells], "datetime64[ns]").astype(np.int64)
         except (ValueError, TypeError):
-            raise self._first_wrong_cell(path, cells, line_number, name) from None
+            raise self._first_wrong_cell(csv_path, time_cells, line_number, column_name) from None
         passed = stamps - self.first_time
         return np.asarray((passed % DAY_IN_NANOSECONDS if self.notation == "hh:mm:ss.fff" else passed) / 1e9)
 
@@ -62,39 +62,43 @@ class TimeStamps:
             raise ValueError(cell)
         return _iso_text(matched)
 
-    def _first_wrong_cell(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
+    def _first_wrong_cell(
+        self, csv_path: Path, time_cells: list[str], line_number: int, column_name: str
+    ) -> InputError:
         """InputError for the first cell that is no time in this notation."""
-        for i, cell in enumerate(cells):
+        for i, cell in enumerate(time_cells):
             try:
                 np.datetime64(self._cell_for_numpy(cell), "ns")
             except ValueError:
                 where = f" with the zone {self.zone}" if self.zone else ""
                 return InputError(
-                    path,
-                    f"line {line_number + i}, column {name!r}",
+                    csv_path,
+                    f"line {line_number + i}, column {column_name!r}",
                     cell.strip(),
-                    f"a time such as {self.first} is needed ({self.notation}{where}, as in the first row)",
+                    f"a time such as {self.first_text} is needed ({self.notation}{where}, as in the first row)",
                 )
-        return InputError(path, f"line {line_number} and after, column {name!r}", None, "times of the clock are needed")
+        return InputError(
+            csv_path, f"line {line_number} and after, column {column_name!r}", None, "times of the clock are needed"
+        )
 
 
-def find_stamps(path: Path, cell: str, line_number: int, name: str) -> TimeStamps:
+def find_stamps(csv_path: Path, first_cell: str, line_number: int, column_name: str) -> TimeStamps:
     """``TimeStamps`` of a column, from its first cell; raises InputError, with advice, where the cell can be read in
     two ways."""
-    cell = cell.strip()
+    first_cell = first_cell.strip()
     for form, pattern in TIME_NOTATIONS.items():
-        matched = pattern.fullmatch(cell)
+        matched = pattern.fullmatch(first_cell)
         if matched is not None:
-            plain = TimeStamps(form, matched.groupdict().get("zone") or "", 0, cell)
+            plain = TimeStamps(form, matched.groupdict().get("zone") or "", 0, first_cell)
             try:
                 zero = int(np.datetime64(_iso_text(matched), "ns").astype(np.int64))
             except ValueError:
-                raise plain._first_wrong_cell(path, [cell], line_number, name) from None
-            return TimeStamps(form, plain.zone, zero, cell)
+                raise plain._first_wrong_cell(csv_path, [first_cell], line_number, column_name) from None
+            return TimeStamps(form, plain.zone, zero, first_cell)
     raise InputError(
-        path,
-        f"line {line_number}, column {name!r}",
-        cell,
+        csv_path,
+        f"line {line_number}, column {column_name!r}",
+        first_cell,
         "this notation of times has two meanings or none: "
         "write 2026-03-02T09:30:00.000, 09:30:00.000, or seconds in a column time [s]",
     )

@@ -24,7 +24,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.measured.channel import Channel
+from models.measured.channel import FileChannel
 from models.measured.formats.mdf4_blocks import VARIABLE_LENGTH_FLAG, check_blocks
 from models.measured.formats.opened import (
     OpenFile,
@@ -33,7 +33,7 @@ from models.measured.formats.opened import (
     distinct_names,
     flaw_finding,
     library_errors_as_input,
-    without_numbers,
+    no_readable_channel_error,
 )
 
 SECONDS_SYNCHRONISATION = 1
@@ -56,32 +56,34 @@ LINEAR_CONVERSION = {3: 0, 4: 1}
 
 @dataclass(frozen=True)
 class MdfFile(OpenFile):
-    """Reader of an MDF file; ``places`` holds the group and the index of every channel in the file."""
+    """Reader of an MDF file; ``channel_places`` holds the group and the index of every channel in the file."""
 
-    places: tuple[tuple[int, int], ...]
+    channel_places: tuple[tuple[int, int], ...]
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of the records of each span, loaded once for all channels."""
         with opened_mdf(self.path) as mdf:
-            group = self.places[channel_indices[0]][0]
-            for first, count in spans:
+            group = self.channel_places[channel_indices[0]][0]
+            for first, count in sample_spans:
                 with suppressed_output():
-                    block = _record_block(mdf, group, [self.places[i][1] for i in channel_indices], first, count)
+                    block = _record_block(
+                        mdf, group, [self.channel_places[i][1] for i in channel_indices], first, count
+                    )
                 yield block
 
 
 @contextmanager
-def opened_mdf(path: Path) -> Iterator[Any]:
+def opened_mdf(mdf_path: Path) -> Iterator[Any]:
     """Context with asammdf's open file, its terminal output suppressed; InputError where the file is damaged or the
     package missing."""
     try:
         from asammdf import MDF
     except ImportError:
-        raise InputError(path, "", None, "MDF files need asammdf: pip install 'twinrig[measured]'") from None
+        raise InputError(mdf_path, "", None, "MDF files need asammdf: pip install 'twinrig[measured]'") from None
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
-    with path.open("rb") as file:  # a path would be mapped into memory as a whole
+    with mdf_path.open("rb") as file:  # a path would be mapped into memory as a whole
         mdf, why = None, ""
         with suppressed_output():
             try:
@@ -92,7 +94,7 @@ def opened_mdf(path: Path) -> Iterator[Any]:
             if mdf is None:
                 gc.collect()  # what it left in circles would complain later
         if mdf is None:
-            raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})")
+            raise InputError(mdf_path, "", None, f"the file is damaged and cannot be read ({why})")
         try:
             yield mdf
         finally:
@@ -110,89 +112,101 @@ def suppressed_output() -> Iterator[None]:
         sys.unraisablehook = kept
 
 
-def _record_block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _record_block(
+    mdf: Any, group_index: int, channel_indices: list[int], first_record: int, record_count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Times and values of some records, loaded only once; asammdf's public functions would load them again for each
     channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
-    data_blocks = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
-    unit = mdf.groups[group].channels[mdf.masters_db[group]].unit or ""
+    data_blocks = list(
+        mdf._mdf._load_data(mdf.groups[group_index], record_offset=first_record, record_count=record_count)
+    )
+    unit = mdf.groups[group_index].channels[mdf.masters_db[group_index]].unit or ""
     times = SECONDS_OF_UNIT.get(unit.strip(), 1.0) * np.concatenate(
-        [mdf.get_master(group, data=data_block) for data_block in data_blocks]
+        [mdf.get_master(group_index, data=data_block) for data_block in data_blocks]
     )
     values = [
-        np.concatenate([_physical_values(mdf, group, i, data_block) for data_block in data_blocks]) for i in indices
+        np.concatenate([_physical_values(mdf, group_index, i, data_block) for data_block in data_blocks])
+        for i in channel_indices
     ]
-    return times[:count], np.column_stack(values)[:count]
+    return times[:record_count], np.column_stack(values)[:record_count]
 
 
-def _physical_values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
+def _physical_values(mdf: Any, group_index: int, channel_index: int, records: Any) -> np.ndarray:
     """Physical values (n,) of one channel in some records; NaN where they are marked as invalid.
 
     What the library calls to ignore the marks is to hand them over; it would leave out the samples otherwise.
     """
-    samples, invalid = mdf.get(group=group, index=index, data=records, samples_only=True, ignore_invalidation_bits=True)
+    samples, invalid = mdf.get(
+        group=group_index, index=channel_index, data=records, samples_only=True, ignore_invalidation_bits=True
+    )
     values = np.asarray(samples, float)
     return values if invalid is None else np.where(np.asarray(invalid, bool), np.nan, values)
 
 
-def open_mdf(path: Path) -> MdfFile:
+def open_mdf(mdf_path: Path) -> MdfFile:
     """``MdfFile`` of a path with its list of channels; raises InputError where the file is damaged."""
-    with library_errors_as_input(path):
-        with path.open("rb") as file:
+    with library_errors_as_input(mdf_path):
+        with mdf_path.open("rb") as file:
             identification = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
         if identification is None:
-            raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
+            raise InputError(mdf_path, "byte 8", None, "MDF of version 3 or 4 can be read")
         version = int(identification[1])
-        findings = check_blocks(path) if version == 4 else []
-        with opened_mdf(path) as mdf:
-            return _file_with_channels(path, mdf, version, findings)
+        findings = check_blocks(mdf_path) if version == 4 else []
+        with opened_mdf(mdf_path) as mdf:
+            return _file_with_channels(mdf_path, mdf, version, findings)
 
 
-def _file_with_channels(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfFile:
+def _file_with_channels(mdf_path: Path, mdf: Any, mdf_version: int, findings: list[Finding]) -> MdfFile:
     """``MdfFile`` with the channels that hold numbers over time."""
     left_out, locations, channels = SkippedChannels(), [], []
     for g, group in enumerate(mdf.groups):
         records = group.channel_group
-        if version == 3 and records.cycles_nr * records.samples_byte_nr > path.stat().st_size:
+        if mdf_version == 3 and records.cycles_nr * records.samples_byte_nr > mdf_path.stat().st_size:
             raise InputError(
-                path, f"group {g + 1}", records.cycles_nr, "the file is too short for the records that it announces"
+                mdf_path, f"group {g + 1}", records.cycles_nr, "the file is too short for the records that it announces"
             )
-        why = _why_group_unusable(mdf, g, version)
+        why = _why_group_unusable(mdf, g, mdf_version)
         if why:
             left_out.add(why, f"group {g + 1}")
             continue
         for i, channel in enumerate(group.channels):
             if i == mdf.masters_db.get(g):
                 continue
-            why = _why_channel_unusable(group, i, version)
+            why = _why_channel_unusable(group, i, mdf_version)
             if why:
                 left_out.add(why, repr(channel.name))
             else:
                 locations.append((g, i))
                 channels.append(channel)
-    findings = findings + left_out.findings(path)
+    findings = findings + left_out.findings(mdf_path)
     if not locations:
-        raise without_numbers(path, findings)
+        raise no_readable_channel_error(mdf_path, findings)
     groups = [
         _group_names(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, locations, strict=True)
     ]
-    names, repeated = distinct_names(path, [channel.name for channel in channels], *zip(*groups, strict=True))
+    names, repeated = distinct_names(mdf_path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
-        Channel(
+        FileChannel(
             name,
             channel.unit or "",
             _plain_comment(channel.comment),
             g,
             mdf.groups[g].channel_group.cycles_nr,
             None,
-            _value_step(channel, version),
+            _value_step(channel, mdf_version),
             next(filter(None, texts), ""),
         )
         for name, channel, (g, _), texts in zip(names, channels, locations, groups, strict=True)
     )
-    start, notes = _start_time(path, mdf.header, version)
+    start, notes = _start_time(mdf_path, mdf.header, mdf_version)
     return MdfFile(
-        path, listed, start, _plain_comment(mdf.header.comment), tuple(findings + repeated + notes), tuple(locations)
+        mdf_path,
+        listed,
+        start,
+        _plain_comment(mdf.header.comment),
+        tuple(findings + repeated + notes),
+        tuple(locations),
     )
 
 
@@ -207,45 +221,53 @@ def _group_names(group: Any, channel: Any) -> tuple[str, str, str, str]:
     return (getattr(group, "acq_name", None) or "").strip(), sources[0], comment.strip(), sources[1]
 
 
-def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
+def _why_group_unusable(mdf: Any, group_index: int, mdf_version: int) -> str:
     """Reason why a channel group cannot be used; empty if it can."""
-    group, master = mdf.groups[g], mdf.masters_db.get(g)
+    group, master = mdf.groups[group_index], mdf.masters_db.get(group_index)
     if group.channel_group.cycles_nr == 0:
         return "no samples"
-    if version == 4 and group.channel_group.flags & VARIABLE_LENGTH_FLAG:
+    if mdf_version == 4 and group.channel_group.flags & VARIABLE_LENGTH_FLAG:
         return "records with lengths of their own"
     if master is None:
         return "no clock"
-    if version == 4 and group.channels[master].sync_type != SECONDS_SYNCHRONISATION:
+    if mdf_version == 4 and group.channels[master].sync_type != SECONDS_SYNCHRONISATION:
         return "its clock does not count seconds"
-    return "" if _bits_within_record(group, group.channels[master], version) else "its clock lies outside the records"
+    return (
+        ""
+        if _bits_within_record(group, group.channels[master], mdf_version)
+        else ("its clock lies outside the records")
+    )
 
 
-def _why_channel_unusable(group: Any, i: int, version: int) -> str:
+def _why_channel_unusable(group: Any, channel_index: int, mdf_version: int) -> str:
     """Reason why a channel does not give one number per sample; empty if it does."""
-    channel = group.channels[i]
+    channel = group.channels[channel_index]
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
-    if version == 4 and channel.flags & ALL_INVALID:
+    if mdf_version == 4 and channel.flags & ALL_INVALID:
         return "marked as invalid by the recorder"
     numbers = (
         channel.channel_type == 0
-        and channel.data_type in NUMBER_TYPES[version]
-        and conversion in NUMERIC_CONVERSIONS[version]
+        and channel.data_type in NUMBER_TYPES[mdf_version]
+        and conversion in NUMERIC_CONVERSIONS[mdf_version]
     )
-    if not numbers or group.channel_dependencies[i]:
+    if not numbers or group.channel_dependencies[channel_index]:
         return "no numbers"
-    return "" if _bits_within_record(group, channel, version) else "bits outside the records (a damaged file has such)"
+    return (
+        ""
+        if _bits_within_record(group, channel, mdf_version)
+        else ("bits outside the records (a damaged file has such)")
+    )
 
 
-def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
+def _bits_within_record(group: Any, channel: Any, mdf_version: int) -> bool:
     """Whether a channel's bits lie inside its records. asammdf copies without this check and could crash the
     process."""
-    records, whole = group.channel_group, channel.data_type in WHOLE_NUMBER_TYPES[version]
-    if version == 4 and channel.channel_type == VIRTUAL_MASTER:
+    records, whole = group.channel_group, channel.data_type in WHOLE_NUMBER_TYPES[mdf_version]
+    if mdf_version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
-    begin = 8 * channel.byte_offset + channel.bit_offset if version == 4 else channel.start_offset
-    begin += 8 * getattr(channel, "additional_byte_offset", 0) if version == 3 else 0
-    marked = version == 4 and channel.flags & INVALIDATION_FLAGS
+    begin = 8 * channel.byte_offset + channel.bit_offset if mdf_version == 4 else channel.start_offset
+    begin += 8 * getattr(channel, "additional_byte_offset", 0) if mdf_version == 3 else 0
+    marked = mdf_version == 4 and channel.flags & INVALIDATION_FLAGS
     return (
         0 <= begin <= begin + channel.bit_count <= 8 * records.samples_byte_nr
         and (0 < channel.bit_count <= 64 if whole else begin % 8 == 0 and channel.bit_count in (16, 32, 64))
@@ -253,15 +275,15 @@ def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
     )
 
 
-def _value_step(channel: Any, version: int) -> float:
+def _value_step(channel: Any, mdf_version: int) -> float:
     """Step between values of a channel stored as whole numbers, in its unit; 0 for floating-point values and nonlinear
     conversions."""
-    if channel.data_type not in WHOLE_NUMBER_TYPES[version]:
+    if channel.data_type not in WHOLE_NUMBER_TYPES[mdf_version]:
         return 0.0
     conversion = channel.conversion
-    if conversion is None or conversion.conversion_type == (0 if version == 4 else 65535):
+    if conversion is None or conversion.conversion_type == (0 if mdf_version == 4 else 65535):
         return 1.0
-    return abs(float(conversion.a)) if conversion.conversion_type == LINEAR_CONVERSION[version] else 0.0
+    return abs(float(conversion.a)) if conversion.conversion_type == LINEAR_CONVERSION[mdf_version] else 0.0
 
 
 def _plain_comment(comment: str) -> str:
@@ -275,17 +297,17 @@ def _plain_comment(comment: str) -> str:
     return (root.findtext(".//TX") or "").strip()
 
 
-def _start_time(path: Path, header: Any, version: int) -> tuple[datetime | None, list[Finding]]:
+def _start_time(mdf_path: Path, file_header: Any, mdf_version: int) -> tuple[datetime | None, list[Finding]]:
     """Date and time at time 0; None, with a finding, where the file does not give the time zone."""
-    if not getattr(header, "abs_time", 0):
-        return None, [flaw_finding(path, "note", "the file does not say when it was measured")]
-    if version == 4 and header.time_flags & LOCAL_TIME_FLAG:
-        clock = datetime.fromtimestamp(header.abs_time / 1e9, UTC)
+    if not getattr(file_header, "abs_time", 0):
+        return None, [flaw_finding(mdf_path, "note", "the file does not say when it was measured")]
+    if mdf_version == 4 and file_header.time_flags & LOCAL_TIME_FLAG:
+        clock = datetime.fromtimestamp(file_header.abs_time / 1e9, UTC)
         text = f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the file does not name, and is not used"
-        return None, [flaw_finding(path, "doubt", text)]
-    minutes = 60 * header.tz_offset if version == 3 else 0
-    if version == 4 and header.time_flags & OFFSET_VALID_FLAG:
-        minutes = header.tz_offset + header.daylight_save_time
-    seconds, nanoseconds = divmod(header.abs_time, 10**9)
+        return None, [flaw_finding(mdf_path, "doubt", text)]
+    minutes = 60 * file_header.tz_offset if mdf_version == 3 else 0
+    if mdf_version == 4 and file_header.time_flags & OFFSET_VALID_FLAG:
+        minutes = file_header.tz_offset + file_header.daylight_save_time
+    seconds, nanoseconds = divmod(file_header.abs_time, 10**9)
     zone = timezone(timedelta(minutes=minutes))
     return datetime.fromtimestamp(seconds, zone) + timedelta(microseconds=nanoseconds // 1000), []

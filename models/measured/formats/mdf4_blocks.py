@@ -48,68 +48,81 @@ class MdfBlock:
     data: bytes
 
 
-def check_blocks(path: Path) -> list[Finding]:
+def check_blocks(mdf_path: Path) -> list[Finding]:
     """Findings on an MDF 4 file with more records than it announces; raises InputError at the byte where its structure
     is inconsistent."""
-    size = path.stat().st_size
+    size = mdf_path.stat().st_size
     if size < FIRST_BLOCK_OFFSET + HEAD_BYTES:
-        raise InputError(path, f"byte {size}", None, "the file ends in its header")
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        raise InputError(mdf_path, f"byte {size}", None, "the file ends in its header")
+    with mdf_path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
             text = "the recorder did not finish this file: let its software finalise it, or asammdf save it anew"
-            raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), text)
-        blocks = dict(_linked_blocks(path, data, size))
+            raise InputError(mdf_path, "byte 0", data[:8].decode("latin-1").strip(), text)
+        blocks = dict(_linked_blocks(mdf_path, data, size))
         if blocks[FIRST_BLOCK_OFFSET].kind != b"##HD":
-            raise InputError(path, f"byte {FIRST_BLOCK_OFFSET}", None, "the header block ##HD is needed")
-    _check_chains(path, blocks)
+            raise InputError(mdf_path, f"byte {FIRST_BLOCK_OFFSET}", None, "the header block ##HD is needed")
+    _check_chains(mdf_path, blocks)
     groups = [(place, block) for place, block in blocks.items() if block.kind == b"##DG"]
-    return [finding for place, block in groups for finding in _check_records(path, place, block, blocks)]
+    return [finding for place, block in groups for finding in _check_records(mdf_path, place, block, blocks)]
 
 
-def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, MdfBlock]]:
+def _linked_blocks(mdf_path: Path, file_bytes: mmap.mmap, file_size: int) -> Iterator[tuple[int, MdfBlock]]:
     """Every block that a link points to, by its position in the file."""
     seen, ahead, cut = (
         {FIRST_BLOCK_OFFSET},
         [FIRST_BLOCK_OFFSET],
-        f"; the file has {size} bytes: it is cut off or damaged",
+        f"; the file has {file_size} bytes: it is cut off or damaged",
     )
     while ahead:
         place = ahead.pop()
-        if not FIRST_BLOCK_OFFSET <= place <= size - HEAD_BYTES or data[place : place + 2] != b"##":
-            raise InputError(path, f"byte {place}", None, f"a block must begin here{cut}")
-        length, count = struct.unpack_from("<QQ", data, place + 8)
-        if place + length > size or HEAD_BYTES + 8 * count > length:
+        if not FIRST_BLOCK_OFFSET <= place <= file_size - HEAD_BYTES or file_bytes[place : place + 2] != b"##":
+            raise InputError(mdf_path, f"byte {place}", None, f"a block must begin here{cut}")
+        length, count = struct.unpack_from("<QQ", file_bytes, place + 8)
+        if place + length > file_size or HEAD_BYTES + 8 * count > length:
             text = f"a block of {length} bytes with {count} links begins here{cut}"
-            raise InputError(path, f"byte {place}", None, text)
-        links = struct.unpack_from(f"<{count}Q", data, place + HEAD_BYTES)
+            raise InputError(mdf_path, f"byte {place}", None, text)
+        links = struct.unpack_from(f"<{count}Q", file_bytes, place + HEAD_BYTES)
         rest = place + HEAD_BYTES + 8 * count
-        yield place, MdfBlock(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
+        yield (
+            place,
+            MdfBlock(file_bytes[place : place + 4], length, links, file_bytes[rest : min(rest + 100, place + length)]),
+        )
         new = {link for link in links if link} - seen
         seen |= new
         ahead += sorted(new)
 
 
-def _check_chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
+def _check_chains(mdf_path: Path, blocks_by_position: dict[int, MdfBlock]) -> None:
     """Raise InputError for a chain of links that leads back to one of its own blocks."""
     ended: set[int] = set()
-    for place in blocks:
+    for place in blocks_by_position:
         chain: dict[int, None] = {}
-        while place and place not in ended and blocks[place].kind in CHAINED_BLOCKS and blocks[place].links:
+        while (
+            place
+            and place not in ended
+            and blocks_by_position[place].kind in CHAINED_BLOCKS
+            and blocks_by_position[place].links
+        ):
             if place in chain:
-                raise InputError(path, f"byte {place}", None, "a chain of blocks leads back to this one")
+                raise InputError(mdf_path, f"byte {place}", None, "a chain of blocks leads back to this one")
             chain[place] = None
-            place = blocks[place].links[0]
+            place = blocks_by_position[place].links[0]
         ended |= set(chain)
 
 
-def _check_records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock]) -> list[Finding]:
+def _check_records(
+    mdf_path: Path, link_position: int, data_group: MdfBlock, blocks_by_position: dict[int, MdfBlock]
+) -> list[Finding]:
     """Findings on a data group with more bytes than its records need; raises InputError if channel groups announce more
     records than it has bytes for."""
-    there = sum(_unpacked_length(path, at, blocks) for at in _data_positions(path, group.links[2], blocks))
-    id_size = group.data[0]
-    needed, loose, at = 0, False, group.links[1]
+    there = sum(
+        _unpacked_length(mdf_path, at, blocks_by_position)
+        for at in _data_positions(mdf_path, data_group.links[2], blocks_by_position)
+    )
+    id_size = data_group.data[0]
+    needed, loose, at = 0, False, data_group.links[1]
     while at:
-        block = blocks[at]
+        block = blocks_by_position[at]
         _, cycles, flags = struct.unpack_from("<QQH", block.data)
         record_size = sum(struct.unpack_from("<II", block.data, 24))
         loose |= bool(flags & VARIABLE_LENGTH_FLAG)
@@ -117,33 +130,35 @@ def _check_records(path: Path, place: int, group: MdfBlock, blocks: dict[int, Md
         at = block.links[0]
     if needed > there:
         allowed = f"the records of this data group need {needed} bytes, and {there} are there"
-        raise InputError(path, f"byte {place}", None, allowed)
+        raise InputError(mdf_path, f"byte {link_position}", None, allowed)
     if needed < there and not loose:
-        text = f"the data group at byte {place} has {there} bytes of records; {needed} are announced and read"
-        return [flaw_finding(path, "doubt", text)]
+        text = f"the data group at byte {link_position} has {there} bytes of records; {needed} are announced and read"
+        return [flaw_finding(mdf_path, "doubt", text)]
     return []
 
 
-def _data_positions(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list[int]:
+def _data_positions(mdf_path: Path, link_position: int, blocks_by_position: dict[int, MdfBlock]) -> list[int]:
     """Positions of the data blocks that a link leads to, directly or through a list."""
-    places, ahead = list[int](), [place]
+    places, ahead = list[int](), [link_position]
     while ahead:
         at = ahead.pop()
-        if len(places) > len(blocks):
-            raise InputError(path, f"byte {place}", None, "a list of data blocks names more of them than there are")
-        if at and blocks[at].kind in (b"##DL", b"##HL", b"##LD"):
-            ahead += blocks[at].links
+        if len(places) > len(blocks_by_position):
+            raise InputError(
+                mdf_path, f"byte {link_position}", None, "a list of data blocks names more of them than there are"
+            )
+        if at and blocks_by_position[at].kind in (b"##DL", b"##HL", b"##LD"):
+            ahead += blocks_by_position[at].links
         elif at:
             places.append(at)
     return places
 
 
-def _unpacked_length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
+def _unpacked_length(mdf_path: Path, block_position: int, blocks_by_position: dict[int, MdfBlock]) -> int:
     """Number of bytes of records in a data block after unpacking."""
-    block = blocks[place]
+    block = blocks_by_position[block_position]
     if block.kind != b"##DZ":
         return block.length - HEAD_BYTES - 8 * len(block.links)
     plain, packed = struct.unpack_from("<QQ", block.data, 8)
     if plain > LARGEST_COMPRESSION * packed + HEAD_BYTES:
-        raise InputError(path, f"byte {place}", plain, f"{packed} packed bytes cannot hold as many")
+        raise InputError(mdf_path, f"byte {block_position}", plain, f"{packed} packed bytes cannot hold as many")
     return int(plain)

@@ -17,7 +17,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.measured.channel import Channel
+from models.measured.channel import FileChannel
 from models.measured.formats.opened import (
     OpenFile,
     SampleSpan,
@@ -46,9 +46,9 @@ class SampleLayout:
     """Layout of the samples in an RPC III file: byte of the first group, points in a group, number of channels, data
     type, factor of each channel, period (s)."""
 
-    begin: int
-    points: int
-    width: int
+    first_byte: int
+    samples_per_group: int
+    channel_count: int
     dtype: np.dtype
     scales: np.ndarray
     period: float
@@ -61,38 +61,40 @@ class RpcFile(OpenFile):
     layout: SampleLayout
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of each span, from the groups that hold it."""
         layout = self.layout
-        size = layout.points * layout.width * layout.dtype.itemsize
+        size = layout.samples_per_group * layout.channel_count * layout.dtype.itemsize
         with self.path.open("rb") as file:
-            for first, count in spans:
-                low, high = first // layout.points, -(-(first + count) // layout.points)
-                file.seek(layout.begin + low * size)
+            for first, count in sample_spans:
+                low, high = first // layout.samples_per_group, -(-(first + count) // layout.samples_per_group)
+                file.seek(layout.first_byte + low * size)
                 data = np.frombuffer(file.read((high - low) * size), layout.dtype).reshape(
-                    -1, layout.width, layout.points
+                    -1, layout.channel_count, layout.samples_per_group
                 )
                 samples = data[:, channel_indices].transpose(0, 2, 1).reshape(-1, len(channel_indices))
                 with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN all the same
                     values = samples.astype(float) * layout.scales[channel_indices]
-                skipped = first - low * layout.points
+                skipped = first - low * layout.samples_per_group
                 yield layout.period * np.arange(first, first + count), values[skipped : skipped + count]
 
 
-def open_rpc(path: Path) -> RpcFile:
+def open_rpc(rpc_path: Path) -> RpcFile:
     """``RpcFile`` of a path: header read and compared with the length of the file; raises InputError."""
-    with library_errors_as_input(path):
-        parameters = read_parameters(path)
-        layout = _sample_layout(path, parameters)
-        count, said = _usable_samples(path, parameters, layout)
-        said += _numbers_of_names(path, parameters, layout.width)
-        numbers = range(1, layout.width + 1)
+    with library_errors_as_input(rpc_path):
+        parameters = read_parameters(rpc_path)
+        layout = _sample_layout(rpc_path, parameters)
+        count, said = _usable_samples(rpc_path, parameters, layout)
+        said += _findings_on_names(rpc_path, parameters, layout.channel_count)
+        numbers = range(1, layout.channel_count + 1)
         names = [parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}" for i in numbers]
-        names, repeated = distinct_names(path, names)
-        steps = np.abs(layout.scales) if layout.dtype == SAMPLE_TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
+        names, repeated = distinct_names(rpc_path, names)
+        steps = (
+            np.abs(layout.scales) if layout.dtype == SAMPLE_TYPES["SHORT_INTEGER"] else np.zeros(layout.channel_count)
+        )
         channels = tuple(
-            Channel(
+            FileChannel(
                 name,
                 parameters.get(f"UNITS.CHAN_{i}", "").strip(),
                 _join_long_text(parameters, f"COMMENT.CHAN_{i}"),
@@ -103,36 +105,40 @@ def open_rpc(path: Path) -> RpcFile:
             )
             for name, i, step in zip(names, numbers, steps, strict=True)
         )
-        start, notes = start_with_zone(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
+        start, notes = (
+            start_with_zone(rpc_path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
+        )
         return RpcFile(
-            path, channels, start, _join_long_text(parameters, "COMMENT"), (*said, *repeated, *notes), layout
+            rpc_path, channels, start, _join_long_text(parameters, "COMMENT"), (*said, *repeated, *notes), layout
         )
 
 
-def read_parameters(path: Path) -> dict[str, str]:
+def read_parameters(rpc_path: Path) -> dict[str, str]:
     """Parameters of an RPC III header by name; the first three have fixed positions and give the number of the
     others."""
-    with path.open("rb") as file:
+    with rpc_path.open("rb") as file:
         head = file.read(HEADER_BLOCK)
         if len(head) < HEADER_BLOCK:
-            raise InputError(path, f"byte {len(head)}", None, "the file ends in its header")
+            raise InputError(rpc_path, f"byte {len(head)}", None, "the file ends in its header")
         first = dict(_header_record(head, i) for i in range(3))
         if list(first) != FIRST_PARAMETERS:
             text = f"RPC III begins with {', '.join(FIRST_PARAMETERS[:2])} and {FIRST_PARAMETERS[2]}"
-            raise InputError(path, "header", list(first), text)
+            raise InputError(rpc_path, "header", list(first), text)
         if first["FORMAT"] not in LITTLE_ENDIAN:
-            raise InputError(path, "header, FORMAT", first["FORMAT"], f"one of {', '.join(LITTLE_ENDIAN)} can be read")
-        blocks = whole_number(path, first, "NUM_HEADER_BLOCKS", MOST_BLOCKS)
-        count = whole_number(path, first, "NUM_PARAMS", 4 * blocks)
+            raise InputError(
+                rpc_path, "header, FORMAT", first["FORMAT"], f"one of {', '.join(LITTLE_ENDIAN)} can be read"
+            )
+        blocks = whole_number(rpc_path, first, "NUM_HEADER_BLOCKS", MOST_BLOCKS)
+        count = whole_number(rpc_path, first, "NUM_PARAMS", 4 * blocks)
         head += file.read(HEADER_BLOCK * (blocks - 1))
     if len(head) < HEADER_BLOCK * blocks:
-        raise InputError(path, f"byte {len(head)}", None, f"the file ends in its header of {blocks} blocks")
+        raise InputError(rpc_path, f"byte {len(head)}", None, f"the file ends in its header of {blocks} blocks")
     return dict(_header_record(head, i) for i in range(count))
 
 
-def _header_record(record_bytes: bytes, i: int) -> tuple[str, str]:
-    """Name and value of header parameter number ``i``; both are ended by a zero byte."""
-    record = record_bytes[i * RECORD_LENGTH : (i + 1) * RECORD_LENGTH]
+def _header_record(record_bytes: bytes, parameter_index: int) -> tuple[str, str]:
+    """Name and value of header parameter number ``parameter_index``; both are ended by a zero byte."""
+    record = record_bytes[parameter_index * RECORD_LENGTH : (parameter_index + 1) * RECORD_LENGTH]
     key, value = (part.split(b"\0")[0] for part in (record[:KEY_LENGTH], record[KEY_LENGTH:]))
     try:
         return key.decode("utf-8").strip(), value.decode("utf-8")
@@ -140,27 +146,27 @@ def _header_record(record_bytes: bytes, i: int) -> tuple[str, str]:
         return key.decode("latin-1").strip(), value.decode("latin-1")
 
 
-def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int) -> int:
+def whole_number(rpc_path: Path, parameters: dict[str, str], parameter_name: str, maximum: int) -> int:
     """Value of a header parameter that must be a whole number from 1 to ``maximum``; raises InputError otherwise."""
-    text = parameters.get(name, "").strip()
+    text = parameters.get(parameter_name, "").strip()
     if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= maximum:
-        raise InputError(path, f"header, {name}", text, f"a whole number from 1 to {maximum} is needed")
+        raise InputError(rpc_path, f"header, {parameter_name}", text, f"a whole number from 1 to {maximum} is needed")
     return int(text.split(".")[0])
 
 
-def _real_parameter(path: Path, parameters: dict[str, str], name: str, positive: bool) -> float:
+def _real_parameter(rpc_path: Path, parameters: dict[str, str], parameter_name: str, must_be_positive: bool) -> float:
     """Value of a header parameter that must be a finite number; raises InputError otherwise."""
     try:
-        value = float(parameters.get(name, ""))
+        value = float(parameters.get(parameter_name, ""))
     except ValueError:
         value = np.nan
-    if not np.isfinite(value) or (positive and value <= 0.0):
-        needed = "a finite number is needed" + (" above 0" if positive else "")
-        raise InputError(path, f"header, {name}", parameters.get(name, ""), needed)
+    if not np.isfinite(value) or (must_be_positive and value <= 0.0):
+        needed = "a finite number is needed" + (" above 0" if must_be_positive else "")
+        raise InputError(rpc_path, f"header, {parameter_name}", parameters.get(parameter_name, ""), needed)
     return value
 
 
-def _sample_layout(path: Path, parameters: dict[str, str]) -> SampleLayout:
+def _sample_layout(rpc_path: Path, parameters: dict[str, str]) -> SampleLayout:
     """``SampleLayout`` from the header parameters."""
     for name, allowed in (
         ("FILE_TYPE", ("TIME_HISTORY",)),
@@ -170,61 +176,66 @@ def _sample_layout(path: Path, parameters: dict[str, str]) -> SampleLayout:
         type_of_file = parameters.get(name, allowed[0]).strip()
         if type_of_file not in allowed:
             raise InputError(
-                path, f"header, {name}", type_of_file, "only time histories of one of these can be read", allowed
+                rpc_path, f"header, {name}", type_of_file, "only time histories of one of these can be read", allowed
             )
     dtype = SAMPLE_TYPES[parameters.get("DATA_TYPE", "SHORT_INTEGER").strip()]
-    width = whole_number(path, parameters, "CHANNELS", 10**4)
-    points = whole_number(path, parameters, "PTS_PER_GROUP", 10**7)
-    if points % whole_number(path, parameters, "PTS_PER_FRAME", points):
-        raise InputError(path, "header, PTS_PER_GROUP", points, "a group must hold whole frames")
-    period = _real_parameter(path, parameters, "DELTA_T", True)
+    width = whole_number(rpc_path, parameters, "CHANNELS", 10**4)
+    points = whole_number(rpc_path, parameters, "PTS_PER_GROUP", 10**7)
+    if points % whole_number(rpc_path, parameters, "PTS_PER_FRAME", points):
+        raise InputError(rpc_path, "header, PTS_PER_GROUP", points, "a group must hold whole frames")
+    period = _real_parameter(rpc_path, parameters, "DELTA_T", True)
     scales = np.ones(width)
     if dtype == SAMPLE_TYPES["SHORT_INTEGER"]:
-        scales = np.array([_real_parameter(path, parameters, f"SCALE.CHAN_{i}", False) for i in range(1, width + 1)])
+        scales = np.array(
+            [_real_parameter(rpc_path, parameters, f"SCALE.CHAN_{i}", False) for i in range(1, width + 1)]
+        )
     return SampleLayout(
         HEADER_BLOCK * int(float(parameters["NUM_HEADER_BLOCKS"])), points, width, dtype, scales, period
     )
 
 
-def _usable_samples(path: Path, parameters: dict[str, str], layout: SampleLayout) -> tuple[int, list[Finding]]:
+def _usable_samples(rpc_path: Path, parameters: dict[str, str], layout: SampleLayout) -> tuple[int, list[Finding]]:
     """Number of usable samples, and findings on missing or surplus ones."""
-    frame = whole_number(path, parameters, "PTS_PER_FRAME", layout.points)
-    announced = frame * whole_number(path, parameters, "FRAMES", 10**12)
-    size = layout.points * layout.width * layout.dtype.itemsize
-    data = path.stat().st_size - layout.begin
-    present = layout.points * (data // size)
+    frame = whole_number(rpc_path, parameters, "PTS_PER_FRAME", layout.samples_per_group)
+    announced = frame * whole_number(rpc_path, parameters, "FRAMES", 10**12)
+    size = layout.samples_per_group * layout.channel_count * layout.dtype.itemsize
+    data = rpc_path.stat().st_size - layout.first_byte
+    present = layout.samples_per_group * (data // size)
     texts = list[str]()
     if "SAMPLES" in parameters:
-        announced = whole_number(path, parameters, "SAMPLES", announced)
+        announced = whole_number(rpc_path, parameters, "SAMPLES", announced)
     else:
         texts.append(
-            f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at "
+            f"the header does not say how many of the {announced} samples are measured: up to "
+            f"{layout.samples_per_group - 1} at "
             "the end may be padding of the last group"
         )
-    count, extra = min(announced, present), data - size * -(-announced // layout.points)
+    count, extra = min(announced, present), data - size * -(-announced // layout.samples_per_group)
     if count == 0:
-        raise InputError(path, f"byte {layout.begin}", None, "the file ends before its first group of samples does")
+        raise InputError(
+            rpc_path, f"byte {layout.first_byte}", None, "the file ends before its first group of samples does"
+        )
     if count < announced:
         texts.append(
             f"the header announces {announced} samples, but {count} are there in whole groups: the file is cut off"
         )
     if extra > 0:
         texts.append(f"{extra} bytes follow the samples that the header announces, unread")
-    return count, [flaw_finding(path, "doubt", text) for text in texts]
+    return count, [flaw_finding(rpc_path, "doubt", text) for text in texts]
 
 
-def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
+def _findings_on_names(rpc_path: Path, parameters: dict[str, str], channel_count: int) -> list[Finding]:
     """Findings on channels without a name; raises InputError for a name with a number above that of the channels."""
     numbers = {int(matched[1]) for key in parameters if (matched := re.fullmatch(r"DESC\.CHAN_(\d{1,9})", key))}
-    if numbers and max(numbers) > width:
-        raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")
-    unnamed = [str(i) for i in range(1, width + 1) if i not in numbers]
-    return [flaw_finding(path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
+    if numbers and max(numbers) > channel_count:
+        raise InputError(rpc_path, "header, CHANNELS", channel_count, f"a channel {max(numbers)} is described as well")
+    unnamed = [str(i) for i in range(1, channel_count + 1) if i not in numbers]
+    return [flaw_finding(rpc_path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
 
 
-def _join_long_text(parameters: dict[str, str], name: str) -> str:
+def _join_long_text(parameters: dict[str, str], parameter_name: str) -> str:
     """Text that is spread over several header parameters, NAME_1, NAME_2, ... with line ends written as ``\\n``."""
     parts: list[str] = []
-    while (key := f"{name}_{len(parts) + 1}") in parameters:
+    while (key := f"{parameter_name}_{len(parts) + 1}") in parameters:
         parts.append(parameters[key])
     return re.sub(r"\\(.)", lambda matched: "\n" if matched[1] == "n" else matched[1], "".join(parts))

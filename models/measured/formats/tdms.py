@@ -18,7 +18,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.measured.channel import Channel
+from models.measured.channel import FileChannel
 from models.measured.formats.opened import (
     OpenFile,
     SampleSpan,
@@ -26,7 +26,7 @@ from models.measured.formats.opened import (
     distinct_names,
     flaw_finding,
     library_errors_as_input,
-    without_numbers,
+    no_readable_channel_error,
 )
 
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
@@ -57,16 +57,16 @@ class ChannelLocation:
 class TdmsData(OpenFile):
     """Reader of a TDMS file with the location of every channel."""
 
-    places: tuple[ChannelLocation, ...]
+    channel_places: tuple[ChannelLocation, ...]
 
     def pieces(
-        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+        self, channel_indices: list[int], sample_spans: Iterable[SampleSpan]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times and values of each span, read separately for each channel."""
-        places = [self.places[i] for i in channel_indices]
+        places = [self.channel_places[i] for i in channel_indices]
         with BoundedFile(self.path) as file:
             data = opened_tdms(self.path, file)
-            for first, count in spans:
+            for first, count in sample_spans:
                 values = [np.asarray(data[each.group][each.name].read_data(first, count), float) for each in places]
                 least = min(len(column) for column in values)
                 place = places[0]
@@ -80,92 +80,101 @@ class BoundedFile(io.BufferedReader):
     """A file whose reads never allocate more memory than the file's size, since a damaged length field may claim
     gigabytes."""
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(io.FileIO(path))
-        self.size = path.stat().st_size
+    def __init__(self, tdms_path: Path) -> None:
+        super().__init__(io.FileIO(tdms_path))
+        self.size = tdms_path.stat().st_size
 
-    def read(self, size: int | None = -1, /) -> bytes:
+    def read(self, byte_count: int | None = -1, /) -> bytes:
         """Read at most the bytes that remain in the file."""
-        return super().read(size if size is None or size < 0 else min(size, max(self.size - self.tell(), 0)))
+        return super().read(
+            byte_count if byte_count is None or byte_count < 0 else min(byte_count, max(self.size - self.tell(), 0))
+        )
 
 
-def opened_tdms(path: Path, file: BoundedFile) -> Any:
+def opened_tdms(tdms_path: Path, bounded_file: BoundedFile) -> Any:
     """npTDMS's open file, with its terminal output suppressed; InputError where the package is missing."""
     try:
         from nptdms import TdmsFile
         from nptdms.log import log_manager
     except ImportError:
-        raise InputError(path, "", None, "TDMS files need npTDMS: pip install 'twinrig[measured]'") from None
+        raise InputError(tdms_path, "", None, "TDMS files need npTDMS: pip install 'twinrig[measured]'") from None
     log_manager.set_level(logging.CRITICAL)
-    return TdmsFile.open(file, raw_timestamps=True)
+    return TdmsFile.open(bounded_file, raw_timestamps=True)
 
 
-def open_tdms(path: Path) -> TdmsData:
+def open_tdms(tdms_path: Path) -> TdmsData:
     """``TdmsData`` of a path with its list of channels; raises InputError where the file is damaged."""
-    with library_errors_as_input(path):
-        cut = check_segments(path)
-        with BoundedFile(path) as file:
-            return _file_with_channels(path, opened_tdms(path, file), cut)
+    with library_errors_as_input(tdms_path):
+        cut = check_segments(tdms_path)
+        with BoundedFile(tdms_path) as file:
+            return _file_with_channels(tdms_path, opened_tdms(tdms_path, file), cut)
 
 
-def check_segments(path: Path) -> list[Finding]:
+def check_segments(tdms_path: Path) -> list[Finding]:
     """Findings on an incomplete last segment of a TDMS file; raises InputError for any other damage to the chain of
     segments."""
-    size, place = path.stat().st_size, 0
-    with path.open("rb") as file:
+    size, place = tdms_path.stat().st_size, 0
+    with tdms_path.open("rb") as file:
         while place < size:
             file.seek(place)
             lead = file.read(LEAD_IN_LENGTH)
             if not b"TDSm".startswith(lead[:4]):
-                raise InputError(path, f"byte {place}", lead[:4].hex(" "), "a segment of TDMS must begin here")
+                raise InputError(tdms_path, f"byte {place}", lead[:4].hex(" "), "a segment of TDMS must begin here")
             if len(lead) < LEAD_IN_LENGTH:
-                return [_cut_off_finding(path, place)]
+                return [_cut_off_finding(tdms_path, place)]
             order = ">" if lead[4] & 0x40 else "<"
             following, raw = struct.unpack(order + "QQ", lead[12:])
             if following == OPEN_END or place + LEAD_IN_LENGTH + following > size:
                 if place == 0 and LEAD_IN_LENGTH + raw > size:
-                    raise InputError(path, f"byte {size}", None, "the file ends before its first samples")
-                return [_cut_off_finding(path, place)]
+                    raise InputError(tdms_path, f"byte {size}", None, "the file ends before its first samples")
+                return [_cut_off_finding(tdms_path, place)]
             if raw > following:
-                raise InputError(path, f"byte {place + 20}", raw, "the samples begin after the end of their segment")
+                raise InputError(
+                    tdms_path, f"byte {place + 20}", raw, "the samples begin after the end of their segment"
+                )
             place += LEAD_IN_LENGTH + following
     return []
 
 
-def _cut_off_finding(path: Path, offset: int) -> Finding:
+def _cut_off_finding(tdms_path: Path, segment_offset: int) -> Finding:
     """Finding on a segment that is not complete."""
     return flaw_finding(
-        path, "doubt", f"the segment at byte {offset} is not complete: the file is cut off, and what is whole is read"
+        tdms_path,
+        "doubt",
+        f"the segment at byte {segment_offset} is not complete: the file is cut off, and what is whole is read",
     )
 
 
-def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
+def _file_with_channels(tdms_path: Path, tdms_file: Any, cut_off_findings: list[Finding]) -> TdmsData:
     """``TdmsData`` with the channels that hold numbers over time; channels with the same time axis form a group."""
     left_out = SkippedChannels()
     usable = [
-        (group, channel) for group in data.groups() for channel in group.channels() if _is_numeric(channel, left_out)
+        (group, channel)
+        for group in tdms_file.groups()
+        for channel in group.channels()
+        if _is_numeric(channel, left_out)
     ]
-    if sum(len(channel) for _, channel in usable) > path.stat().st_size:
-        raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
+    if sum(len(channel) for _, channel in usable) > tdms_path.stat().st_size:
+        raise InputError(tdms_path, "channels", None, "more samples are announced than the file has bytes")
     zero = min((start for _, channel in usable if (start := _start_in_utc(channel)) is not None), default=None)
     with_clock = [
         (channel, place)
         for group, channel in usable
         if (place := _channel_location(group, channel, zero, left_out)) is not None
     ]
-    findings = [*cut, *left_out.findings(path)]
+    findings = [*cut_off_findings, *left_out.findings(tdms_path)]
     if not with_clock:
-        raise without_numbers(path, findings)
+        raise no_readable_channel_error(tdms_path, findings)
     clocks = [(place.group, place.clock, place.first, place.increment) for _, place in with_clock]
     counts = [len(channel) for channel, _ in with_clock]
-    if cut:
+    if cut_off_findings:
         counts = [min(n for n, other in zip(counts, clocks, strict=True) if other == clock) for clock in clocks]
     keys = list(zip(clocks, counts, strict=True))
     names, repeated = distinct_names(
-        path, [place.name for _, place in with_clock], [place.group for _, place in with_clock]
+        tdms_path, [place.name for _, place in with_clock], [place.group for _, place in with_clock]
     )
     channels = tuple(
-        Channel(
+        FileChannel(
             name,
             _property_text(channel, *UNIT_PROPERTIES),
             _property_text(channel, "description"),
@@ -177,52 +186,52 @@ def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
         )
         for name, key, (channel, place) in zip(names, keys, with_clock, strict=True)
     )
-    comment = str(data.properties.get("description", "")).strip()
-    return TdmsData(path, channels, zero, comment, (*findings, *repeated), tuple(place for _, place in with_clock))
+    comment = str(tdms_file.properties.get("description", "")).strip()
+    return TdmsData(tdms_path, channels, zero, comment, (*findings, *repeated), tuple(place for _, place in with_clock))
 
 
-def _is_numeric(channel: Any, skipped_channels: SkippedChannels) -> bool:
+def _is_numeric(tdms_channel: Any, skipped_channels: SkippedChannels) -> bool:
     """Whether a channel holds real numbers, one or more."""
-    if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
+    if len(tdms_channel) and tdms_channel.data_type is not None and tdms_channel.dtype.kind in "iuf":
         return True
-    skipped_channels.add("no numbers" if len(channel) else "no samples", repr(channel.name))
+    skipped_channels.add("no numbers" if len(tdms_channel) else "no samples", repr(tdms_channel.name))
     return False
 
 
 def _channel_location(
-    group: Any, channel: Any, zero: datetime | None, skipped_channels: SkippedChannels
+    tdms_group: Any, tdms_channel: Any, time_zero: datetime | None, skipped_channels: SkippedChannels
 ) -> ChannelLocation | None:
     """Location of a channel's samples and times; None where it has no time axis, or is a time axis itself."""
-    properties, start = channel.properties, _start_in_utc(channel)
-    late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
+    properties, start = tdms_channel.properties, _start_in_utc(tdms_channel)
+    late = 0.0 if time_zero is None or start is None else (start - time_zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
     if str(properties.get("wf_xunit_string", "s")).casefold() not in SECOND_SPELLINGS:
-        skipped_channels.add("its clock does not count seconds", repr(channel.name))
+        skipped_channels.add("its clock does not count seconds", repr(tdms_channel.name))
         return None
     if np.isfinite(increment) and increment > 0.0:
         return ChannelLocation(
-            group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment
+            tdms_group.name, tdms_channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment
         )
     clocks = [
         clock
-        for clock in group.channels()
+        for clock in tdms_group.channels()
         if clock.name.casefold() in TIME_CHANNEL_NAMES
-        and len(clock) == len(channel)
+        and len(clock) == len(tdms_channel)
         and _property_text(clock, *UNIT_PROPERTIES).casefold() in SECOND_SPELLINGS
     ]
-    if channel.name.casefold() in TIME_CHANNEL_NAMES and clocks:
+    if tdms_channel.name.casefold() in TIME_CHANNEL_NAMES and clocks:
         return None
     if len(clocks) != 1:
         skipped_channels.add(
-            "no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name)
+            "no clock (wf_increment, or one channel 'time' in s of the same length)", repr(tdms_channel.name)
         )
         return None
-    return ChannelLocation(group.name, channel.name, clocks[0].name, late, 0.0)
+    return ChannelLocation(tdms_group.name, tdms_channel.name, clocks[0].name, late, 0.0)
 
 
-def _start_in_utc(channel: Any) -> datetime | None:
+def _start_in_utc(tdms_channel: Any) -> datetime | None:
     """Date and time in UTC at which a channel begins; None where the file does not say."""
-    stamp = channel.properties.get("wf_start_time")
+    stamp = tdms_channel.properties.get("wf_start_time")
     if not hasattr(stamp, "seconds"):
         return None
     start = TDMS_EPOCH + timedelta(
@@ -231,12 +240,14 @@ def _start_in_utc(channel: Any) -> datetime | None:
     return None if start - TDMS_EPOCH < timedelta(days=1) else start
 
 
-def _property_text(channel: Any, *names: str) -> str:
+def _property_text(tdms_channel: Any, *property_names: str) -> str:
     """Value of the first of the named properties that a channel has, as text."""
-    return next((str(channel.properties[name]).strip() for name in names if name in channel.properties), "")
+    return next(
+        (str(tdms_channel.properties[name]).strip() for name in property_names if name in tdms_channel.properties), ""
+    )
 
 
-def _value_step(channel: Any) -> float:
+def _value_step(tdms_channel: Any) -> float:
     """Step between values stored as whole numbers without a scaling; 0 otherwise."""
-    scaled = any(name.startswith("NI_Scale") for name in channel.properties)
-    return 1.0 if channel.dtype.kind in "iu" and not scaled else 0.0
+    scaled = any(name.startswith("NI_Scale") for name in tdms_channel.properties)
+    return 1.0 if tdms_channel.dtype.kind in "iu" and not scaled else 0.0

@@ -31,7 +31,7 @@ from models.core.errors import InputError
 from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, table_blocks
 from models.core.whole_files import whole_file
 from models.ensemble.runner import values_in_order
-from models.ensemble.store import Arrays, Store
+from models.ensemble.store import ArraysByName, BlockStore
 from models.systems.contact.scene import ContactMethod
 
 MOTION_COLUMNS = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
@@ -74,7 +74,7 @@ def solve_table(
     *,
     with_errors: bool = True,
     executor: Executor | None = None,
-    block_store: Store | None = None,
+    block_store: BlockStore | None = None,
 ) -> dict[str, int]:
     """Compute the creep forces of all contacts in the CSV file ``cases_path`` and write them to ``output_path``.
     Returns the numbers of all rows and of refused rows.
@@ -117,7 +117,7 @@ def compile_kernels(build_contacts: BuildContacts, contact_method: ContactMethod
 
 def solved_rows(
     row_block: RowBlock, build_contacts: BuildContacts, contact_method: ContactMethod, with_errors: bool
-) -> Arrays:
+) -> ArraysByName:
     """Solve a block of rows. Returns ``forces`` (rows, columns), the indices ``wrong`` (m,) of refused rows, and the
     reasons ``why`` (m,).
     """

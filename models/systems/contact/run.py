@@ -36,7 +36,7 @@ from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.scene_effects import extended_by_effects
 from models.core.tables import ROWS_PER_BLOCK as ROWS_PER_TABLE_BLOCK
-from models.ensemble.store import Store, named_files
+from models.ensemble.store import BlockStore, named_files
 from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.contact.assumptions import assumptions
 from models.systems.contact.assumptions import table_assumptions as assumptions_of_rows
@@ -223,7 +223,7 @@ def _solved_table(
     count = partial(_count_rows, report_progress, rows)
     if not several:
         return solve_table(file, output_path, built_contact, scene.method, count, with_errors=estimate_error)
-    store = Store(output_path.parent / BLOCKS_FOLDER)
+    store = BlockStore(output_path.parent / BLOCKS_FOLDER)
     facts = {"scene": scene.table(), "error": estimate_error, "files": named_files(scene.table(), Path(scene.folder))}
     with (
         store.reserved_folder(facts),

@@ -13,7 +13,7 @@ from models.core.scene_effects import effect_lines as effect_lines
 from models.engines.cut_vehicle import check_step, native_share
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES as FREE_ENGINES
-from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
+from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal, Quantity
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
 from models.systems.hub_forces.scene import ForceFrame, HubScene
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
@@ -178,12 +178,16 @@ def _finding_text(finding_text: str) -> str:
 
 def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
     """Returns the measured files of forces and angles as a ``Recording``, which the checks of recordings take."""
-    from models.measured.columns import MemoryColumns
+    from models.measured.columns import SamplesInMemory
     from models.measured.recording import Recording
 
-    def signal(location: str, quantity: Quantity, axis: str, file_name: str | None, frame: ForceFrame) -> Signal:
+    def signal(
+        location: str, quantity: Quantity, axis: str, file_name: str | None, frame: ForceFrame
+    ) -> MeasuredSignal:
         name = f"{location} {quantity} {axis}"
-        return Signal(name, str(file_name), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0)
+        return MeasuredSignal(
+            name, str(file_name), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0
+        )
 
     (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
     signals = (
@@ -196,4 +200,4 @@ def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
     )
     count = min(len(forces.samples), len(angles.samples))
     samples = np.hstack([forces.samples[:count], angles.samples[:count]])
-    return Recording(signals, MemoryColumns(tuple(s.name for s in signals), samples), forces.period)
+    return Recording(signals, SamplesInMemory(tuple(s.name for s in signals), samples), forces.period)

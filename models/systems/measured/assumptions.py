@@ -136,7 +136,9 @@ def _same_attitude_assumption(
         s.frame for s in recording_analysis.recording.signals if s.at in vehicle.hubs and recording_analysis.is_input(s)
     }
     angles = [
-        s for s in recording_analysis.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")
+        s
+        for s in recording_analysis.recording.find_signals("angle", vehicle.chassis)
+        if s.component in ("roll", "pitch")
     ]
     if frames != {"inertial"} or not angles:
         return []

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from models.core.errors import InputError, suggestion_phrase
-from models.measured.channel import Channel, Source
-from models.measured.signal import Frame, Places, Quantity, Signal
+from models.measured.channel import FileChannel, MeasurementSource
+from models.measured.signal import Frame, MeasuredSignal, MeasurementPlaces, Quantity
 from models.measured.units import factor_to_si
 from models.systems.measured.scene import MappedChannel, MeasuredScene
 
@@ -19,8 +19,8 @@ COMPONENTS_OF_QUANTITY: dict[Quantity, tuple[str, ...]] = {
 
 
 def mapped_signals(
-    scene: MeasuredScene, measurement_files: Sequence[Source], transducer_places: Places
-) -> tuple[Signal, ...]:
+    scene: MeasuredScene, measurement_files: Sequence[MeasurementSource], transducer_places: MeasurementPlaces
+) -> tuple[MeasuredSignal, ...]:
     """Returns the signals of all mapped channels, in the order of the scene; ``measurement_files`` : the scene's opened
     files.
 
@@ -32,7 +32,7 @@ def mapped_signals(
         for file, source in zip(scene.files, measurement_files, strict=True)
         for row in file.channels
     ]
-    names, mapped = [row.channel for _, row, _ in rows], list[Signal]()
+    names, mapped = [row.channel for _, row, _ in rows], list[MeasuredSignal]()
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
         signal = _signal_of_entry(scene.file, place, row, source, transducer_places, name)
@@ -59,10 +59,10 @@ def _signal_of_entry(
     file_name: str,
     key_path: str,
     mapped_channel: MappedChannel,
-    measurement_file: Source,
-    transducer_places: Places,
+    measurement_file: MeasurementSource,
+    transducer_places: MeasurementPlaces,
     key_of_place: str,
-) -> Signal:
+) -> MeasuredSignal:
     channel, at_hub = (
         find_channel(measurement_file, mapped_channel.channel, file_name, key_path),
         mapped_channel.at in transducer_places.hubs,
@@ -92,7 +92,7 @@ def _signal_of_entry(
         mapped_channel.check or mapped_channel.quantity == "strain" or mapped_channel.at in transducer_places.connectors
     )
     location = mapped_channel.channel, mapped_channel.quantity, mapped_channel.at, mapped_channel.component
-    return Signal(
+    return MeasuredSignal(
         key_of_place,
         measurement_file.path.name,
         *location,
@@ -106,7 +106,7 @@ def _signal_of_entry(
     )
 
 
-def find_channel(measurement_file: Source, channel_name: str, file_name: str, key_path: str) -> Channel:
+def find_channel(measurement_file: MeasurementSource, channel_name: str, file_name: str, key_path: str) -> FileChannel:
     """Returns the channel of a file by its name. Raises InputError, with the most similar names, if there is not
     exactly one.
     """
@@ -128,7 +128,7 @@ def find_channel(measurement_file: Source, channel_name: str, file_name: str, ke
     )
 
 
-def _similar_channels(channel_name: str, measurement_file: Source) -> str:
+def _similar_channels(channel_name: str, measurement_file: MeasurementSource) -> str:
     """Text with the channels of a file whose names are most similar to ``channel_name``, or else with the first
     channels.
     """
@@ -142,7 +142,9 @@ def _similar_channels(channel_name: str, measurement_file: Source) -> str:
     )
 
 
-def _check_place(file_name: str, key_path: str, mapped_channel: MappedChannel, transducer_places: Places) -> None:
+def _check_place(
+    file_name: str, key_path: str, mapped_channel: MappedChannel, transducer_places: MeasurementPlaces
+) -> None:
     """Raise InputError for a place where the mapped quantity cannot be measured, and for a component that it does not
     have there.
     """

@@ -19,13 +19,13 @@ from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 from models.core.scene_effects import extended_by_effects
 from models.core.whole_files import write_whole
-from models.measured.channel import SAMPLES_PER_BLOCK, Source
-from models.measured.columns import Columns
+from models.measured.channel import SAMPLES_PER_BLOCK, MeasurementSource
+from models.measured.columns import SampleFile
 from models.measured.gaps import without_impossible_values
-from models.measured.recording import Progress, Recording, no_progress
-from models.measured.resampling import EQUAL_RATES, resample_to
-from models.measured.signal import Signal
-from models.measured.timing import EVEN_CLOCK_SHARE, Timing, sample_timing
+from models.measured.recording import Progress, Recording, report_no_progress
+from models.measured.resampling import EQUAL_RATE_RATIO, resample_to
+from models.measured.signal import MeasuredSignal
+from models.measured.timing import EVEN_CLOCK_DEVIATION_SHARE, SampleTiming, sample_timing
 from models.systems.measured.scene import MeasuredScene
 
 COLUMNS_FILE, RAW_COLUMNS_FILE, SOURCES_FILE, ABSURD_VALUES_FILE = (
@@ -49,9 +49,9 @@ class ClockGroup:
     The times are corrected for the drift of the file's clock, and shifted.
     """
 
-    source: Source
-    signals: tuple[Signal, ...]
-    timing: Timing
+    source: MeasurementSource
+    signals: tuple[MeasuredSignal, ...]
+    timing: SampleTiming
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -84,11 +84,11 @@ class ClockGrid:
 
 def record_on_clock(
     scene: MeasuredScene,
-    measurement_files: Sequence[Source],
-    signals: Sequence[Signal],
+    measurement_files: Sequence[MeasurementSource],
+    signals: Sequence[MeasuredSignal],
     hub_names: Sequence[str],
     columns_folder: Path,
-    report_progress: Progress = no_progress,
+    report_progress: Progress = report_no_progress,
 ) -> Recording:
     """Resample the mapped signals of opened files to common sample times, store them as columns in ``columns_folder``,
     and apply the scene's effects.
@@ -126,7 +126,7 @@ def record_on_clock(
     return extended_by_effects(Recording(tuple(signals), columns, grid.period, began, comment, tuple(findings)), scene)
 
 
-def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], recording_columns: Columns) -> None:
+def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[MeasuredSignal], recording_columns: SampleFile) -> None:
     """Convert moments measured about points above or below hubs to moments about the hubs: (Mx - r Fy, My + r Fx) for a
     point r (m) above the hub.
     """
@@ -143,7 +143,7 @@ def _clock_finding(scene: MeasuredScene, clock_groups: list[ClockGroup], clock_g
     """Returns a finding on how all channels were resampled to the common sample times."""
     groups_by_method: dict[str, list[str]] = {}
     for group in clock_groups:
-        faster = group.timing.period < clock_grid.period * (1 - EQUAL_RATES)
+        faster = group.timing.period < clock_grid.period * (1 - EQUAL_RATE_RATIO)
         method = (
             "as it is"
             if _is_on_clock(group, clock_grid)
@@ -159,7 +159,7 @@ def _clock_finding(scene: MeasuredScene, clock_groups: list[ClockGroup], clock_g
 
 
 def file_shifts(
-    scene: MeasuredScene, measurement_files: Sequence[Source]
+    scene: MeasuredScene, measurement_files: Sequence[MeasurementSource]
 ) -> tuple[list[float], datetime | None, list[Finding]]:
     """Returns the shift (s) of each file's times, the date at which the common time is 0, and findings on missing start
     times.
@@ -180,14 +180,14 @@ def file_shifts(
 
 
 def _mapped_groups(
-    measurement_file: Source, signals: Sequence[Signal], clock_shift: float, clock_drift: float
+    measurement_file: MeasurementSource, signals: Sequence[MeasuredSignal], clock_shift: float, clock_drift: float
 ) -> Iterator[ClockGroup]:
     """Yields the channel groups of a file that have mapped channels, with their times in the common time. clock_shift :
     s;
     clock_drift : relative error of the file's clock.
     """
     group_of_channel = {channel.name: channel.group for channel in measurement_file.channels}
-    mapped = dict[int, list[Signal]]()
+    mapped = dict[int, list[MeasuredSignal]]()
     for signal in (signal for signal in signals if signal.file == measurement_file.path.name):
         mapped.setdefault(group_of_channel[signal.channel], []).append(signal)
     for first, *other_signals in mapped.values():
@@ -233,7 +233,7 @@ def _clock_grid(scene: MeasuredScene, wheel_force_groups: list[ClockGroup]) -> C
     settings, file, timings = scene.clock, scene.file, [group.timing for group in wheel_force_groups]
     fastest = min(timings, key=lambda timing: timing.period)
     period = 1.0 / settings.rate if settings.rate else fastest.period
-    if period < fastest.period * (1 - EQUAL_RATES):
+    if period < fastest.period * (1 - EQUAL_RATE_RATIO):
         slower = f"is faster than the wheel forces, {fastest.rate:g} Hz, which adds nothing"
         raise InputError(file, "clock.rate", settings.rate, slower)
     first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
@@ -244,10 +244,10 @@ def _clock_grid(scene: MeasuredScene, wheel_force_groups: list[ClockGroup]) -> C
         raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
     times = fastest.times
     start = float(
-        times[min(np.searchsorted(times, first + settings.start - EVEN_CLOCK_SHARE * period), len(times) - 1)]
+        times[min(np.searchsorted(times, first + settings.start - EVEN_CLOCK_DEVIATION_SHARE * period), len(times) - 1)]
     )
     end = last if settings.duration is None else min(last, start + settings.duration)
-    count = int(np.floor((end - start) / period + EVEN_CLOCK_SHARE)) + 1
+    count = int(np.floor((end - start) / period + EVEN_CLOCK_DEVIATION_SHARE)) + 1
     if settings.duration is not None and start + settings.duration > last + period:
         raise InputError(file, "clock.duration", settings.duration, f"the wheel forces last {last - start:.6g} s")
     if count < FEWEST_SAMPLES:
@@ -282,10 +282,10 @@ def _check_cover(scene: MeasuredScene, clock_group: ClockGroup, clock_grid: Cloc
 def _recording_columns(
     work_folder: Path,
     scene: MeasuredScene,
-    signals: Sequence[Signal],
-    measurement_files: Sequence[Source],
+    signals: Sequence[MeasuredSignal],
+    measurement_files: Sequence[MeasurementSource],
     clock_grid: ClockGrid,
-) -> Columns:
+) -> SampleFile:
     """Opens the columns of a recording, new or begun earlier from the same files. Raises InputError where the folder
     has columns of other files.
     """
@@ -301,7 +301,7 @@ def _recording_columns(
     if path.is_file() and json.loads(path.read_text()) != described:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
     write_whole(path, json.dumps(described))
-    return Columns(work_folder / COLUMNS_FILE, tuple(signal.name for signal in signals), clock_grid.count)
+    return SampleFile(work_folder / COLUMNS_FILE, tuple(signal.name for signal in signals), clock_grid.count)
 
 
 def _is_on_clock(clock_group: ClockGroup, clock_grid: ClockGrid) -> bool:
@@ -312,13 +312,13 @@ def _is_on_clock(clock_group: ClockGroup, clock_grid: ClockGrid) -> bool:
     deviations = np.abs(clock.times[inside] - clock_grid.start - clock_grid.period * indices[inside])
     return (
         clock.order is None
-        and abs(clock.period / clock_grid.period - 1) <= EVEN_CLOCK_SHARE
-        and bool((deviations <= EVEN_CLOCK_SHARE * clock_grid.period).all())
+        and abs(clock.period / clock_grid.period - 1) <= EVEN_CLOCK_DEVIATION_SHARE
+        and bool((deviations <= EVEN_CLOCK_DEVIATION_SHARE * clock_grid.period).all())
     )
 
 
 def _write_unchanged(
-    clock_group: ClockGroup, clock_grid: ClockGrid, recording_columns: Columns, work_folder: Path
+    clock_group: ClockGroup, clock_grid: ClockGrid, recording_columns: SampleFile, work_folder: Path
 ) -> list[Finding]:
     """Write a group that was sampled at the recording's sample times into the columns, block by block, NaN in gaps.
     Returns findings on absurd values.
@@ -352,14 +352,14 @@ def _write_unchanged(
 
 
 def _write_resampled(
-    clock_group: ClockGroup, clock_grid: ClockGrid, recording_columns: Columns, work_folder: Path
+    clock_group: ClockGroup, clock_grid: ClockGrid, recording_columns: SampleFile, work_folder: Path
 ) -> list[Finding]:
     """Resample a group with other sample times into the columns, by a temporary file, signal by signal. Returns
     findings on absurd values.
     """
     clock, absurd = clock_group.timing, list[Finding]()
     count = next(channel.count for channel in clock_group.source.channels if channel.name == clock_group.names[0])
-    raw = Columns(work_folder / RAW_COLUMNS_FILE, clock_group.names, count)
+    raw = SampleFile(work_folder / RAW_COLUMNS_FILE, clock_group.names, count)
     for block in clock_group.source.blocks(clock_group.names):
         raw.put(clock_group.names, block.first, clock_group.values_in_si(block.values))
     for signal in clock_group.signals:

@@ -16,13 +16,13 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.finding import LISTED_FINDINGS, Finding
-from models.drift.score import Verdict, root_mean_square
+from models.drift.score import StabilisedRunVerdict, root_mean_square
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.measured.checks.spikes import spike_positions
-from models.measured.columns import Columns
+from models.measured.columns import SampleFile
 from models.measured.gaps import LONGEST_BRIDGED_GAP, filled_samples
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
@@ -36,7 +36,7 @@ NEGLIGIBLE_FORCE_SHARE = 0.02
 """Rms of a section force divided by the largest rms in the same unit, below which the force is not compared."""
 SETTLING_DURATION = 1.0
 """Time (s) at the beginning of a run that is not compared, in which the run settles."""
-SamplesBySignal = dict[Signal, np.ndarray]
+SamplesBySignal = dict[MeasuredSignal, np.ndarray]
 RunRecording = Callable[[Recording, Path], SectionOutcome]
 
 
@@ -109,7 +109,9 @@ def consequences(
     return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
 
-def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
+def verdict_with_consequences(
+    verdict: StabilisedRunVerdict, consequences: Sequence[Consequence]
+) -> StabilisedRunVerdict:
     """Returns the verdict on a run, lowered from "accepted" if findings change the section forces too much."""
     worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
@@ -119,7 +121,7 @@ def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequen
         f"accepted up to {FORCE_LIMITS[0]:.0%} and {DAMAGE_LIMITS[0]:.0%}, rejected beyond "
         f"{FORCE_LIMITS[1]:.0%} and {DAMAGE_LIMITS[1]:.0%}"
     )
-    return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
+    return StabilisedRunVerdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
 
 
 def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
@@ -155,7 +157,7 @@ def samples_as_recording(recording: Recording, samples_by_signal: SamplesBySigna
     """Write samples of signals into columns in ``columns_folder``, and return them as a recording."""
     columns_folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples_by_signal.values())))
-    columns = Columns(columns_folder / "samples.columns", tuple(s.name for s in recording.signals), count)
+    columns = SampleFile(columns_folder / "samples.columns", tuple(s.name for s in recording.signals), count)
     columns.write(0, np.column_stack([samples_by_signal[s] for s in recording.signals]))
     return Recording(recording.signals, columns, recording.period)
 
@@ -185,7 +187,7 @@ def _consequence_of_most_changed_force(
 
 
 def _read_later(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     """Samples of signals corrected for a constant delay, or for a clock's drift, which grows from the start on."""
     size, count = finding.size or 0.0, len(next(iter(samples_by_signal.values())))
@@ -207,7 +209,7 @@ def _read_at(sampled_values: np.ndarray, samples_later: np.ndarray) -> np.ndarra
 
 
 def _divided_by_factor(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
@@ -215,13 +217,13 @@ def _divided_by_factor(
 
 
 def _offset_removed(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     return {s: samples_by_signal[s] - (finding.size or 0.0) for s in signals}
 
 
 def _moments_corrected(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     force = {(s.at, s.component): s for s in samples_by_signal if s.quantity == "force" and not s.check}
     across = {"x": ("y", -1.0), "y": ("x", 1.0)}
@@ -233,17 +235,17 @@ def _moments_corrected(
 
 
 def _channels_exchanged(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     first, second = signals
     return {first: samples_by_signal[second], second: samples_by_signal[first]}
 
 
 def _without_spikes(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     """Samples of signals with spikes of one or two samples replaced by interpolation."""
-    out = dict[Signal, np.ndarray]()
+    out = dict[MeasuredSignal, np.ndarray]()
     for s in signals:
         at, values = spike_positions(samples_by_signal[s])[0], samples_by_signal[s].copy()
         values[np.minimum(np.concatenate((at, at + 1)), len(values) - 1)] = np.nan
@@ -252,12 +254,12 @@ def _without_spikes(
 
 
 def _bridge_varied(
-    finding: Finding, signals: Sequence[Signal], samples_by_signal: SamplesBySignal, sample_period: float
+    finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
     """Samples of signals with gaps bridged as for the run, plus or minus the bridge's standard deviation, with the sign
     alternating from gap to gap.
     """
-    out = dict[Signal, np.ndarray]()
+    out = dict[MeasuredSignal, np.ndarray]()
     for s in signals:
         if s.quantity in ("force", "moment"):
             values, gaps = filled_samples(samples_by_signal[s], sample_period, LONGEST_BRIDGED_GAP)
@@ -267,7 +269,9 @@ def _bridge_varied(
     return out
 
 
-CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], SamplesBySignal, float], SamplesBySignal]] = {
+CORRECTION_OF_CHECK: dict[
+    str, Callable[[Finding, Sequence[MeasuredSignal], SamplesBySignal, float], SamplesBySignal]
+] = {
     "shift": _read_later,
     "drift": _read_later,
     "gain": _divided_by_factor,

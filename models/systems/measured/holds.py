@@ -39,7 +39,7 @@ def noise_deviations(stated_deviations: NoiseTable, recording: Recording) -> dic
     """
     deviations = dict[str, float]()
     for key, quantity in QUANTITY_OF_NOISE_KEY.items():
-        sizes = np.array([white_noise(recording, s) for s in recording.find(quantity) if not s.check])
+        sizes = np.array([white_noise(recording, s) for s in recording.find_signals(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(AttitudeHold, key))
         deviations[key] = getattr(stated_deviations, key) or max(

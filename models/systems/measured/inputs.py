@@ -20,7 +20,7 @@ from models.core.signals import Smooth
 from models.core.smoothing import low_passed
 from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
-from models.measured.signal import HUB_COMPONENTS, Signal
+from models.measured.signal import HUB_COMPONENTS, MeasuredSignal
 from models.multibody.cut_kernel import FRAMES, WRENCH
 from models.vehicles.cut_vehicle import CutVehicle
 
@@ -95,14 +95,14 @@ class RecordingInputs:
         for missing forces, or forces with long gaps.
         """
         self.recording, self.vehicle, self.findings = recording, vehicle, list[Finding]()
-        used: dict[tuple[str, str, str], Signal] = {
+        used: dict[tuple[str, str, str], MeasuredSignal] = {
             (s.quantity, s.component, s.at): s for s in reversed(recording.signals) if not s.check
         }
         self.hubs = [used.get((what, axis, hub)) for hub in vehicle.hubs for _, what, axis, _ in HUB_COMPONENTS]
         self.angles = [used.get((what, axis, vehicle.chassis)) for what, axis in ANGLE_SIGNALS]
         self.yaw = used.get(("angular rate", "yaw", vehicle.chassis))
         self._check()
-        self._bridges = dict[Signal, tuple[np.ndarray, np.ndarray]]()
+        self._bridges = dict[MeasuredSignal, tuple[np.ndarray, np.ndarray]]()
         for signal in (*self.hubs, *(self.angles[:2] if angles_are_enforced else [])):
             if signal is not None:
                 values, gaps, findings = bridged_signals(recording, signal)
@@ -117,7 +117,7 @@ class RecordingInputs:
         return next(signal.frame for signal in self.hubs if signal is not None)
 
     @property
-    def used_signals(self) -> tuple[Signal, ...]:
+    def used_signals(self) -> tuple[MeasuredSignal, ...]:
         """Signals of hub forces, angles and rates that the run uses."""
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
@@ -151,7 +151,7 @@ class RecordingInputs:
         return tilt
 
     def _signal_block(
-        self, signals: list[Signal | None], first_sample: int, sample_count: int, missing_value: float
+        self, signals: list[MeasuredSignal | None], first_sample: int, sample_count: int, missing_value: float
     ) -> np.ndarray:
         out = np.full((min(sample_count, self.recording.count - first_sample), len(signals)), missing_value)
         for i, signal in enumerate(signals):

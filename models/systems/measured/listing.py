@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.finding import merged_findings
-from models.measured.channel import SAMPLES_PER_BLOCK, Channel, Source
+from models.measured.channel import SAMPLES_PER_BLOCK, FileChannel, MeasurementSource
 from models.measured.formats import open_source
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 from models.measured.units import quantities_of_unit
@@ -87,7 +87,7 @@ class ChannelGuess:
     left_out: str = ""
 
 
-def guess_channel(channel: Channel) -> ChannelGuess | None:
+def guess_channel(channel: FileChannel) -> ChannelGuess | None:
     """Guess the meaning of a channel from its name and unit; None without any clue. Unknown fields are empty."""
     words, family = _words_of_name(channel.name), _words_of_name(channel.family)
     kinds = quantities_of_unit(channel.unit) or tuple(QUANTITY_PATTERNS)
@@ -178,7 +178,7 @@ def describe(measured_path: Path) -> str:
     return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
 
 
-def _range_texts(measurement_file: Source, channel_names: list[str]) -> dict[str, str]:
+def _range_texts(measurement_file: MeasurementSource, channel_names: list[str]) -> dict[str, str]:
     """Text for each channel of a group: rate, number of samples, first and last time, least and largest value."""
     count = next(channel.count for channel in measurement_file.channels if channel.name == channel_names[0])
     firsts = (
@@ -202,7 +202,7 @@ def _range_texts(measurement_file: Source, channel_names: list[str]) -> dict[str
     return {name: f"{head} {a:>11.5g} {b:>11.5g}" for name, a, b in zip(channel_names, low, high, strict=True)}
 
 
-def scene_text(measurement_file: Source) -> str:
+def scene_text(measurement_file: MeasurementSource) -> str:
     """Returns a draft scene for a measurement file as TOML: entries for guessed channels, comments for the others."""
     rows = [_map_entry(channel.name, guess_channel(channel)) for channel in measurement_file.channels]
     return "\n".join(

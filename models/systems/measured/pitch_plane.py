@@ -19,13 +19,13 @@ from models.core.finding import Finding
 from models.core.result import Result
 from models.core.time_series import write_time_series
 from models.drift import score
-from models.drift.score import Limits, Verdict, section_forces
+from models.drift.score import AcceptanceLimits, StabilisedRunVerdict, section_forces
 from models.measured import axle_forces
-from models.measured.axle_balance import FORCE_PLACES, axle_forces_of, axle_signals
-from models.measured.columns import Columns
+from models.measured.axle_balance import LOCATIONS_OF_AXLE_FORCES, axle_forces_of, axle_signals
+from models.measured.columns import SampleFile
 from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import MeasuredSignal, Quantity
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome
 from models.systems.measured.sections import SectionChannel
 from models.systems.pitch_plane import trust as drift_trust
@@ -71,14 +71,14 @@ class PlaneRun:
 
     result: Result
     trust: TrustPrediction | None
-    verdict: Verdict
+    verdict: StabilisedRunVerdict
     outcome: SectionOutcome
 
 
 def run(
     run_settings: PlaneRunSettings,
     scene_folder: Path,
-    verdict_limits: Limits | None = None,
+    verdict_limits: AcceptanceLimits | None = None,
     estimate_error: bool = False,
 ) -> PlaneRun:
     """Run a recording on the pitch-plane vehicle; files of its scene are written into a new folder. Raises InputError,
@@ -90,31 +90,43 @@ def run(
     scene, said = scene_of(run_settings, scene_folder)
     result = simulate(scene, run_settings.engine, error=estimate_error)
     limited = trusted_time(scene, run_settings.hold.force)
-    if limited and run_settings.recording.find("angle", CHASSIS_NAME, "pitch"):
+    if limited and run_settings.recording.find_signals("angle", CHASSIS_NAME, "pitch"):
         limited = replace(limited, unchecked_text="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [run_settings.effect] if run_settings.effect else []
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
-    verdict = score.blind_verdict(
-        figures, effects, result.times[-1], verdict_limits or Limits(), until, uncertainty=score.uncertainty(result)
+    verdict = score.verdict_without_true_run(
+        figures,
+        effects,
+        result.times[-1],
+        verdict_limits or AcceptanceLimits(),
+        until,
+        stated_pitch_uncertainty=score.stated_pitch_uncertainty(result),
     )
     if run_settings.effect is None and verdict.word == "accepted":
-        verdict = _verdict_with_measured_pitch(run_settings, result, verdict_limits or Limits(), verdict)
+        verdict = _verdict_with_measured_pitch(run_settings, result, verdict_limits or AcceptanceLimits(), verdict)
     return PlaneRun(result, limited, verdict, _section_outcome(result, said, scene_folder))
 
 
 def _verdict_with_measured_pitch(
-    run_settings: PlaneRunSettings, pitch_plane_result: Result, verdict_limits: Limits, verdict: Verdict
-) -> Verdict:
+    run_settings: PlaneRunSettings,
+    pitch_plane_result: Result,
+    verdict_limits: AcceptanceLimits,
+    verdict: StabilisedRunVerdict,
+) -> StabilisedRunVerdict:
     """Returns the verdict on an accepted free run after its pitch is compared with the measured pitch.
 
     Where forces turn with the vehicle no error grows, but offsets and forces in another frame still make it drift, and
     its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
-    angles = run_settings.recording.find("angle", CHASSIS_NAME, "pitch")
+    angles = run_settings.recording.find_signals("angle", CHASSIS_NAME, "pitch")
     if not angles:
-        return Verdict("stabilise", UNCHECKED_TEXT) if _force_frames(run_settings) != {"inertial"} else verdict
+        return (
+            StabilisedRunVerdict("stabilise", UNCHECKED_TEXT)
+            if _force_frames(run_settings) != {"inertial"}
+            else verdict
+        )
     measured = run_settings.recording.samples(angles[0])
     known = np.flatnonzero(np.isfinite(measured))
     beside = np.interp(pitch_plane_result.times, run_settings.recording.period * known, measured[known])
@@ -122,12 +134,12 @@ def _verdict_with_measured_pitch(
     if off <= verdict_limits.pitch_error:
         return verdict
     limit = f"(at most {verdict_limits.pitch_error:g}): check the frame of the forces and their offsets"
-    return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
+    return StabilisedRunVerdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
 
 
 def _force_frames(run_settings: PlaneRunSettings) -> set[str]:
     """Frames ("inertial", "body" or "hub") of the vertical forces at both axles."""
-    return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(run_settings.recording, axle)}
+    return {signal.frame for axle in LOCATIONS_OF_AXLE_FORCES for signal in axle_signals(run_settings.recording, axle)}
 
 
 def scene_of(run_settings: PlaneRunSettings, scene_folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
@@ -135,7 +147,7 @@ def scene_of(run_settings: PlaneRunSettings, scene_folder: Path) -> tuple[Scene,
     gaps.
     """
     period, said, frames = run_settings.recording.period, list[Finding](), _force_frames(run_settings)
-    forces = {axle: ("N", _axle_force(run_settings, axle, said)) for axle in FORCE_PLACES}
+    forces = {axle: ("N", _axle_force(run_settings, axle, said)) for axle in LOCATIONS_OF_AXLE_FORCES}
     write_time_series(scene_folder / "wheel_forces.csv", forces, period)
     if "inertial" in frames and len(frames) > 1:
         text = "vertical forces must all keep their direction in space, or all turn with the vehicle"
@@ -182,13 +194,15 @@ def _axle_force(run_settings: PlaneRunSettings, axle_name: str, findings: list[F
     """
     signals = axle_signals(run_settings.recording, axle_name)
     if len(signals) != (1 if signals and signals[0].at == axle_name else 2):
-        axle_place, left, right = map(repr, FORCE_PLACES[axle_name])
+        axle_place, left, right = map(repr, LOCATIONS_OF_AXLE_FORCES[axle_name])
         text = f"the vertical force is needed at {axle_place}, or at both {left} and {right}"
         raise InputError(run_settings.file, "files.channels", None, text)
     return np.asarray(sum(_samples_without_gaps(run_settings, signal, findings) for signal in signals))
 
 
-def _samples_without_gaps(run_settings: PlaneRunSettings, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
+def _samples_without_gaps(
+    run_settings: PlaneRunSettings, signal: MeasuredSignal, all_findings: list[Finding]
+) -> np.ndarray:
     values, _, findings = bridged_signals(run_settings.recording, signal)
     all_findings += findings
     return values
@@ -205,7 +219,9 @@ def _prescribed_pitch(run_settings: PlaneRunSettings, scene_folder: Path, findin
         ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
     )
     for quantity, name, unit, key, deviation in known if filtered else known[:1]:
-        for signal in [s for s in run_settings.recording.find(quantity, CHASSIS_NAME, "pitch") if not s.check][:1]:
+        for signal in [s for s in run_settings.recording.find_signals(quantity, CHASSIS_NAME, "pitch") if not s.check][
+            :1
+        ]:
             values = (
                 run_settings.recording.samples(signal)
                 if filtered
@@ -219,7 +235,9 @@ def _prescribed_pitch(run_settings: PlaneRunSettings, scene_folder: Path, findin
     write_time_series(scene_folder / "pitch.csv", columns, run_settings.recording.period)
     if not filtered:
         return {"file": "pitch.csv", "bandwidth": hold.smoothing}
-    noise = hold.force * math.sqrt(max(len(axle_signals(run_settings.recording, axle)) for axle in FORCE_PLACES))
+    noise = hold.force * math.sqrt(
+        max(len(axle_signals(run_settings.recording, axle)) for axle in LOCATIONS_OF_AXLE_FORCES)
+    )
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
@@ -244,7 +262,7 @@ def _section_outcome(pitch_plane_result: Result, findings: tuple[Finding, ...], 
             f"{CHASSIS_NAME} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS_NAME, "pitch"
         )
         channels[answer] = -pitch_plane_result[name]
-    columns = Columns(
+    columns = SampleFile(
         columns_folder / "run.f64", tuple(answer.name for answer in channels), len(pitch_plane_result.times)
     )
     columns.write(0, np.column_stack(list(channels.values())))

@@ -7,9 +7,9 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.finding import finding_lines as finding_texts
 from models.core.scene_effects import effect_lines as effect_lines
-from models.measured.channel import Source
+from models.measured.channel import MeasurementSource
 from models.measured.formats import open_source
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.channel_map import mapped_signals
 from models.systems.measured.scene import MeasuredRig, MeasuredScene
@@ -34,14 +34,14 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
         check_virtual(rig.vehicle, scene.virtual, scene.file)
 
 
-def opened_files(scene: MeasuredScene) -> tuple[Source, ...]:
+def opened_files(scene: MeasuredScene) -> tuple[MeasurementSource, ...]:
     """Opens the measurement files of a scene; raises InputError."""
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 
 def signals_of_files(
-    scene: MeasuredScene, measurement_files: Sequence[Source], measured_rig: MeasuredRig
-) -> tuple[Signal, ...]:
+    scene: MeasuredScene, measurement_files: Sequence[MeasurementSource], measured_rig: MeasuredRig
+) -> tuple[MeasuredSignal, ...]:
     """Returns the signals of all mapped channels. Raises InputError also where a wheel has no vertical force, or the
     stabiliser no angles.
     """

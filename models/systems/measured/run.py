@@ -21,14 +21,14 @@ from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
 from models.core.result import Result
 from models.core.systems import load
-from models.drift.score import Verdict
+from models.drift.score import StabilisedRunVerdict
 from models.fatigue.counting import CountedLoad, counted_load
 from models.measured.checks import findings_of_all_checks
-from models.measured.checks.evidence import Evidence
+from models.measured.checks.evidence import CheckedRecording
 from models.measured.checks.spectra import white_noise
 from models.measured.checks.weight import mean_hub_moments
-from models.measured.recording import Progress, Recording, no_progress
-from models.measured.signal import Signal
+from models.measured.recording import Progress, Recording, report_no_progress
+from models.measured.signal import MeasuredSignal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.clock import record_on_clock
@@ -80,7 +80,7 @@ class RecordingAnalysis:
     drift: Drift | None = None
     trust: tuple[tuple[str, TrustPrediction], ...] = ()
     runs: dict[str, SectionOutcome] = field(default_factory=dict)
-    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    verdicts: dict[str, StabilisedRunVerdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
     channel_comparisons: tuple[ChannelComparison, ...] = ()
     plane: Result | None = None
@@ -91,11 +91,11 @@ class RecordingAnalysis:
     temporary_folder: "TemporaryDirectory[str] | None" = None
 
     @cached_property
-    def evidence_for_checks(self) -> Evidence:
+    def evidence_for_checks(self) -> CheckedRecording:
         """Recording, vehicle and stated noise in the form that the checks of recordings take."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in QUANTITY_OF_NOISE_KEY.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
-        return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
+        return CheckedRecording(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
 
     @property
     def has_error_findings(self) -> bool:
@@ -112,7 +112,7 @@ class RecordingAnalysis:
         """The outcome of the chosen run; None where no run was made."""
         return self.runs.get(self.chosen_run)
 
-    def is_input(self, signal: Signal) -> bool:
+    def is_input(self, signal: MeasuredSignal) -> bool:
         """Whether a signal is an input of the chosen run; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
         return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN))
@@ -145,7 +145,7 @@ class RecordingAnalysis:
         self,
         run_name: str,
         run_folder: Path,
-        report_progress: Callable[[float, float], None] = no_progress,
+        report_progress: Callable[[float, float], None] = report_no_progress,
         estimate_error: bool = False,
     ) -> SectionOutcome:
         """Make a run by its name, or complete the run in a folder. estimate_error : whether the error of a run in the
@@ -175,7 +175,7 @@ def run(
     scene: MeasuredScene,
     engine: str = "",
     folder: Path | None = None,
-    report_progress: Progress = no_progress,
+    report_progress: Progress = report_no_progress,
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
@@ -205,7 +205,7 @@ def run(
         if not whole_run:
             raise
         exam.failed[exam.chosen_run] = str(failure)
-        exam.verdicts[exam.chosen_run] = Verdict("rejected", failure.reason)
+        exam.verdicts[exam.chosen_run] = StabilisedRunVerdict("rejected", failure.reason)
         labelled.data.attrs |= _endings_of_runs(exam)
         return labelled
 
@@ -268,7 +268,7 @@ def _start_examination(
     return exam
 
 
-def read_files(scene: MeasuredScene, columns_folder: Path, report_progress: Progress = no_progress) -> Recording:
+def read_files(scene: MeasuredScene, columns_folder: Path, report_progress: Progress = report_no_progress) -> Recording:
     """Reads the files of a scene as a recording with common sample times, stored in a folder. Raises InputError for
     unusable files.
     """
@@ -344,7 +344,7 @@ def _predict_drift(recording_analysis: RecordingAnalysis, vehicle: CutVehicle) -
 
 def _initial_value(recording: Recording, quantity: str, angle_axis: str, chassis_name: str) -> float:
     """Mean of an angle (rad) or a rate (rad/s) over the first 0.1 s of a recording; 0 where it is not measured."""
-    for signal in recording.find(quantity, chassis_name, angle_axis)[:1]:
+    for signal in recording.find_signals(quantity, chassis_name, angle_axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
         return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
     return 0.0

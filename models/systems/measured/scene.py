@@ -11,9 +11,9 @@ from models.core.errors import InputError
 from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
-from models.drift.score import Limits
-from models.measured.axle_balance import FORCE_PLACES
-from models.measured.signal import Frame, Places, Quantity, TransducerPlace
+from models.drift.score import AcceptanceLimits
+from models.measured.axle_balance import LOCATIONS_OF_AXLE_FORCES
+from models.measured.signal import Frame, MeasurementPlaces, Quantity, TransducerPlace
 from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.measured.pitch_plane import CHASSIS_NAME, SPRING_NAMES
 from models.systems.measured.sections import section_names
@@ -37,7 +37,7 @@ class MeasuredRig:
 
     name: str
     chassis: str
-    places: Places
+    places: MeasurementPlaces
     sections: tuple[str, ...]
     angles: tuple[str, ...]
     vehicle: CutVehicle | None
@@ -149,7 +149,7 @@ class MeasuredScene(SceneFile):
     noise: NoiseTable = NoiseTable()
     stabilise: MeasuredStabiliserTable = MeasuredStabiliserTable()
     run: MeasuredRunTable = MeasuredRunTable()
-    limits: Limits = Field(default=RUN_LIMITS, description="of the verdict")
+    limits: AcceptanceLimits = Field(default=RUN_LIMITS, description="of the verdict")
     hand_on: HandOnTable = HandOnTable()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
@@ -159,12 +159,15 @@ class MeasuredScene(SceneFile):
         """
         given_vehicle = self.vehicle
         if given_vehicle.file is None:
-            hubs, springs = tuple(hub for axle in FORCE_PLACES.values() for hub in axle), tuple(SPRING_NAMES.values())
-            places = Places(hubs, (CHASSIS_NAME,), springs)
+            hubs, springs = (
+                tuple(hub for axle in LOCATIONS_OF_AXLE_FORCES.values() for hub in axle),
+                tuple(SPRING_NAMES.values()),
+            )
+            places = MeasurementPlaces(hubs, (CHASSIS_NAME,), springs)
             return MeasuredRig(str(given_vehicle.parameters), CHASSIS_NAME, places, springs, ("pitch",), None)
         vehicle = cut(scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
         bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.uncut.bodies, vehicle.elements))
-        places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
+        places = MeasurementPlaces(vehicle.hubs, bodies, elements, tuple(self.sensors))
         return MeasuredRig(
             vehicle.tree.name, vehicle.chassis, places, section_names(vehicle), ("roll", "pitch"), vehicle
         )

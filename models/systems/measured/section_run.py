@@ -22,8 +22,8 @@ from models.core.whole_files import write_whole
 from models.engines.cut_vehicle import TUMBLED_PITCH, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
-from models.measured.columns import Columns
-from models.measured.recording import Recording, no_progress
+from models.measured.columns import SampleFile
+from models.measured.recording import Recording, report_no_progress
 from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import PrescribedAngles, RecordingInputs, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
@@ -93,7 +93,7 @@ class SectionOutcome:
     counts : of steps, force calls and states.
     """
 
-    columns: Columns
+    columns: SampleFile
     answers: tuple[SectionChannel, ...]
     period: float
     done: int
@@ -187,7 +187,7 @@ def check_settings(run_settings: SectionRunSettings) -> None:
 def run(
     run_settings: SectionRunSettings,
     run_folder: Path,
-    report_progress: Progress = no_progress,
+    report_progress: Progress = report_no_progress,
     block_duration: float = CHECKPOINT_INTERVAL,
 ) -> SectionOutcome:
     """Run a recording, or complete its run in ``run_folder``; ``report_progress`` is called with the simulated and the
@@ -230,7 +230,7 @@ class _March:
         elif self.filter is not None:
             known = self.filter.state
             self.filter.state = replace(known, **{name: saved[name] for name in vars(known)})
-        self.columns = Columns(
+        self.columns = SampleFile(
             run_folder / "run.f64", tuple(answer.name for answer in run_settings.sections.answers), run_settings.count
         )
 

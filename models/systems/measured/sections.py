@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.signal import HUB_COMPONENTS, Quantity, Signal, TransducerPlace
+from models.measured.signal import HUB_COMPONENTS, MeasuredSignal, Quantity, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, SectionPlaces, section_results
 from models.multibody.cut_table import Joints, joints
@@ -51,7 +51,7 @@ class SectionChannel:
     at: str = ""
     component: str = ""
 
-    def measures(self, measured_signal: Signal) -> bool:
+    def measures(self, measured_signal: MeasuredSignal) -> bool:
         """Whether a signal measures the quantity of this channel at the same place and in the same component."""
         return (self.quantity, self.at, self.component) == (
             measured_signal.quantity,
@@ -203,7 +203,7 @@ def _guide_arrays(vehicle: CutVehicle, joints: Joints) -> tuple[np.ndarray, np.n
 
 
 def accelerometer_points(
-    vehicle: CutVehicle, signals: Iterable[Signal], transducer_places: Mapping[str, TransducerPlace]
+    vehicle: CutVehicle, signals: Iterable[MeasuredSignal], transducer_places: Mapping[str, TransducerPlace]
 ) -> tuple[AccelerometerPoint, ...]:
     """Points at which acceleration signals are measured: sensors in ``transducer_places``, and centres of bodies."""
     section_points = dict[str, AccelerometerPoint]()

@@ -19,22 +19,22 @@ from models.core.finding import Finding
 from models.drift import score
 from models.drift.score import (
     DOUBTFUL_INNOVATION_LIMIT,
-    Limits,
+    AcceptanceLimits,
     RunErrors,
     RunFigures,
-    Verdict,
+    StabilisedRunVerdict,
     low_pass,
     root_mean_square,
 )
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import MeasuredSignal
 from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRunSettings
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid_vehicle
 
-RUN_LIMITS = Limits(artificial_share=0.1)
+RUN_LIMITS = AcceptanceLimits(artificial_share=0.1)
 """Default limits of the verdict. A stabilising moment of 5 Hz, which is 12 % of the inertia term, takes 5 %
 off the damage of engine mounts on a rough road; a moment of 0.7 Hz is 2 % of that term and takes 1 % off.
 """
@@ -88,7 +88,7 @@ class ChannelComparison:
     ``STRETCH_ERROR_LIMIT`` of the channel's rms, infinite if never.
     """
 
-    signal: Signal
+    signal: MeasuredSignal
     answer: SectionChannel
     offset: float
     bands: tuple[FrequencyBand, ...]
@@ -97,7 +97,7 @@ class ChannelComparison:
     trusted_time: float
 
 
-def channels_to_compare(run_settings: SectionRunSettings) -> tuple[tuple[Signal, SectionChannel], ...]:
+def channels_to_compare(run_settings: SectionRunSettings) -> tuple[tuple[MeasuredSignal, SectionChannel], ...]:
     """Returns pairs of a measured signal and the run's channel of the same quantity, for check signals and
     accelerations.
 
@@ -109,7 +109,7 @@ def channels_to_compare(run_settings: SectionRunSettings) -> tuple[tuple[Signal,
     )
 
 
-def _same_axes(run_settings: SectionRunSettings, signal: Signal) -> bool:
+def _same_axes(run_settings: SectionRunSettings, signal: MeasuredSignal) -> bool:
     """Whether the run computes a signal's quantity in the axes of the signal."""
     if signal.at in run_settings.vehicle.hubs and signal.quantity in ("force", "moment"):
         return signal.frame == run_settings.sections.frame
@@ -117,7 +117,7 @@ def _same_axes(run_settings: SectionRunSettings, signal: Signal) -> bool:
 
 
 def paired_channels(
-    recording: Recording, run_outcome: SectionOutcome, signal: Signal, section_channel: SectionChannel
+    recording: Recording, run_outcome: SectionOutcome, signal: MeasuredSignal, section_channel: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns times (n,) in s of a run, and measured and computed values (n,) of a channel."""
     computed, skip = run_outcome.samples(section_channel), round(run_outcome.period / recording.period)
@@ -128,7 +128,7 @@ def paired_channels(
 def compare_channel(
     recording: Recording,
     run_outcome: SectionOutcome,
-    signal: Signal,
+    signal: MeasuredSignal,
     section_channel: SectionChannel,
     woehler_exponents: tuple[float, ...] = (3.0, 5.0, 8.0),
 ) -> ChannelComparison:
@@ -199,11 +199,11 @@ def _trusted_time(error_values: np.ndarray, signal_size: float, sample_period: f
 def judge_run(
     run_settings: SectionRunSettings,
     run_outcome: SectionOutcome,
-    verdict_limits: Limits = RUN_LIMITS,
+    verdict_limits: AcceptanceLimits = RUN_LIMITS,
     trusted_time: float | None = None,
     channel_comparisons: Sequence[ChannelComparison] = (),
     noise_by_quantity: Mapping[str, float] | None = None,
-) -> Verdict:
+) -> StabilisedRunVerdict:
     """Judge a recording's run without knowledge of the true run.
 
     trusted_time : predicted time (s) for which a free run can be trusted, None if not known; channel_comparisons :
@@ -217,16 +217,16 @@ def judge_run(
     off = {name: share for name, share in shares.items() if not share <= LARGEST_DISAGREEMENT}
     if off:
         told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
-        return Verdict(
+        return StabilisedRunVerdict(
             "rejected", f"channels that were not put in disagree (at most {LARGEST_DISAGREEMENT:.0%}): {told}"
         )
-    verdict = score.blind_verdict(
+    verdict = score.verdict_without_true_run(
         figures_of_run(run_outcome, run_settings.vehicle),
         EFFECTS_OF_HOLD[run_settings.hold.method],
         run_outcome.period * (run_outcome.done - 1),
         verdict_limits,
         trusted_time,
-        uncertainty=angle_uncertainty(run_settings.vehicle, run_settings.hold, run_settings.recording.period),
+        pitch_uncertainty=angle_uncertainty(run_settings.vehicle, run_settings.hold, run_settings.recording.period),
     )
     return _worded_for_spatial_vehicle(verdict)
 
@@ -251,9 +251,9 @@ def judge_beside_truth(
     run_outcome: SectionOutcome,
     true_measurement: VirtualMeasurement,
     attitude_hold: AttitudeHold,
-    verdict_limits: Limits = RUN_LIMITS,
+    verdict_limits: AcceptanceLimits = RUN_LIMITS,
     woehler_exponent: float = WOEHLER_SLOPE,
-) -> Verdict:
+) -> StabilisedRunVerdict:
     """Judge a run on a virtual measurement by comparison with the true run; woehler_exponent : Woehler exponent."""
     figures = (
         figures_of_run(run_outcome, true_measurement.vehicle),
@@ -264,12 +264,12 @@ def judge_beside_truth(
     )
 
 
-def _worded_for_spatial_vehicle(verdict: Verdict) -> Verdict:
+def _worded_for_spatial_vehicle(verdict: StabilisedRunVerdict) -> StabilisedRunVerdict:
     """Returns the verdict with words for the pitch plane replaced by words for a spatial vehicle."""
     reason = verdict.reason
     for plane, space in WORDS_OF_SCORE.items():
         reason = reason.replace(plane, space)
-    return Verdict(verdict.word, reason)
+    return StabilisedRunVerdict(verdict.word, reason)
 
 
 def figures_of_run(run_outcome: SectionOutcome, vehicle: CutVehicle) -> RunFigures:

@@ -17,13 +17,13 @@ from models.core.whole_files import write_whole
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED_STEP_METHOD, HubRun
 from models.measured.channel import SAMPLES_PER_BLOCK
-from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults, measured_samples
+from models.measured.columns import SampleFile
+from models.measured.faults_of_measurement import SimulatedFaults, measured_samples
 from models.measured.faults_of_measurement import check_faults as check_faults
 from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
 from models.measured.recording import Recording
-from models.measured.signal import HUB_COMPONENTS, Quantity, Signal
+from models.measured.signal import HUB_COMPONENTS, MeasuredSignal, Quantity
 from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import specific_forces_on_body
 from models.systems.hub_forces.measurement import element_travels
@@ -62,7 +62,7 @@ class VirtualTable(Strict):
     )
     travels: list[str] = Field(default=[], description="springs, mounts or bars whose travel is a check channel")
     sections: list[str] = Field(default=[], description="springs, mounts or bars whose force is a check channel")
-    faults: Faults = Field(default=Faults(), description="what the transducers add to the truth")
+    faults: SimulatedFaults = Field(default=SimulatedFaults(), description="what the transducers add to the truth")
     format: str = Field(default="mf4", description="extension of the file that is written: csv, mf4, rsp or tdms")
     seed: int = Field(default=1, ge=0, le=2**62, description="of noise and dropouts")
 
@@ -77,7 +77,7 @@ class VirtualMeasurement:
 
     vehicle: CutVehicle
     run: HubRun
-    signals: tuple[Signal, ...]
+    signals: tuple[MeasuredSignal, ...]
     values: np.ndarray
     stride: int
     errors: dict[str, Estimate] = field(default_factory=dict)
@@ -92,7 +92,7 @@ class VirtualMeasurement:
         """Sampling period of the transducers (s)."""
         return self.step * self.stride
 
-    def samples(self, transducer_faults: Faults, noise_seed: int, noise_path: int = 0) -> np.ndarray:
+    def samples(self, transducer_faults: SimulatedFaults, noise_seed: int, noise_path: int = 0) -> np.ndarray:
         """Returns the samples (m, signals) in SI with faults of the transducers; NaN where a
         transducer has no value.
         """
@@ -128,7 +128,9 @@ def virtual_measurement(
     )
 
 
-def checked_signals(vehicle: CutVehicle, virtual_settings: VirtualTable, scene_path: str = "") -> tuple[Signal, ...]:
+def checked_signals(
+    vehicle: CutVehicle, virtual_settings: VirtualTable, scene_path: str = ""
+) -> tuple[MeasuredSignal, ...]:
     """Returns the signals of all channels of a virtual measurement. Raises InputError for steps that do not divide one
     another, and for names that the vehicle does not have.
     """
@@ -151,7 +153,7 @@ def checked_signals(vehicle: CutVehicle, virtual_settings: VirtualTable, scene_p
     return signals
 
 
-def _signals_of_channels(vehicle: CutVehicle, virtual_settings: VirtualTable) -> tuple[Signal, ...]:
+def _signals_of_channels(vehicle: CutVehicle, virtual_settings: VirtualTable) -> tuple[MeasuredSignal, ...]:
     """Signals of hub forces, chassis motion, accelerometers and check channels, in the order of the
     measured columns.
     """
@@ -175,7 +177,7 @@ def _signals_of_channels(vehicle: CutVehicle, virtual_settings: VirtualTable) ->
     ]
     rows += [(f"{name}_travel", "travel", name, "", "body") for name in virtual_settings.travels]
     return tuple(
-        Signal(name, "", name, quantity, at, axis, frame, 1, *FILE_UNITS[quantity], check=i >= first_check)
+        MeasuredSignal(name, "", name, quantity, at, axis, frame, 1, *FILE_UNITS[quantity], check=i >= first_check)
         for i, (name, quantity, at, axis, frame) in enumerate(rows)
     )
 
@@ -217,7 +219,7 @@ def body_rates(angles: np.ndarray, angle_rates: np.ndarray) -> np.ndarray:
     )
 
 
-def channel_group(signals: tuple[Signal, ...], samples: np.ndarray, sample_period: float) -> ChannelGroup:
+def channel_group(signals: tuple[MeasuredSignal, ...], samples: np.ndarray, sample_period: float) -> ChannelGroup:
     """Returns samples (n, signals) in SI as a group of channels in the units of the file to be written."""
     factors = np.array([signal.factor for signal in signals])
     blocks = (samples[i : i + SAMPLES_PER_BLOCK] / factors for i in range(0, len(samples), SAMPLES_PER_BLOCK))
@@ -257,7 +259,7 @@ def _toml_text(toml_value: object) -> str:
     return json.dumps(toml_value, ensure_ascii=False)
 
 
-def map_lines(signals: tuple[Signal, ...], file_name: str, clock_offset: float = 0.0) -> str:
+def map_lines(signals: tuple[MeasuredSignal, ...], file_name: str, clock_offset: float = 0.0) -> str:
     """Returns the TOML text of a table [[files]] with a channel map of signals; ``clock_offset`` (s) is added to the
     file's clock.
     """
@@ -278,6 +280,6 @@ def recording_of_samples(measurement: VirtualMeasurement, samples: np.ndarray, c
     """Returns samples (m, signals) of a virtual measurement as a recording, without measurement files and channel maps;
     ``columns_path`` : file of its columns.
     """
-    columns = Columns(columns_path, tuple(signal.name for signal in measurement.signals), len(samples))
+    columns = SampleFile(columns_path, tuple(signal.name for signal in measurement.signals), len(samples))
     columns.write(0, samples)
     return Recording(measurement.signals, columns, measurement.period)

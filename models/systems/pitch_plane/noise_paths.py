@@ -26,7 +26,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, guard
 from models.ensemble.runner import PathFailed
-from models.ensemble.store import Arrays
+from models.ensemble.store import ArraysByName
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
 
 DRIFT_OFF_PITCH = 0.05
@@ -79,7 +79,7 @@ class NoisePaths:
             except Exception as error:
                 raise PathFailed(path, f"{type(error).__name__}: {error}") from error
 
-    def __call__(self, path_numbers: range) -> Arrays:
+    def __call__(self, path_numbers: range) -> ArraysByName:
         """Runs a block of n paths. Returns arrays by name.
 
         ``states`` (n, rows, 8); ``drift_off`` (n,): first time (s) at which the pitch is further than ``threshold``
@@ -242,7 +242,7 @@ def mujoco_threads(
     )
 
 
-def largest_difference(reference_paths: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
+def largest_difference(reference_paths: ArraysByName, other_paths: ArraysByName, times: np.ndarray) -> float:
     """Largest difference in any state between two ensembles of the same paths, before both drift off, divided by the
     reference's largest state in that time.
 

@@ -6,7 +6,7 @@ The memory does not grow with the number of paths.
 import numpy as np
 
 from models.ensemble.statistics import FAN_PERCENTILES
-from models.ensemble.store import Arrays
+from models.ensemble.store import ArraysByName
 from models.ensemble.streamed import MagnitudeQuantiles, StreamedCovariance, StreamedMoments, ValueCounts
 
 PITCH_STATE = 3
@@ -23,7 +23,7 @@ class PathStatistics:
     """
 
     def __init__(self, true_states: np.ndarray, saved_path_count: int) -> None:
-        self._true, self._saved, self._blocks = true_states, saved_path_count, list[Arrays]()
+        self._true, self._saved, self._blocks = true_states, saved_path_count, list[ArraysByName]()
         self.moments, self.covariance, self._spread, self.drift_off = (
             StreamedMoments(),
             StreamedCovariance(),
@@ -32,7 +32,7 @@ class PathStatistics:
         )
         self.lost, self.steepest = 0, np.full(len(true_states), np.nan)
 
-    def add(self, path_block: Arrays) -> None:
+    def add(self, path_block: ArraysByName) -> None:
         """Add a block of noise paths to all statistics."""
         errors = path_block["states"] - self._true
         self.moments.add(errors)
@@ -46,7 +46,7 @@ class PathStatistics:
             self._blocks.append({name: values[: self._saved - paths_kept] for name, values in path_block.items()})
 
     @property
-    def first(self) -> Arrays:
+    def first(self) -> ArraysByName:
         """Arrays of the first ``saved_paths`` paths, by name."""
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
 

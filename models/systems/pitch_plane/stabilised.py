@@ -26,13 +26,13 @@ from models.drift.score import (
     FEWEST_ROWS,
     SECTION_FORCE_CHANNELS,
     TUMBLING_PITCH,
-    Limits,
-    blind_verdict,
+    AcceptanceLimits,
     errors_of_run,
     figures_of_run,
     innovations_are_consistent,
-    uncertainty,
+    stated_pitch_uncertainty,
     verdict_on_run,
+    verdict_without_true_run,
 )
 from models.fatigue.damage import WOEHLER_SLOPE
 from models.systems.pitch_plane.run import run
@@ -77,7 +77,7 @@ class StabiliserOptions(Strict):
         None, gt=-0.5, lt=0.5, description="slope angle of the second road", json_schema_extra={"unit": "rad"}
     )
     slope: float = quantity("", "Woehler exponent", default=WOEHLER_SLOPE)
-    limits: Limits = Limits()
+    limits: AcceptanceLimits = AcceptanceLimits()
 
 
 def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> StabiliserOptions:
@@ -279,14 +279,14 @@ class StabiliserBench:
             errors_of_run(run_result, self.truth, self.options.slope),
         )
         with_truth = verdict_on_run(figures, wrong, stabiliser_effects, limits)
-        verdict_without_truth = blind_verdict(
+        verdict_without_truth = verdict_without_true_run(
             figures,
             stabiliser_effects,
             float(run_result.times[-1]),
             limits,
             self.trusted,
             innovations_are_consistent(run_result),
-            uncertainty(run_result),
+            stated_pitch_uncertainty(run_result),
         )
         loads = {f"damage {channel}": wrong.damage[channel] for channel in SECTION_FORCE_CHANNELS}
         loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in SECTION_FORCE_CHANNELS}

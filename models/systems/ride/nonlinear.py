@@ -19,9 +19,9 @@ from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
-from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
-from models.ensemble.store import Arrays
+from models.ensemble.runner import PathBlocks, run_paths
+from models.ensemble.store import ArraysByName
 from models.ensemble.workers import Crew
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
@@ -159,7 +159,7 @@ class CopiesJob:
     speeds: tuple[float, ...]
     sampling: RunSampling
 
-    def __call__(self, speed_indices: range) -> Arrays:
+    def __call__(self, speed_indices: range) -> ArraysByName:
         """Returns the fields of ``Copies`` as arrays, with the speed as their first axis."""
         copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in speed_indices]
         return {
@@ -186,7 +186,7 @@ def _copies_by_speed(scene: RideScene, copies_job: CopiesJob, report_study_progr
         )
 
     with Crew.of(scene, default_workers=1).at_work(len(copies_job.speeds)) as pool:
-        arrays = run_paths(copies_job, len(copies_job.speeds), None, pool, Blocks(1), report_progress)
+        arrays = run_paths(copies_job, len(copies_job.speeds), None, pool, PathBlocks(1), report_progress)
     return {
         speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
         for speed, names, moments, step, duration, settling in zip(

@@ -133,14 +133,14 @@ def _step_errors(
     """
     power = 2.0**KINKED_ORDER
     try:
-        first_part, share, remains = (
+        duration_of_first_part, share, remains = (
             principal_series(simulate_path(with_step_factor(scene, 2.0, FINE_WINDOW))),
             FINE_WINDOW,
             1.0 / (power - 1.0),
         )
     except (InputError, RunFailed):
         share = min(1.0, max(HALF_STEP_SHARE, LEAST_STEPS * scene.run.step / scene.run.duration))
-        first_part, remains = (
+        duration_of_first_part, remains = (
             principal_series(simulate_path(with_step_factor(scene, 0.5, share))),
             power / (power - 1.0),
         )
@@ -151,7 +151,7 @@ def _step_errors(
             _rms_difference(fine_series, coarse_series, name),
         )
         grown = max(1.0, difference_over_all / difference_at_start) if difference_at_start > 0.0 else 1.0
-        error = remains * grown * _rms_difference(fine_series, first_part, name)
+        error = remains * grown * _rms_difference(fine_series, duration_of_first_part, name)
         estimates[name] = Estimate(error, unit, error / channel_sizes[name], KINKED_ORDER, scene.run.step)
     return estimates
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.channel import Source
+from models.measured.channel import MeasurementSource
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import ChannelGroup
 
@@ -138,7 +138,7 @@ def _file_digests(folder: Path) -> dict[str, str]:
     return {str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-def read_channels(measurement_source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def read_channels(measurement_source: MeasurementSource) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and values of every channel, read in several blocks."""
     channels: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for group in {channel.group for channel in measurement_source.channels}:
@@ -152,7 +152,7 @@ def read_channels(measurement_source: Source) -> dict[str, tuple[np.ndarray, np.
     return channels
 
 
-def reading_error(measurement_source: Source, truth: Truth, expected_text: str) -> float:
+def reading_error(measurement_source: MeasurementSource, truth: Truth, expected_text: str) -> float:
     """Largest difference between what is read from a file and the expected values; infinite if a channel, a sample or
     the reader's message is missing."""
     channels, finding_texts = (

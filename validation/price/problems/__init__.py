@@ -1,7 +1,7 @@
 """Test problems of the work-precision measurements: one file each, with the computed quantities and their errors.
 
 A problem knows its reference solution and that solution's own uncertainty; ``models.advice.price.runner`` does the
-rest. A new system adds a file here whose class fulfils ``models.advice.price.problem.Problem``.
+rest. A new system adds a file here whose class fulfils ``models.advice.price.problem.WorkPrecisionProblem``.
 """
 
 from collections.abc import Callable

@@ -90,7 +90,9 @@ class StopSolver:
 
 
 class BrakingStop:
-    """Test problem: a braking stop with its reference solution; a ``models.advice.price.problem.Problem``."""
+    """Test problem: a braking stop with its reference solution; a
+    ``models.advice.price.problem.WorkPrecisionProblem``.
+    """
 
     key = "braking"
     note = (

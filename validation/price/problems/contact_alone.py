@@ -53,7 +53,9 @@ class ContactSolver:
 
 
 class ContactAlone:
-    """Test problem: rolling contacts with their exact forces; a ``models.advice.price.problem.Problem``."""
+    """Test problem: rolling contacts with their exact forces; a
+    ``models.advice.price.problem.WorkPrecisionProblem``.
+    """
 
     key, duration, uncertain_share = "contact", 1.0, 0.25
     note = (

@@ -77,7 +77,7 @@ def vehicle_under_forces() -> Assembly:
 
 class ForceExcited:
     """Test problem: a vehicle under wheel forces, with its reference solution; a
-    ``models.advice.price.problem.Problem``.
+    ``models.advice.price.problem.WorkPrecisionProblem``.
 
     ``judged_quantities`` : name and unit of the quantity for which a variant sets tolerances, before the states.
     """

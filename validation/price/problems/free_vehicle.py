@@ -78,7 +78,7 @@ class FreeVehicleSolver:
 
 class FreeVehicle:
     """Test problem: a free vehicle on a road, with its reference solution; a
-    ``models.advice.price.problem.Problem``."""
+    ``models.advice.price.problem.WorkPrecisionProblem``."""
 
     key, duration = "vehicle", DURATION
     note = (

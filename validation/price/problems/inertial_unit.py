@@ -135,7 +135,9 @@ class AttitudeSolver:
 
 
 class InertialUnit:
-    """Test problem: attitude from gyro rates, with its reference; a ``models.advice.price.problem.Problem``."""
+    """Test problem: attitude from gyro rates, with its reference; a
+    ``models.advice.price.problem.WorkPrecisionProblem``.
+    """
 
     key, duration, bound = "unit", DURATION, 1.0
     note = (

@@ -152,7 +152,9 @@ def continuous_solution(assembly: Assembly, method: str, tolerance: float) -> Od
 
 
 class RoadExcited:
-    """Test problem: a vehicle on a road, with its reference solution; a ``models.advice.price.problem.Problem``."""
+    """Test problem: a vehicle on a road, with its reference solution; a
+    ``models.advice.price.problem.WorkPrecisionProblem``.
+    """
 
     key, duration = "road", DURATION
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)

@@ -137,7 +137,7 @@ def march(state, table_of_wheels, table, step, step_count):
 
 class RollingWheels:
     """Test problem: a rolling wheel with FASTSIM, with its reference solution; a
-    ``models.advice.price.problem.Problem``."""
+    ``models.advice.price.problem.WorkPrecisionProblem``."""
 
     duration = DURATION
     note = (

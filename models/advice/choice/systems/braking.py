@@ -15,10 +15,10 @@ from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import StopHistory
 
-ENGINE, WINDOWED = "reference", False
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", False
 
 
-def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: BrakingScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Simulate every braking procedure and collect its quantities. A quantity that is not finite, as where the vehicle
     does not stop, is left out.
     """
@@ -26,7 +26,7 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
     (engine,) = engines_of(scene, (engine,)) or (engine,)
     for name in scene.procedures:
         start_time = time.process_time()
-        drive = run(scene, engine, procedure=name, error=error)
+        drive = run(scene, engine, procedure=name, error=with_error_estimate)
         seconds += time.process_time() - start_time
         path, stop = drive.detail, StopHistory(drive.detail)
         if len(path.times) < 3:
@@ -46,23 +46,23 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
     )
 
 
-def steps(scene: BrakingScene) -> int:
+def step_count(scene: BrakingScene) -> int:
     """Number of steps of a braking procedure that lasts for the longest duration that the scene allows."""
     return round(scene.run.duration / scene.run.sample) * scene.run.substeps
 
 
-def divisible_steps(scene: BrakingScene) -> int:
+def divisible_step_count(scene: BrakingScene) -> int:
     """Number of time steps within a controller sample, which a longer step must divide: only these steps may become
     longer, the controller's samples stay.
     """
     return scene.run.substeps
 
 
-def shorten(table: dict[str, Any], scene: BrakingScene, steps: int) -> None:
-    """Edit the table to run only the first samples of every procedure."""
-    table.setdefault("run", {})["duration"] = max(2, steps // scene.run.substeps) * scene.run.sample
+def shorten_run(scene_table: dict[str, Any], scene: BrakingScene, step_limit: int) -> None:
+    """Edit ``scene_table`` to run only the first samples of every procedure."""
+    scene_table.setdefault("run", {})["duration"] = max(2, step_limit // scene.run.substeps) * scene.run.sample
 
 
-def coarsen(table: dict[str, Any], scene: BrakingScene, step_factor: int) -> None:
-    """Edit the table to take fewer steps within a sample."""
-    table.setdefault("run", {})["substeps"] = scene.run.substeps // step_factor
+def lengthen_steps(scene_table: dict[str, Any], scene: BrakingScene, step_factor: int) -> None:
+    """Edit ``scene_table`` to take fewer steps within a sample."""
+    scene_table.setdefault("run", {})["substeps"] = scene.run.substeps // step_factor

@@ -10,15 +10,15 @@ from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.handling.run import TYRE_CHANNELS, run
 from models.systems.handling.scene import HandlingScene
 
-ENGINE, WINDOWED = "mujoco", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "mujoco", True
 MOTION_CHANNELS = {"speed": (0, "m/s"), "side speed": (1, "m/s"), "yaw rate": (2, "rad/s")}
 TYRE_QUANTITIES = ("load", "fx", "fy", "mz")
 """Channels of the tyres that are compared, with a case for each tyre."""
 
 
-def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: HandlingScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Simulate every manoeuvre and collect the vehicle's motion and its tyres' loads and forces."""
-    runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
+    runs = [run(scene, engine, name, with_error_estimate) for name in scene.manoeuvres]
     drives = [handling_run.detail for handling_run in runs]
     speeds = [drive.velocity() for drive in drives]
     quantities = {
@@ -38,20 +38,20 @@ def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) 
     return RunQuantities(quantities, counts, sum(handling_run.seconds for handling_run in runs))
 
 
-def steps(scene: HandlingScene) -> int:
+def step_count(scene: HandlingScene) -> int:
     """Number of steps of the shortest manoeuvre."""
     return min(round(manoeuvre.duration / scene.run.step) for manoeuvre in scene.manoeuvres.values())
 
 
-divisible_steps = steps
+divisible_step_count = step_count
 
 
-def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
-    """Edit the table to shorten every manoeuvre to at most ``steps`` of the scene's time steps."""
-    for name, manoeuvre in table["manoeuvres"].items():
-        manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
+def shorten_run(scene_table: dict[str, Any], scene: HandlingScene, step_limit: int) -> None:
+    """Edit ``scene_table`` to shorten every manoeuvre to at most ``step_limit`` of the scene's time steps."""
+    for name, manoeuvre in scene_table["manoeuvres"].items():
+        manoeuvre["duration"] = min(scene.manoeuvres[name].duration, step_limit * scene.run.step)
 
 
-def coarsen(table: dict[str, Any], scene: HandlingScene, step_factor: int) -> None:
-    """Edit the table to multiply the step by ``step_factor``."""
-    table.setdefault("run", {})["step"] = step_factor * scene.run.step
+def lengthen_steps(scene_table: dict[str, Any], scene: HandlingScene, step_factor: int) -> None:
+    """Edit ``scene_table`` to multiply the step by ``step_factor``."""
+    scene_table.setdefault("run", {})["step"] = step_factor * scene.run.step

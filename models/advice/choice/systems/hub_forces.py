@@ -8,14 +8,14 @@ from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.hub_forces.run import MOTION_CHANNELS, run
 from models.systems.hub_forces.scene import HubScene
 
-ENGINE, WINDOWED = "mujoco", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "mujoco", True
 
 
-def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: HubScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Measure hub forces, run the vehicle with roll and pitch held as in the scene, and collect the chassis motion and
     the element forces.
     """
-    path = run(scene, engine, error=error)
+    path = run(scene, engine, error=with_error_estimate)
     quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION_CHANNELS.items()}
     names = path.data["element"].values
     quantities |= {str(name): Quantity("N", (path["section_force"][:, i],)) for i, name in enumerate(names)}
@@ -25,19 +25,19 @@ def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> Ru
     )
 
 
-def steps(scene: HubScene) -> int:
+def step_count(scene: HubScene) -> int:
     """Number of steps of a run."""
     return scene.step_count
 
 
-divisible_steps = steps
+divisible_step_count = step_count
 
 
-def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:
-    """Edit the table to shorten the run to ``steps`` time steps of the scene's own length."""
-    table.setdefault("run", {})["duration"] = steps * scene.run.step
+def shorten_run(scene_table: dict[str, Any], scene: HubScene, step_limit: int) -> None:
+    """Edit ``scene_table`` to shorten the run to ``step_limit`` time steps of the scene's own length."""
+    scene_table.setdefault("run", {})["duration"] = step_limit * scene.run.step
 
 
-def coarsen(table: dict[str, Any], scene: HubScene, step_factor: int) -> None:
-    """Edit the table to multiply the step by ``step_factor``."""
-    table.setdefault("run", {})["step"] = step_factor * scene.run.step
+def lengthen_steps(scene_table: dict[str, Any], scene: HubScene, step_factor: int) -> None:
+    """Edit ``scene_table`` to multiply the step by ``step_factor``."""
+    scene_table.setdefault("run", {})["step"] = step_factor * scene.run.step

@@ -13,21 +13,21 @@ from models.systems.measured.clock import FEWEST_SAMPLES
 from models.systems.measured.run import RecordingAnalysis, read_files, run
 from models.systems.measured.scene import MeasuredScene
 
-ENGINE, WINDOWED = "mujoco", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "mujoco", True
 SHORTEST_PART_STEPS = 60
 """Number of steps of which whole multiples make up the shortest part of a recording, so that it can be computed with
 longer steps, too.
 """
 
 
-def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: MeasuredScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Bring the measurement onto one clock, run the vehicle, and collect the section forces; the seconds are those of
     the time integration.
     """
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
-    result = run(scene, engine, error=error)
+    result = run(scene, engine, with_error_estimate=with_error_estimate)
     exam: RecordingAnalysis = result.detail
     assert exam.outcome is not None
     forces = [answer for answer in exam.outcome.answers if answer.quantity != "acceleration"]
@@ -37,12 +37,12 @@ def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) 
     return RunQuantities(quantities, called, result.seconds)
 
 
-def steps(scene: MeasuredScene) -> int:
+def step_count(scene: MeasuredScene) -> int:
     """Number of steps of a run."""
     return round(_period_and_duration(scene)[1] / _step(scene))
 
 
-divisible_steps = steps
+divisible_step_count = step_count
 
 
 def _step(scene: MeasuredScene) -> float:
@@ -62,20 +62,20 @@ def _period_and_duration(scene: MeasuredScene) -> tuple[float, float]:
         return recording.period, recording.duration
 
 
-def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
-    """Edit the table to shorten the run to ``few`` steps, but no less than a recording must have; a virtual measurement
-    is shortened with it.
+def shorten_run(scene_table: dict[str, Any], scene: MeasuredScene, step_limit: int) -> None:
+    """Edit ``scene_table`` to shorten the run to ``step_limit`` steps, but no less than a recording must have; a
+    virtual measurement is shortened with it.
     """
     period, full_duration = _period_and_duration(scene)
     least_steps = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_step(scene) * SHORTEST_PART_STEPS))
-    duration = min(max(few, least_steps) * _step(scene), full_duration)
+    duration = min(max(step_limit, least_steps) * _step(scene), full_duration)
     if scene.virtual is None:
-        table.setdefault("clock", {})["duration"] = duration
+        scene_table.setdefault("clock", {})["duration"] = duration
     else:
-        table["virtual"]["duration"] = scene.clock.start + duration
-        table.get("clock", {}).pop("duration", None)
+        scene_table["virtual"]["duration"] = scene.clock.start + duration
+        scene_table.get("clock", {}).pop("duration", None)
 
 
-def coarsen(table: dict[str, Any], scene: MeasuredScene, step_factor: int) -> None:
-    """Edit the table to multiply the step by ``step_factor``."""
-    table.setdefault("run", {})["step"] = step_factor * _step(scene)
+def lengthen_steps(scene_table: dict[str, Any], scene: MeasuredScene, step_factor: int) -> None:
+    """Edit ``scene_table`` to multiply the step by ``step_factor``."""
+    scene_table.setdefault("run", {})["step"] = step_factor * _step(scene)

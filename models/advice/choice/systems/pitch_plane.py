@@ -7,21 +7,21 @@ from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
-ENGINE, WINDOWED = "reference", True
-CALLS_PER_STEP = {"RK4": 4, "RK44": 4, "Euler": 1}
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", True
+FORCE_CALLS_PER_STEP = {"RK4": 4, "RK44": 4, "Euler": 1}
 """Right-hand side calls in a step of the methods that do not count them."""
 
 
-def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: Scene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Run the pitch-plane scene and collect the channels of its result."""
     assembly = assembly_of_scene(scene)
     start_time = time.process_time()
-    result = run(scene, engine, vehicle_assembly=assembly, error=error)
+    result = run(scene, engine, vehicle_assembly=assembly, with_error_estimate=with_error_estimate)
     seconds = time.process_time() - start_time
     run_counts, states = result.counts(), result.detail.states
     counts = {"steps": run_counts.get("steps", len(states) - 1), "states": states.shape[1]}
     counts["calls"] = run_counts.get(
-        "force calls", CALLS_PER_STEP.get(result.data.attrs["integrator"], 1) * counts["steps"]
+        "force calls", FORCE_CALLS_PER_STEP.get(result.data.attrs["integrator"], 1) * counts["steps"]
     )
     quantities = {
         str(name): Quantity(channel.attrs["units"], (channel.values,))
@@ -30,24 +30,24 @@ def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQu
     return RunQuantities(quantities, counts, seconds)
 
 
-def steps(scene: Scene) -> int:
+def step_count(scene: Scene) -> int:
     """Number of steps of the run."""
     return round(scene.run.duration / scene.run.step)
 
 
-divisible_steps = steps
+divisible_step_count = step_count
 
 
-def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:
-    """Edit the table to shorten the run to ``steps`` time steps of the scene's own length."""
-    table["run"] |= {"duration": steps * scene.run.step}
-    table["run"].pop("output_step", None)
+def shorten_run(scene_table: dict[str, Any], scene: Scene, step_limit: int) -> None:
+    """Edit ``scene_table`` to shorten the run to ``step_limit`` time steps of the scene's own length."""
+    scene_table["run"] |= {"duration": step_limit * scene.run.step}
+    scene_table["run"].pop("output_step", None)
 
 
-def coarsen(table: dict[str, Any], scene: Scene, step_factor: int) -> None:
-    """Edit the table to multiply the steps of all engines by ``step_factor``; every step becomes a saved row."""
-    table["run"] |= {"step": step_factor * scene.run.step}
-    table["run"].pop("output_step", None)
-    for engine_table in table.get("engines", {}).values():
+def lengthen_steps(scene_table: dict[str, Any], scene: Scene, step_factor: int) -> None:
+    """Edit ``scene_table`` to multiply the steps of all engines by ``step_factor``; every step becomes a saved row."""
+    scene_table["run"] |= {"step": step_factor * scene.run.step}
+    scene_table["run"].pop("output_step", None)
+    for engine_table in scene_table.get("engines", {}).values():
         if "step" in engine_table:
             engine_table["step"] *= step_factor

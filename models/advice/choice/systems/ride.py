@@ -15,10 +15,10 @@ from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
-ENGINE, WINDOWED = "reference", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", True
 
 
-def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
+def copies_of_scene(scene: RideScene | CopiesInTime) -> CopiesInTime:
     """The ride scene as an ensemble of copies that are integrated in time, an object that can leave out effects,
     shorten the run and lengthen its steps.
     """
@@ -28,11 +28,11 @@ def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
         return in_time(ReducedScene.complete(scene))
 
 
-def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: CopiesInTime, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Integrate the copies at every speed with their own equations, and collect the mean squares of the outputs;
     InputError for another engine.
     """
-    if engine != ENGINE:
+    if engine != DEFAULT_ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     squares_of, seconds = dict[str, list[np.ndarray]](), 0.0
     for pace in scene.steps_at_speeds:
@@ -53,11 +53,11 @@ def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -
     return RunQuantities(quantities, counts, seconds)
 
 
-def steps(scene: CopiesInTime) -> int:
+def step_count(scene: CopiesInTime) -> int:
     """Number of time steps of all copies at all speeds."""
     return scene.steps
 
 
-def divisible_steps(scene: CopiesInTime) -> int:
+def divisible_step_count(scene: CopiesInTime) -> int:
     """Number of steps that a longer step must divide, both in the lead-in and while outputs are averaged."""
     return STEP_MULTIPLE // gcd(STEP_MULTIPLE, scene.step_factor)

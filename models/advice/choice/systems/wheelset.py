@@ -12,14 +12,14 @@ from models.systems.wheelset.of_scene import path_speeds
 from models.systems.wheelset.run import run
 from models.systems.wheelset.scene import WheelsetScene
 
-ENGINE, WINDOWED = "reference", True
+DEFAULT_ENGINE, PART_REPRESENTS_RUN = "reference", True
 
 
-def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) -> RunQuantities:
+def computed_quantities(scene: WheelsetScene, engine: str, with_error_estimate: bool = False) -> RunQuantities:
     """Compute the path at every speed and collect its states and contact quantities. A quantity of contact patches has
     all times of the first patch, then all times of the next one.
     """
-    paths = [run(scene, engine, speed, error=error) for speed in path_speeds(scene)]
+    paths = [run(scene, engine, speed, error=with_error_estimate) for speed in path_speeds(scene)]
     quantities = {
         str(name): Quantity(
             channel.attrs["units"], tuple(case for path in paths for case in np.atleast_2d(path[str(name)].T))
@@ -35,21 +35,21 @@ def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) 
     )
 
 
-def steps(scene: WheelsetScene) -> int:
+def step_count(scene: WheelsetScene) -> int:
     """Number of time steps of the path at every speed."""
     return round(scene.run.duration / scene.run.step)
 
 
-divisible_steps = steps
+divisible_step_count = step_count
 
 
-def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
-    """Edit the table to shorten the paths to ``steps`` time steps of the scene's own length, at the speeds of the whole
-    scene.
+def shorten_run(scene_table: dict[str, Any], scene: WheelsetScene, step_limit: int) -> None:
+    """Edit ``scene_table`` to shorten the paths to ``step_limit`` time steps of the scene's own length, at the speeds
+    of the whole scene.
     """
-    table.setdefault("run", {}).update(duration=steps * scene.run.step, speeds=path_speeds(scene))
+    scene_table.setdefault("run", {}).update(duration=step_limit * scene.run.step, speeds=path_speeds(scene))
 
 
-def coarsen(table: dict[str, Any], scene: WheelsetScene, step_factor: int) -> None:
-    """Edit the table to multiply the step by ``step_factor``."""
-    table.setdefault("run", {})["step"] = step_factor * scene.run.step
+def lengthen_steps(scene_table: dict[str, Any], scene: WheelsetScene, step_factor: int) -> None:
+    """Edit ``scene_table`` to multiply the step by ``step_factor``."""
+    scene_table.setdefault("run", {})["step"] = step_factor * scene.run.step

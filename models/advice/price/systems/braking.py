@@ -34,10 +34,12 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
 
 @dataclass(frozen=True)
 class PricedBraking:
-    """A braking procedure as a priced scene, see ``models.advice.price.PricedScene``. name : of the procedure."""
+    """A braking procedure as a priced scene, see ``models.advice.price.PricedScene``. procedure_name : name of the
+    procedure.
+    """
 
     scene: BrakingScene
-    name: str
+    procedure_name: str
     quantity: str
     engines: tuple[str, ...]
     note: str
@@ -61,11 +63,11 @@ class PricedBraking:
     searched_duration = full_duration
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work: tyre forces, evaluated once per step in every engine."""
         return "force calls"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of steps for the only method of braking, one for each engine that integrates the chassis."""
         run = self.scene.run
         values = tuple(run.sample / n for n in sorted({*SUBSTEPS_TRIED, run.substeps}))
@@ -73,7 +75,7 @@ class PricedBraking:
             SettingLadder(engine, METHOD_NAME, values, 1, default=run.sample / run.substeps) for engine in self.engines
         ]
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference, with twice as many steps within a sample on every rung."""
         engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
         return SettingLadder(
@@ -93,7 +95,7 @@ class PricedBraking:
         """
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
-        path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.name).detail
+        path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.procedure_name).detail
         if not path.ended_at_rest:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path
@@ -106,7 +108,7 @@ class PricedBraking:
         value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
         return PricedRun(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of steps within a sample."""
         return [
             "[run]",

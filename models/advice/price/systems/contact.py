@@ -32,16 +32,16 @@ USUAL_QUANTITY = "fx,fy"
 
 @dataclass(frozen=True, eq=False)
 class PricedContact:
-    """A contact as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; rows : the rows
-    of a table that can be solved; None for one contact at its creepages.
+    """A contact as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; table_rows :
+    the rows of a table that can be solved; None for one contact at its creepages.
     """
 
     scene: ContactScene
     channels: tuple[str, ...]
-    rows: RowBlock | None
+    table_rows: RowBlock | None
     kink_period = 0.0
     full_duration = searched_duration = 1.0
-    counted = "contact cells"
+    work_count_name = "contact cells"
 
     @property
     def title(self) -> str:
@@ -59,54 +59,69 @@ class PricedContact:
         return UNIT_OF_CHANNEL[self.channels[0]]
 
     @property
-    def extent(self) -> str:
+    def extent_text(self) -> str:
         """Text on where the quantity is computed: at every creepage, or in the first rows of a table."""
-        return "at every creepage" if self.rows is None else f"in the first {len(self.rows.lines):,} sound rows"
+        return (
+            "at every creepage"
+            if self.table_rows is None
+            else f"in the first {len(self.table_rows.lines):,} sound rows"
+        )
 
     @property
     def note(self) -> str:
         """Text on what the price leaves out: the error of the contact theory."""
         return "errors are those of cells: how far the theory is off stands beside the forces of a run"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of cell numbers for every integration scheme of the scene's theory."""
         name, usual = self.scene.method.name, self.scene.method
         values = tuple(1.0 / n for n in sorted({*CELLS_TRIED, usual.cells}))
         return [
-            SettingLadder(name, march or name, values, self._order(march), default=self._default(march), cells=True)
+            SettingLadder(
+                name,
+                march or name,
+                values,
+                self._convergence_order(march),
+                default=self._default_cell_share(march),
+                cells=True,
+            )
             for march in MARCHES_OF_THEORY[name]
         ]
 
-    def _default(self, march_name: str) -> float:
+    def _default_cell_share(self, march_name: str) -> float:
         return 1.0 / self.scene.method.cells if march_name in ("", self.scene.method.march) else 0.0
 
-    def _order(self, march_name: str) -> int:
+    def _convergence_order(self, march_name: str) -> int:
         return int(self._method(march_name, self.scene.method.cells).order)
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference: cells that halve, with the integration scheme of the highest order."""
         name = self.scene.method.name
         march = MARCHES_OF_THEORY[name][0]
         values = tuple(1.0 / n for n in REFERENCE_CELLS)
         change_text = "half the cells change it by"
-        return SettingLadder(name, march or name, values, self._order(march), cells=True, change_text=change_text)
+        return SettingLadder(
+            name, march or name, values, self._convergence_order(march), cells=True, change_text=change_text
+        )
 
     def second_setting(self, reference_setting: Setting) -> Setting | None:
         """None: no other family of methods computes the same contact theory."""
         return None
 
-    def _method(self, march_name: str, cells: int) -> ContactMethod:
-        update = {"cells": cells, **({"march": march_name} if march_name in MARCHES_OF_THEORY["fastsim"] else {})}
+    def _method(self, march_name: str, cell_count: int) -> ContactMethod:
+        update = {"cells": cell_count, **({"march": march_name} if march_name in MARCHES_OF_THEORY["fastsim"] else {})}
         return self.scene.method.model_copy(update=update)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, int]:
         """Values (n, k) of the channels with a setting, and the number of cells evaluated in all rows."""
         method = self._method(setting.method, round(1.0 / setting.value))
-        if self.rows is None:
+        if self.table_rows is None:
             contact = run(self.scene.model_copy(update={"method": method}), error=False)
             values = np.column_stack([contact[name] for name in self.channels])
         else:
-            answered = solved_rows(self.rows, partial(inputs_of_table_contacts, self.scene), method, False)["forces"]
+            answered = solved_rows(self.table_rows, partial(inputs_of_table_contacts, self.scene), method, False)[
+                "forces"
+            ]
             values = answered[:, [OUTPUT_COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
@@ -118,7 +133,7 @@ class PricedContact:
         values = np.repeat(values, 2, axis=0) if len(values) == 1 else values
         return PricedRun(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of cells and the integration scheme."""
         march = [f'march = "{setting.method}"'] if setting.method in MARCHES_OF_THEORY["fastsim"] else []
         return ["[method]", f"cells = {round(1.0 / setting.value)}", *march]

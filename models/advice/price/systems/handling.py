@@ -13,7 +13,7 @@ from models.advice.price.meshed import (
     SECOND_SOLVER_TOLERANCE,
     MeshedScene,
     checked_quantity,
-    first_part,
+    duration_of_first_part,
     run_and_quantity,
 )
 from models.advice.price.problem import Setting
@@ -37,9 +37,9 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
 
 
 @cache
-def _with_cells(handling: Handling, cells: int) -> Handling:
-    """The vehicle with ``cells`` cells along the contact patches of its tyres."""
-    return replace(handling, tyres=replace(handling.tyres, cells=cells))
+def _with_cells(handling: Handling, cell_count: int) -> Handling:
+    """The vehicle with ``cell_count`` cells along the contact patches of its tyres."""
+    return replace(handling, tyres=replace(handling.tyres, cells=cell_count))
 
 
 @dataclass(frozen=True)
@@ -47,17 +47,17 @@ class PricedHandling(MeshedScene):
     """A handling manoeuvre as a priced scene."""
 
     scene: HandlingScene
-    name: str
+    manoeuvre_name: str
     speed: float
     handling: Handling
 
-    def run(self, engine: str, cells: int, step: float, duration: float) -> SimulatedDrive:
+    def run(self, engine: str, cell_count: int, step: float, duration: float) -> SimulatedDrive:
         """Simulate the manoeuvre in an engine with this number of contact cells and this step (s)."""
-        return drive_run(engine, _with_cells(self.handling, cells), self.speed, duration, step)
+        return drive_run(engine, _with_cells(self.handling, cell_count), self.speed, duration, step)
 
-    def exact(self, cells: int, step: float, duration: float) -> SimulatedDrive:
+    def exact_run(self, cell_count: int, step: float, duration: float) -> SimulatedDrive:
         """Simulate the manoeuvre by the solver DOP853 with the engine's accelerations, as an accurate reference."""
-        handling = _with_cells(self.handling, cells)
+        handling = _with_cells(self.handling, cell_count)
         model, start = build_in_engine(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
         solved = solve_ivp(
@@ -73,15 +73,15 @@ class PricedHandling(MeshedScene):
             raise RunFailed(self.reference_engine, solved.message)
         return drive_of_fixed_steps(handling, Trajectory(times, solved.y.T), self.reference_engine)
 
-    def read(self, run: SimulatedDrive) -> tuple[np.ndarray, np.ndarray, int]:
+    def quantity_along_run(self, run: SimulatedDrive) -> tuple[np.ndarray, np.ndarray, int]:
         """Times (n,) in s and values (n, k) of the quantity along a manoeuvre, and the number of force calls; the
         assumptions of the run are judged.
         """
-        drive_result(self.scene, self.reference_engine, self.name, run)
+        drive_result(self.scene, self.reference_engine, self.manoeuvre_name, run)
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of contact cells and the step."""
         return [
             "[tyres]",
@@ -110,7 +110,7 @@ def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str,
         QUANTITIES[quantity_name][1],
         note,
         manoeuvre.duration,
-        first_part(manoeuvre.duration, SEARCHED_DURATION),
+        duration_of_first_part(manoeuvre.duration, SEARCHED_DURATION),
         engines,
         "mujoco",
         step,

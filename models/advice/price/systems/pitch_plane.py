@@ -40,7 +40,7 @@ USUAL_QUANTITY = {
     "heave-pitch": "enforced_force",
 }
 """Quantity that is priced where the user names none, by the vehicle's input."""
-SENSORS = frozenset({"accelerometers", "gyro", "gyro_bias", "pitch_sensor"})
+SENSOR_EFFECTS = frozenset({"accelerometers", "gyro", "gyro_bias", "pitch_sensor"})
 """Effects that only read the motion: they are left out, since otherwise no step could be tried that misses a sampling
 time.
 """
@@ -54,15 +54,15 @@ SECOND_SOLVER_TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class PricedPitchPlane:
-    """A pitch-plane scene as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; base
-    : step (s) whose whole fractions all divide the run and its samples.
+    """A pitch-plane scene as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity;
+    base_step : step (s) whose whole fractions all divide the run and its samples.
     """
 
     assembly: Assembly
     engines: tuple[str, ...]
     channels: tuple[str, ...]
     unit: str
-    base: float
+    base_step: float
     searched_duration: float
 
     @property
@@ -81,7 +81,7 @@ class PricedPitchPlane:
         return self.assembly.scene.run.duration
 
     @property
-    def sampled(self) -> bool:
+    def has_sampled_input(self) -> bool:
         """Whether the input has kinks or jumps at its sampling times."""
         signal = self.assembly.input
         return signal is not None and signal.period is not None and len(signal.knots(self.full_duration)) > 0
@@ -89,19 +89,19 @@ class PricedPitchPlane:
     @property
     def kink_period(self) -> float:
         """Sampling period (s) of an input that is not smooth at its samples; 0 for a smooth input."""
-        return self.base if self.sampled else 0.0
+        return self.base_step if self.has_sampled_input else 0.0
 
     @property
     def note(self) -> str:
         """Text on which methods the price leaves out."""
-        return "adaptive methods are left out: they restart at every sample" if self.sampled else ""
+        return "adaptive methods are left out: they restart at every sample" if self.has_sampled_input else ""
 
     @property
-    def counted(self) -> str:
+    def work_count_name(self) -> str:
         """Name of the count that measures the work: force calls, for every method."""
         return "force calls"
 
-    def ladders(self) -> list[SettingLadder]:
+    def setting_ladders(self) -> list[SettingLadder]:
         """Ladders of settings for every method of the engines; generalised-alpha with Exudyn's default spectral radius
         and with the recommended one.
         """
@@ -109,7 +109,7 @@ class PricedPitchPlane:
         for engine in self.engines:
             for name, known in CATALOGUE[engine].items():
                 adaptive = known.adaptive or getattr(OUTSIDE_CLASSES.get(engine), "adaptive", False)
-                if known.adaptive and self.sampled and (engine, name) not in UNAVAILABLE_INTEGRATORS:
+                if known.adaptive and self.has_sampled_input and (engine, name) not in UNAVAILABLE_INTEGRATORS:
                     continue
                 for method in [m for m in SPECTRAL_RADII if m.startswith(name)] or [name]:
                     values = TOLERANCES_TRIED if adaptive else self._steps()
@@ -119,19 +119,21 @@ class PricedPitchPlane:
                     ladders.append(SettingLadder(engine, method, values, order, adaptive, default))
         return ladders
 
-    def reference(self) -> SettingLadder:
+    def reference_ladder(self) -> SettingLadder:
         """Ladder of the reference: RK4 on the hand-written equations of motion; each step is half the previous one."""
-        fewest_steps = math.ceil((FEWEST_ROWS - 1) * self.base / self.searched_duration * (1 - 1e-9))
-        coarsest_steps = max(fewest_steps, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
-        return SettingLadder("reference", "RK4", tuple(self.base / coarsest_steps / 2**k for k in range(16)), 4)
+        fewest_steps = math.ceil((FEWEST_ROWS - 1) * self.base_step / self.searched_duration * (1 - 1e-9))
+        coarsest_steps = max(fewest_steps, math.ceil(self.base_step / 4e-3 * (1 - 1e-9)))
+        return SettingLadder("reference", "RK4", tuple(self.base_step / coarsest_steps / 2**k for k in range(16)), 4)
 
     def second_setting(self, reference_setting: Setting) -> Setting | None:
         """LSODA as the setting that checks the reference; None where it would restart at every sample."""
-        return None if self.sampled else Setting("reference", "LSODA", SECOND_SOLVER_TOLERANCE, 0, adaptive=True)
+        return (
+            None if self.has_sampled_input else Setting("reference", "LSODA", SECOND_SOLVER_TOLERANCE, 0, adaptive=True)
+        )
 
     def solve(self, setting: Setting, duration: float) -> Result:
         """The result of a run with a solver setting, with an output row at every step."""
-        return self.run(setting.engine, self._settings(setting, duration))
+        return self.run(setting.engine, self._engine_settings(setting, duration))
 
     def run(self, engine: str, settings: Settings) -> Result:
         """The result of the scene in an engine with these solver settings, with an output row at every step."""
@@ -143,7 +145,7 @@ class PricedPitchPlane:
         """The quantity's channels along a run."""
         return PricedRun(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
         if setting.engine in OUTSIDE_CLASSES:
             return _outside_engine_lines(setting)
@@ -156,7 +158,7 @@ class PricedPitchPlane:
             *([f"spectral_radius = {radius}"] if radius else []),
         ]
 
-    def _settings(self, setting: Setting, duration: float) -> Settings:
+    def _engine_settings(self, setting: Setting, duration: float) -> Settings:
         if not setting.adaptive:
             return engine_settings(setting, duration)
         signal = self.assembly.input
@@ -164,9 +166,9 @@ class PricedPitchPlane:
         return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
 
     def _steps(self) -> tuple[float, ...]:
-        """Steps (s) to try, from coarse to fine, all whole fractions of ``base``."""
-        parts = np.unique(np.ceil(self.base / np.array(STEPS_TRIED) * (1 - 1e-9)).astype(int))
-        return tuple(self.base / int(k) for k in parts)
+        """Steps (s) to try, from coarse to fine, all whole fractions of ``base_step``."""
+        parts = np.unique(np.ceil(self.base_step / np.array(STEPS_TRIED) * (1 - 1e-9)).astype(int))
+        return tuple(self.base_step / int(k) for k in parts)
 
 
 def _outside_engine_lines(setting: Setting) -> list[str]:
@@ -185,12 +187,12 @@ def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -
     channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY[assembly.mode]).split(","))
     base, first = _base_step_and_duration(assembly)
     priced = PricedPitchPlane(assembly, engines, channels, "", base, first)
-    return replace(priced, unit=_unit(priced))
+    return replace(priced, unit=_common_unit(priced))
 
 
 def _without_sensors(scene: Scene) -> Scene:
     """The pitch-plane scene without its sensor effects."""
-    moving = {name: parameters for name, parameters in scene.effects.items() if name not in SENSORS}
+    moving = {name: parameters for name, parameters in scene.effects.items() if name not in SENSOR_EFFECTS}
     return scene.model_copy(update={"effects": moving})
 
 
@@ -209,18 +211,18 @@ def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
     return base, min(length, base * math.ceil(SEARCHED_DURATION / base * (1 - 1e-9)))
 
 
-def _unit(scene: PricedPitchPlane) -> str:
+def _common_unit(priced: PricedPitchPlane) -> str:
     """The common unit of the priced channels; InputError for an unknown channel, or several units."""
-    longest = float(scene.assembly.scene.settings("reference").step or scene.base)
-    settings = Settings("RK4", scene.base / math.ceil(scene.base / longest * (1 - 1e-9)), scene.base)
-    channels = scene.run("reference", settings).data.data_vars
-    for name in scene.channels:
+    longest = float(priced.assembly.scene.settings("reference").step or priced.base_step)
+    settings = Settings("RK4", priced.base_step / math.ceil(priced.base_step / longest * (1 - 1e-9)), priced.base_step)
+    channels = priced.run("reference", settings).data.data_vars
+    for name in priced.channels:
         if name not in channels:
             raise InputError("--quantity", "", name, "is no channel of this scene", tuple(map(str, channels)))
-    units = list(dict.fromkeys(channels[name].attrs["units"] for name in scene.channels))
+    units = list(dict.fromkeys(channels[name].attrs["units"] for name in priced.channels))
     if len(units) > 1:
         allowed = f"has several units, {' and '.join(units)}: one tolerance cannot hold for all"
-        raise InputError("--quantity", "", ",".join(scene.channels), allowed)
+        raise InputError("--quantity", "", ",".join(priced.channels), allowed)
     return units[0]
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import SECOND_SOLVER_TOLERANCE, MeshedScene, checked_quantity, first_part
+from models.advice.price.meshed import SECOND_SOLVER_TOLERANCE, MeshedScene, checked_quantity, duration_of_first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
@@ -16,7 +16,7 @@ from models.systems.wheelset.scene import WheelsetScene
 SEARCHED_DURATION = 0.25
 """Longest part (s) of a path over which settings are searched."""
 USUAL_QUANTITY = "y"
-QUANTITIES = {**STATE_CHANNELS, **CONTACT_CHANNELS}
+PRICED_QUANTITIES = {**STATE_CHANNELS, **CONTACT_CHANNELS}
 """Quantities that can be priced: state index or contact field, and unit, by name."""
 
 
@@ -27,24 +27,24 @@ class PricedWheelset(MeshedScene):
     scene: WheelsetScene
     speeds: tuple[float, ...]
 
-    def _scene(self, cells: int, step: float, duration: float) -> WheelsetScene:
+    def _changed_scene(self, cell_count: int, step: float, duration: float) -> WheelsetScene:
         """The wheelset scene with another number of contact cells, step (s) and duration (s)."""
-        contact = self.scene.contact.model_copy(update={"cells": cells or 3})
+        contact = self.scene.contact.model_copy(update={"cells": cell_count or 3})
         run = self.scene.run.model_copy(update={"step": step, "duration": duration})
         return self.scene.model_copy(update={"contact": contact, "run": run})
 
-    def run(self, engine: str, cells: int, step: float, duration: float) -> list[WheelsetPath]:
+    def run(self, engine: str, cell_count: int, step: float, duration: float) -> list[WheelsetPath]:
         """Compute the wheelset's path at every speed in an engine, with this number of contact cells and this step
         (s).
         """
-        return [simulated_path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
+        return [simulated_path(self._changed_scene(cell_count, step, duration), engine, speed) for speed in self.speeds]
 
-    def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
+    def exact_run(self, cell_count: int, step: float, duration: float) -> list[WheelsetPath]:
         """The wheelset's path at every speed by the solver DOP853, as an accurate reference."""
-        scene = self._scene(cells, step, duration)
+        scene = self._changed_scene(cell_count, step, duration)
         return [_exact_path(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
 
-    def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
+    def quantity_along_run(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
         """Times (n,) in s and values (n, k) of the quantity along the paths at all speeds, and the number of force
         calls; the assumptions of each path are judged.
         """
@@ -57,7 +57,7 @@ class PricedWheelset(MeshedScene):
             columns = [wheelset_run.contacts[CONTACT_CHANNELS[name][0]] for wheelset_run in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
-    def lines(self, setting: Setting) -> list[str]:
+    def scene_file_lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that set the number of contact cells and the step."""
         step = f"step = {self.steps.get(setting.method, setting.value)!r}"
         cells = ["[contact]", f"cells = {round(1 / setting.value)}"] if self.cells else []
@@ -86,7 +86,7 @@ def _exact_path(equations: Equations, start_state: np.ndarray, step: float, dura
 def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> PricedWheelset:
     """The wheelset scene with a quantity to price: a state or a contact force, along its paths at all speeds."""
     quantity_name, wheelset, contact = (
-        checked_quantity(quantity or USUAL_QUANTITY, QUANTITIES),
+        checked_quantity(quantity or USUAL_QUANTITY, PRICED_QUANTITIES),
         wheelset_of(scene),
         scene.contact,
     )
@@ -99,10 +99,10 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
     return PricedWheelset(
         scene.title,
         quantity_name,
-        QUANTITIES[quantity_name][1],
+        PRICED_QUANTITIES[quantity_name][1],
         note,
         run.duration,
-        first_part(run.duration, SEARCHED_DURATION),
+        duration_of_first_part(run.duration, SEARCHED_DURATION),
         engines,
         "reference",
         run.step,

@@ -25,7 +25,7 @@ from models.core.steps import divides
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS, RADIANS_PER_SECOND
 from models.drift.growth import pitch_spring, rigid_pitch
-from models.drift.innovations import Consistency, consistency
+from models.drift.innovations import FilterConsistency, consistency
 from models.engines.assembly import Assembly, Channels
 from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
@@ -134,7 +134,7 @@ class GuidingEstimate:
     used_values: np.ndarray
     missed_values: np.ndarray
     innovation_sum: np.ndarray
-    consistency: Consistency
+    consistency: FilterConsistency
 
 
 _LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
@@ -258,14 +258,14 @@ def _check_innovations(
 
 def _filter_objections(filter_parameters: Parameters, guiding_estimate: GuidingEstimate) -> tuple[str, ...]:
     """Objections to the measurement or the model, as text, where the filter's innovations are not consistent."""
-    if guiding_estimate.consistency.consistent:
+    if guiding_estimate.consistency.is_consistent:
         return ()
     square = guiding_estimate.consistency.statistics[0]
     largest = guiding_estimate.deviations[:, 0].max()
     known = f"the stated deviation of the pitch, up to {largest:.2g} rad, is not to be relied upon"
     remedy = (
         "the stated deviations are too large: state smaller ones"
-        if square.value < square.low
+        if square.value < square.lower_limit
         else f"check {filter_parameters.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
     )
     return (f"the filter contradicts {filter_parameters.file}: {guiding_estimate.consistency}; {known}; {remedy}",)
@@ -284,10 +284,10 @@ def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
     )
 
 
-def _positions_in_intervals(innovation_statistics: Consistency, run_result: Result) -> Watched:
+def _positions_in_intervals(innovation_statistics: FilterConsistency, run_result: Result) -> Watched:
     """Position of each statistic of the innovations in its interval, from -1 at the lower end to 1 at the upper end."""
     return {
-        f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)])
+        f.name: np.array([(2.0 * f.value - f.lower_limit - f.upper_limit) / (f.upper_limit - f.lower_limit)])
         for f in innovation_statistics.statistics
     }
 

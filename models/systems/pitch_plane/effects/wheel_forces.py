@@ -19,7 +19,7 @@ from models.systems.pitch_plane.sampling import check_end
 if TYPE_CHECKING:
     from models.core.finding import Finding
     from models.measured.axle_forces import AxleForces
-    from models.measured.signal import Signal
+    from models.measured.signal import MeasuredSignal
 
 EXCLUDES = ("road",)
 COST = "one force per wheel, read from a table; no tyre"
@@ -62,10 +62,10 @@ def _doubts_about_forces(
     weight. Raises InputError for impossible forces.
     """
     from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
-    from models.measured.signal import Signal
+    from models.measured.signal import MeasuredSignal
 
     front, rear = (
-        Signal(axle, force_parameters.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0)
+        MeasuredSignal(axle, force_parameters.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0)
         for axle in ("front", "rear")
     )
     scene = vehicle_assembly.scene
@@ -127,16 +127,16 @@ def _steady_accelerations(steady_acceleration: float, run_result: Result) -> Wat
 
 
 def _sample_findings(
-    force_signals: "tuple[Signal, ...]", force_samples: np.ndarray, sample_period: float
+    force_signals: "tuple[MeasuredSignal, ...]", force_samples: np.ndarray, sample_period: float
 ) -> "list[Finding]":
     """Findings on impossible samples of wheel forces: spikes, and values clipped at the sensor's range. Zeros of a
     lifted wheel do not count.
     """
     from models.measured.checks import clipped, spikes
-    from models.measured.checks.evidence import Evidence
-    from models.measured.columns import MemoryColumns
+    from models.measured.checks.evidence import CheckedRecording
+    from models.measured.columns import SamplesInMemory
     from models.measured.recording import Recording
 
-    felt = MemoryColumns(tuple(s.name for s in force_signals), np.where(force_samples == 0.0, np.nan, force_samples))
-    evidence = Evidence(Recording(force_signals, felt, sample_period), None)
+    felt = SamplesInMemory(tuple(s.name for s in force_signals), np.where(force_samples == 0.0, np.nan, force_samples))
+    evidence = CheckedRecording(Recording(force_signals, felt, sample_period), None)
     return [*spikes.check(evidence), *(finding for finding in clipped.check(evidence) if finding.unit == "%")]
