@@ -11,7 +11,7 @@ from models.tyre.tyre_table import stacked_tables
 
 PLANE, ICE = plane_of_truck(PAPER_TRUCK), table_of_surface("ice")
 KINDS = np.array([0, 0, 1, 1])
-ROAD = road([Stretch(0.0, 0, 1), Stretch(10.0, 2, 3), Stretch(12.0, 0, 0)], line=0.5, kind_count=2)
+ROAD = road([Stretch(0.0, 0, 1), Stretch(10.0, 2, 3), Stretch(12.0, 0, 0)], dividing_line=0.5, tyre_kind_count=2)
 FRONT, REAR = PAPER_TRUCK.front.x, PAPER_TRUCK.rear.x
 
 

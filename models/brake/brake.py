@@ -51,12 +51,12 @@ def of_wheels(*brakes: Brake) -> Brakes:
 
 
 @lean
-def torque(i, pressure, last_torque, brakes):
+def torque(wheel_index, pressure, last_torque, brakes):
     """Torque (N m) of brake i at a pressure (bar) that has changed monotonically since the torque was ``last_torque``
     (N m).
     """
-    rising_torque = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
-    falling_torque = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
+    rising_torque = brakes.rising[wheel_index] * max(0.0, pressure - brakes.push_out[wheel_index])
+    falling_torque = brakes.falling[wheel_index] * max(0.0, pressure - brakes.release[wheel_index])
     return max(rising_torque, min(falling_torque, last_torque))
 
 

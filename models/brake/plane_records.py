@@ -57,11 +57,13 @@ class PlaneMotion(NamedTuple):
     report: np.ndarray
 
 
-def motion_of(state: np.ndarray, wheel_turning: np.ndarray) -> PlaneMotion:
+def motion_of(vehicle_state: np.ndarray, wheel_turning: np.ndarray) -> PlaneMotion:
     """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates (2, n), and the wheels'
     rotational speeds (W,) in rad/s.
     """
-    return PlaneMotion(state, wheel_turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, wheel_turning.size)))
+    return PlaneMotion(
+        vehicle_state, wheel_turning, np.zeros(vehicle_state.shape[1]), np.zeros((REPORT_SIZE, wheel_turning.size))
+    )
 
 
 class Wheels(NamedTuple):

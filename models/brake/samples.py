@@ -43,27 +43,27 @@ class Row(NamedTuple):
         return PlaneMotion(self.state, self.turning, accelerations, self.report)
 
 
-def row(coordinates: int, wheels: int) -> Row:
+def row(coordinate_count: int, wheel_count: int) -> Row:
     """A ``Row`` of zeros for these numbers of coordinates and wheels."""
-    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORT_SIZE, wheels))
+    shapes = ((1,), (2, coordinate_count), *((wheel_count,),) * 3, (REPORT_SIZE, wheel_count))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     block = np.zeros(ends[-1])
     columns = np.split(block, ends[:-1])
     return Row(block, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
 
 
-def parts(rows: list[np.ndarray], like: Row) -> Row:
-    """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``like``: every field has an additional
-    first axis, over the rows.
+def parts(row_blocks: list[np.ndarray], layout_row: Row) -> Row:
+    """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``layout_row``: every field has an
+    additional first axis, over the rows.
     """
-    ends = np.cumsum([field.size for field in like[1:]])
-    block = np.concatenate(rows)
+    ends = np.cumsum([field.size for field in layout_row[1:]])
+    block = np.concatenate(row_blocks)
     columns = np.split(block, ends[:-1], axis=1)
     return Row(
         block,
         *(
             np.ascontiguousarray(column).reshape(-1, *field.shape)
-            for column, field in zip(columns, like[1:], strict=True)
+            for column, field in zip(columns, layout_row[1:], strict=True)
         ),
     )
 
@@ -126,27 +126,27 @@ structref.define_proxy(Reference, ReferenceType, Subject._fields)
 
 
 @njit(cache=True, error_model="numpy")
-def by_reference(commands, record, sample, braking, motion, vehicle_parts):
+def by_reference(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts):
     """``Reference`` to the fields of a ``Subject``."""
-    return Reference(commands, record, sample, braking, motion, vehicle_parts)
+    return Reference(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts)
 
 
 go: Callable[..., Any] = advance
 """Placeholder of the function that advances the vehicle by a sample; ``moved`` replaces it."""
 
 
-def some_samples(commands, record, sample, braking, motion, simulated_time, vehicle_parts):
+def some_samples(commands, record, sampling_period, braking, vehicle_motion, simulated_time, vehicle_parts):
     """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends; ``go``
     advances each sample. Returns the status of the last sample, and the time (s).
     """
     air, chambers, brakes, torques = braking
-    status, step = FINE, sample / (torques.shape[0] - 1)
+    status, step = FINE, sampling_period / (torques.shape[0] - 1)
     for _ in range(commands.samples[0]):
         if math.isnan(commands.pressures[0]):
-            by_valves(commands.valves, sample, air, chambers, brakes, torques)
+            by_valves(commands.valves, sampling_period, air, chambers, brakes, torques)
         else:
             by_pressures(commands.pressures, air, brakes, torques)
-        status, used = go(motion, torques, step, commands.steer, *vehicle_parts)
+        status, used = go(vehicle_motion, torques, step, commands.steer, *vehicle_parts)
         simulated_time += used
         if status not in (FINE, AT_REST):
             break
@@ -162,7 +162,7 @@ some: Callable[..., Any] = some_samples
 """Placeholder of the function that advances the vehicle by some samples; ``moved`` replaces it."""
 
 
-def samples(subject):
+def samples(braking_run):
     """Generator that advances the vehicle of a ``Subject`` or a ``Reference`` by ``some_samples``.
 
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
@@ -170,23 +170,23 @@ def samples(subject):
     """
     status, simulated_time = FINE, 0.0
     while True:
-        rates = subject.motion.state[1]
-        yield status, simulated_time, math.hypot(rates[0], rates[1]), subject.braking.air.supply[0]
+        rates = braking_run.motion.state[1]
+        yield status, simulated_time, math.hypot(rates[0], rates[1]), braking_run.braking.air.supply[0]
         status, simulated_time = some(
-            subject.commands,
-            subject.record,
-            subject.sample,
-            subject.braking,
-            subject.motion,
+            braking_run.commands,
+            braking_run.record,
+            braking_run.sample,
+            braking_run.braking,
+            braking_run.motion,
             simulated_time,
-            subject.others,
+            braking_run.others,
         )
 
 
-def _with_globals(function: Callable[..., Any], **replacements: Any) -> Callable[..., Any]:
+def _with_globals(plain_function: Callable[..., Any], **new_globals: Any) -> Callable[..., Any]:
     """A copy of the function with other globals and without closure cells. numba identifies functions by the contents
     of these cells, which differ between processes if they hold compiled functions."""
-    return FunctionType(function.__code__, globals() | replacements, function.__name__)
+    return FunctionType(plain_function.__code__, globals() | new_globals, plain_function.__name__)
 
 
 MoveSamples = Callable[..., Iterator[tuple[int, float, float, float]]]
@@ -199,8 +199,8 @@ def moved(step_function: Callable[..., Any]) -> MoveSamples:
     """Generator function ``samples`` that advances its vehicle by the given ``step_function``."""
     march = _with_globals(samples, some=_with_globals(some_samples, go=step_function))
 
-    def begun(commands, record, sample, braking, motion, *vehicle_parts):
-        return march(Subject(commands, record, sample, braking, motion, vehicle_parts))
+    def begun(commands, record, sampling_period, braking, vehicle_motion, *vehicle_parts):
+        return march(Subject(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts))
 
     return begun
 
@@ -211,16 +211,16 @@ class CompiledSamples:
 
     march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
 
-    def __call__(self, commands, record, sample, braking, motion, *vehicle_parts):
+    def __call__(self, commands, record, sampling_period, braking, vehicle_motion, *vehicle_parts):
         """Generator of ``samples``, from the fields of a ``Subject``."""
-        return self.march(by_reference(commands, record, sample, braking, motion, vehicle_parts))
+        return self.march(by_reference(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts))
 
 
-def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
+def compiled(step_function: Callable[..., Any], cache_name: str) -> CompiledSamples:
     """Compiled samples that advance the vehicle by a compiled step function."""
-    compiled_some = inlined(named_closure(_with_globals(some_samples, go=step_function), name))
+    compiled_some = inlined(named_closure(_with_globals(some_samples, go=step_function), cache_name))
     return CompiledSamples(
-        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), name))
+        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), cache_name))
     )
 
 

@@ -113,22 +113,22 @@ class Sprung:
         )
 
 
-def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
+def _hitch_reach(hitch_positions: np.ndarray, unit_centres: np.ndarray) -> np.ndarray:
     """Distances ``reach`` (U, U) of ``Plane``, m, from the hitches' positions (U - 1,) and the units' centres (U,),
     both ahead of the vehicle's centre.
     """
-    reach = np.zeros((centres.size, centres.size))
-    for k in range(1, centres.size):
-        reach[k:, k - 1] = hitches[k - 1] - (hitches[k - 2] if k > 1 else centres[0])
-        reach[k, k] = centres[k] - hitches[k - 1]
+    reach = np.zeros((unit_centres.size, unit_centres.size))
+    for k in range(1, unit_centres.size):
+        reach[k:, k - 1] = hitch_positions[k - 1] - (hitch_positions[k - 2] if k > 1 else unit_centres[0])
+        reach[k, k] = unit_centres[k] - hitch_positions[k - 1]
     return reach
 
 
-def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
+def _unit(vehicle: SpatialVehicle, towed_body: str | None) -> tuple[float, float, float]:
     """Mass (kg), yaw inertia (kg m^2) and position ahead (m) of a unit's centre of mass. The unit is a towed body with
     all that it carries, or the vehicle without its trailers.
     """
-    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
+    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed_body]
     masses, positions = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
     x, y, _ = masses @ positions / masses.sum()
     return float(masses.sum()), _yaw_inertia(bodies, float(x), float(y)), float(x)
@@ -142,23 +142,26 @@ def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
 
 
 def suspended_vehicle(
-    vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
+    vehicle: SpatialVehicle,
+    spin_inertia: float,
+    front_roll_share: float = 0.5,
+    trailer_spring_code: Literal["native", "compiled"] = "native",
 ) -> Sprung:
     """A two-axle vehicle with two wheels per axle, and its trailers, on its suspension; spin_inertia (kg m^2): for
     wheels whose tyres name no inertia.
 
-    front : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs determine
-    it; forces : who computes the trailers' springs, see ``Handling``. Raises InputError for a vehicle with other axles,
-    with trailers that do not form a row, or without steering.
+    front_roll_share : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs
+    determine it; trailer_spring_code : who computes the trailers' springs, see ``Handling``. Raises InputError for a
+    vehicle with other axles, with trailers that do not form a row, or without steering.
     """
     tyres = _tyres_by_axle(vehicle)
     _check_row(vehicle)
     inertias = _wheel_inertias(vehicle.name, tyres, spin_inertia)
     centred = _displaced_vehicle(replace(vehicle, tyres=tuple(tyres)), -centre_of_mass(vehicle))
-    handling = Handling(centred, Tyres(spin_inertia=0.0), forces=forces)
+    handling = Handling(centred, Tyres(spin_inertia=0.0), forces=trailer_spring_code)
     if handling.vehicle.coordinates()[: len(LEADING_COORDINATES)] != LEADING_COORDINATES:
         raise ValueError("the carrier and the sway are not the first bodies")
-    return Sprung(handling, _plane_truck(centred, inertias, front), tuple(inertias))
+    return Sprung(handling, _plane_truck(centred, inertias, front_roll_share), tuple(inertias))
 
 
 def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
@@ -184,7 +187,7 @@ def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
     return tyres
 
 
-def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
+def _wheel_inertias(vehicle_name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
     """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
     equal.
     """
@@ -192,7 +195,7 @@ def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[f
     for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
         if not inertia > 0.0 or inertia != inertias[number ^ 1]:
             allowed = "kg m^2 of its spin must be above 0, and the same for both wheels of its axle"
-            raise InputError(name, f"tyres[{tyre.name}]", inertia, allowed)
+            raise InputError(vehicle_name, f"tyres[{tyre.name}]", inertia, allowed)
     return inertias
 
 
@@ -226,11 +229,11 @@ POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_le
 """Names of the fields that hold positions of a vehicle's parts."""
 
 
-def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
-    """The vehicle with all positions shifted by ``distance`` (m) along and across, on the ground."""
+def _displaced_vehicle(vehicle: SpatialVehicle, displacement: np.ndarray) -> SpatialVehicle:
+    """The vehicle with all positions shifted by ``displacement`` (m) along and across, on the ground."""
 
-    def moved_position(element: Any, name: str) -> Vector:
-        x, y, z = np.add(getattr(element, name), (distance[0], distance[1], 0.0))
+    def moved_position(vehicle_element: Any, field_name: str) -> Vector:
+        x, y, z = np.add(getattr(vehicle_element, field_name), (displacement[0], displacement[1], 0.0))
         return float(x), float(y), float(z)
 
     parts: dict[str, Any] = {
@@ -242,10 +245,10 @@ def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> Spatial
         )
         for kind in ("bodies", "springs", "tyres", "bars", "side_forces")
     }
-    return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
+    return replace(vehicle, **parts, axles=tuple(float(x + displacement[0]) for x in vehicle.axles))
 
 
-def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
+def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front_roll_share: float) -> Truck:
     """``Truck`` in the plane of a vehicle centred at its mass centre, without trailers; spin_inertias (kg m^2): of its
     wheels.
     """
@@ -259,7 +262,11 @@ def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front:
             roll_share=share,
         )
         for left, right, inertia, share in zip(
-            vehicle.tyres[:4:2], vehicle.tyres[1:4:2], spin_inertias[:4:2], (front, 1.0 - front), strict=True
+            vehicle.tyres[:4:2],
+            vehicle.tyres[1:4:2],
+            spin_inertias[:4:2],
+            (front_roll_share, 1.0 - front_roll_share),
+            strict=True,
         )
     )
     return Truck(

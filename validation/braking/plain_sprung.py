@@ -67,7 +67,7 @@ def asymmetric_train() -> Sprung:
 @cache
 def train_with_compiled_springs() -> Sprung:
     """The asymmetric twin with its trailer, all springs computed by the compiled force function."""
-    return suspended_vehicle(train(), WHEEL_SPIN_INERTIA, forces="compiled")
+    return suspended_vehicle(train(), WHEEL_SPIN_INERTIA, trailer_spring_code="compiled")
 
 
 VEHICLES = {"car": car, "twin": asymmetric_twin, "bent": car_with_stops}

@@ -199,7 +199,10 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
             "relative difference of the period with samples of 5.5 ms from the period of the "
             f"continuous controller, {controller_name}",
             sampled_cycle(
-                _wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
+                _wheel_at_constant_speed(),
+                replace(FIVE_PHASE_CONTROLLERS[controller_name]),
+                cycle_count=5,
+                skipped_cycle_count=3,
             ).period
             / cycle.period
             - 1.0,

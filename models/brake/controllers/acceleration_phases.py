@@ -56,10 +56,10 @@ class AccelerationPhases(Common):
 class _Logic:
     """State machine of one wheel's acceleration phases."""
 
-    def __init__(self, settings: AccelerationPhases) -> None:
-        self._settings, self._phase, self._rose, self._count = settings, FIRST, False, 0
+    def __init__(self, thresholds: AccelerationPhases) -> None:
+        self._settings, self._phase, self._rose, self._count = thresholds, FIRST, False, 0
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         settings, phase = self._settings, self._phase
         falls = relative_acceleration < settings.falls
         if phase == FIRST and falls:

@@ -47,33 +47,33 @@ class FivePhase(Common):
         )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
-        self.set_logic(_Logic, pressures=True)
+        self.set_logic(_Logic, commands_pressures=True)
 
 
 FIRST_PHASE = 0
 
 
-def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
+def end_of_phase(phase: int, controller: FivePhase) -> tuple[float, float]:
     """Threshold of the wheel's acceleration that ends a phase: sign +1 if the acceleration must rise to it, -1 if it
     must fall, and level (m/s^2).
     """
     if phase in (1, 2):
-        return 1.0, settings.e1 if phase == 1 else settings.e2
-    return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
+        return 1.0, controller.e1 if phase == 1 else controller.e2
+    return -1.0, {3: controller.e3, 4: controller.e4}.get(phase, -controller.e5)
 
 
-def rate_of_phase(phase: int, settings: FivePhase) -> float:
+def rate_of_phase(phase: int, controller: FivePhase) -> float:
     """Rate of the brake pressure (bar/s) in a phase."""
-    return (settings.fast, -settings.falling, 0.0, settings.fast, 0.0, settings.slow)[phase]
+    return (controller.fast, -controller.falling, 0.0, controller.fast, 0.0, controller.slow)[phase]
 
 
 class _Logic:
     """State machine of one wheel's five phases."""
 
-    def __init__(self, settings: FivePhase) -> None:
-        self._settings, self._phase, self._pressure = settings, FIRST_PHASE, 0.0
+    def __init__(self, controller: FivePhase) -> None:
+        self._settings, self._phase, self._pressure = controller, FIRST_PHASE, 0.0
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         sign, level = end_of_phase(self._phase, self._settings)
         if sign * (relative_acceleration - level) >= 0.0:
             self._phase = self._phase % 5 + 1
@@ -82,7 +82,7 @@ class _Logic:
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
         raised = self._pressure + rate_of_phase(self._phase, self._settings) * self._settings.period
-        self._pressure = min(max(raised, 0.0), supply)
+        self._pressure = min(max(raised, 0.0), supply_pressure)
         return self._pressure
 
     def _continues_with_phase_5(self, slip: float, relative_acceleration: float) -> bool:

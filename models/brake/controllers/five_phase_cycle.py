@@ -102,91 +102,110 @@ class WheelAtSpeed:
 
 
 @njit(cache=True, error_model="numpy")
-def rim_acceleration(state, wheel_at_speed):
+def rim_acceleration(wheel_state, wheel_at_speed):
     """Acceleration (m/s^2) of the wheel's rim, radius times rotational acceleration."""
     radius, inertia = wheel_at_speed.radius, wheel_at_speed.inertia
-    slip = min(max(1.0 - radius * state.turning / wheel_at_speed.vehicle_speed, 0.0), 1.0)
+    slip = min(max(1.0 - radius * wheel_state.turning / wheel_at_speed.vehicle_speed, 0.0), 1.0)
     k, share = cell_and_share(wheel_at_speed.grip.slips, slip)
     low, high = node_force(k, wheel_at_speed.grip), node_force(k + 1, wheel_at_speed.grip)
-    return radius * (radius * (low + share * (high - low)) - state.torque) / inertia
+    return radius * (radius * (low + share * (high - low)) - wheel_state.torque) / inertia
 
 
 @njit(cache=True, error_model="numpy")
-def state_after(state, rate, time, wheel_at_speed):
+def state_after(wheel_state, pressure_rate, duration, wheel_at_speed):
     """Wheel state after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
     hysteresis loop.
     """
-    pressure = max(state.pressure + rate * time, 0.0)
-    torque_after = torque(0, pressure, state.torque, wheel_at_speed.brakes)
-    drive = StepInput(wheel_at_speed.vehicle_speed, wheel_at_speed.vehicle_speed, state.torque, torque_after, time)
-    rolled = wheel_step(drive, Wheel(wheel_at_speed.radius, wheel_at_speed.inertia, state.turning), wheel_at_speed.grip)
-    return WheelState(pressure, torque_after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
+    pressure = max(wheel_state.pressure + pressure_rate * duration, 0.0)
+    torque_after = torque(0, pressure, wheel_state.torque, wheel_at_speed.brakes)
+    drive = StepInput(
+        wheel_at_speed.vehicle_speed, wheel_at_speed.vehicle_speed, wheel_state.torque, torque_after, duration
+    )
+    rolled = wheel_step(
+        drive, Wheel(wheel_at_speed.radius, wheel_at_speed.inertia, wheel_state.turning), wheel_at_speed.grip
+    )
+    return WheelState(
+        pressure,
+        torque_after,
+        rolled.turning,
+        wheel_state.time + duration,
+        wheel_state.impulse + duration * rolled.force,
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def time_to_corner(state, rate, brakes):
+def time_to_corner(wheel_state, pressure_rate, brakes):
     """Time (s) until the pressure reaches the next corner of the brake's hysteresis loop, or zero pressure; else
     infinite.
     """
     first = math.inf
-    if rate > 0.0:
-        first = (brakes.push_out[0] + state.torque / brakes.rising[0] - state.pressure) / rate
+    if pressure_rate > 0.0:
+        first = (brakes.push_out[0] + wheel_state.torque / brakes.rising[0] - wheel_state.pressure) / pressure_rate
         return first if first > 1e-12 else math.inf
-    if rate < 0.0:
-        for p in (brakes.release[0] + state.torque / brakes.falling[0], brakes.release[0], 0.0):
-            time = (p - state.pressure) / rate
+    if pressure_rate < 0.0:
+        for p in (brakes.release[0] + wheel_state.torque / brakes.falling[0], brakes.release[0], 0.0):
+            time = (p - wheel_state.pressure) / pressure_rate
             if time > 1e-12:
                 first = min(first, time)
     return first
 
 
 @njit(cache=True, error_model="numpy")
-def phase_end(state, sign, end_level, other_level, wheel_at_speed):
-    """LEVEL_MET if the rim's acceleration has passed ``end_level`` in the direction ``sign``, OTHER_LEVEL_MET if it is
-    at most ``other_level`` (m/s^2), else -1.
+def phase_end(wheel_state, crossing_sign, end_acceleration, alternative_acceleration, wheel_at_speed):
+    """LEVEL_MET if the rim's acceleration has passed ``end_acceleration`` in the direction ``crossing_sign``,
+    OTHER_LEVEL_MET if it is at most ``alternative_acceleration`` (m/s^2), else -1.
     """
-    acceleration = rim_acceleration(state, wheel_at_speed)
+    acceleration = rim_acceleration(wheel_state, wheel_at_speed)
     return (
         LEVEL_MET
-        if sign * (acceleration - end_level) >= 0.0
+        if crossing_sign * (acceleration - end_acceleration) >= 0.0
         else OTHER_LEVEL_MET
-        if acceleration <= other_level
+        if acceleration <= alternative_acceleration
         else -1
     )
 
 
 @njit(cache=True, error_model="numpy")
-def integrate_phase(state, rate, sign, end_level, other_level, step, wheel_at_speed):
+def integrate_phase(
+    wheel_state, pressure_rate, crossing_sign, end_acceleration, alternative_acceleration, time_step, wheel_at_speed
+):
     """Wheel state at the end of a phase with a constant rate of pressure (bar/s), integrated in steps (s), and how the
     phase ended.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
-    began, end = state.time, phase_end(state, sign, end_level, other_level, wheel_at_speed)
+    began, end = (
+        wheel_state.time,
+        phase_end(wheel_state, crossing_sign, end_acceleration, alternative_acceleration, wheel_at_speed),
+    )
     while end < 0:
-        time = min(step, time_to_corner(state, rate, wheel_at_speed.brakes))
-        next_state = state_after(state, rate, time, wheel_at_speed)
-        end = phase_end(next_state, sign, end_level, other_level, wheel_at_speed)
+        time = min(time_step, time_to_corner(wheel_state, pressure_rate, wheel_at_speed.brakes))
+        next_state = state_after(wheel_state, pressure_rate, time, wheel_at_speed)
+        end = phase_end(next_state, crossing_sign, end_acceleration, alternative_acceleration, wheel_at_speed)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
                 if (
                     phase_end(
-                        state_after(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed
+                        state_after(wheel_state, pressure_rate, middle, wheel_at_speed),
+                        crossing_sign,
+                        end_acceleration,
+                        alternative_acceleration,
+                        wheel_at_speed,
                     )
                     >= 0
                 ):
                     high = middle
                 else:
                     low = middle
-            next_state = state_after(state, rate, high, wheel_at_speed)
-        state = next_state
-        if end < 0 and not (state.turning > 0.0 or rate < 0.0):
-            return state, WHEEL_LOCKS
-        if end < 0 and state.time - began > LONGEST_PHASE:
-            return state, NEVER_ENDS
-    return state, end
+            next_state = state_after(wheel_state, pressure_rate, high, wheel_at_speed)
+        wheel_state = next_state
+        if end < 0 and not (wheel_state.turning > 0.0 or pressure_rate < 0.0):
+            return wheel_state, WHEEL_LOCKS
+        if end < 0 and wheel_state.time - began > LONGEST_PHASE:
+            return wheel_state, NEVER_ENDS
+    return wheel_state, end
 
 
 @dataclass(frozen=True)
@@ -202,29 +221,29 @@ class Cycle:
 
 
 def limit_cycle(
-    wheel_at_speed: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most_cycles: int = 60
+    wheel_at_speed: WheelAtSpeed, controller: FivePhase, time_step: float = 2e-5, cycle_limit: int = 60
 ) -> Cycle:
     """Limit cycle of a wheel under the continuous five-phase controller, from a freely rolling wheel on, in steps of at
-    most ``step`` (s).
+    most ``time_step`` (s).
 
     The driver applies the brake fast, so the first release differs from later ones. If the wheel stops gaining speed in
     phase 2, phase 5 follows, as in the controller; a wheel that locks by this is released.
 
     Raises RunFailed if a phase does not end, a wheel locks while it is not released, or no cycle closes among
-    ``most_cycles``.
+    ``cycle_limit``.
     """
-    state, _ = _state_at_end(wheel_at_speed.rolling(), 0, controller, step, wheel_at_speed)
-    for _ in range(most_cycles):
+    state, _ = _state_at_end(wheel_at_speed.rolling(), 0, controller, time_step, wheel_at_speed)
+    for _ in range(cycle_limit):
         state = state._replace(time=0.0, impulse=0.0)
         path, number = [state], RELEASE_PHASE
         while number <= SLOW_PHASE:
-            state, end = _state_at_end(state, number, controller, step, wheel_at_speed)
+            state, end = _state_at_end(state, number, controller, time_step, wheel_at_speed)
             path.append(state)
             number = SLOW_PHASE if end == OTHER_LEVEL_MET else number + 1
         first = path[0]
         if abs(state.torque / first.torque - 1.0) + abs(state.turning / first.turning - 1.0) < CLOSED_CYCLE_TOLERANCE:
             return _cycle_from_switches(path, wheel_at_speed)
-    raise RunFailed("braking", f"{most_cycles} cycles of the five phases do not close")
+    raise RunFailed("braking", f"{cycle_limit} cycles of the five phases do not close")
 
 
 def _cycle_from_switches(switch_states: list[WheelState], wheel_at_speed: WheelAtSpeed) -> Cycle:
@@ -238,35 +257,39 @@ def _cycle_from_switches(switch_states: list[WheelState], wheel_at_speed: WheelA
 
 
 def _state_at_end(
-    state: WheelState, phase_number: int, controller: FivePhase, step: float, wheel_at_speed: WheelAtSpeed
+    wheel_state: WheelState, phase_number: int, controller: FivePhase, time_step: float, wheel_at_speed: WheelAtSpeed
 ) -> tuple[WheelState, int]:
     """Wheel state at the end of a phase, and whether it ended as LEVEL_MET or as OTHER_LEVEL_MET; raises RunFailed
     where the wheel locks or the phase does not end.
     """
     sign, level = end_of_phase(phase_number, controller)
     other_level = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
-    state, end = integrate_phase(
-        state, rate_of_phase(phase_number, controller), sign, level, other_level, step, wheel_at_speed.driven
+    wheel_state, end = integrate_phase(
+        wheel_state, rate_of_phase(phase_number, controller), sign, level, other_level, time_step, wheel_at_speed.driven
     )
     if end == NEVER_ENDS or (end == WHEEL_LOCKS and phase_number != 0):
         failure = (
             f"the wheel locks in phase {phase_number}" if end == WHEEL_LOCKS else f"phase {phase_number} does not end"
         )
-        raise RunFailed("braking", failure, state.time)
-    return state, end
+        raise RunFailed("braking", failure, wheel_state.time)
+    return wheel_state, end
 
 
 def sampled_cycle(
-    wheel_at_speed: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
+    wheel_at_speed: WheelAtSpeed,
+    controller: FivePhase,
+    cycle_count: int = 30,
+    substep_count: int = 4,
+    skipped_cycle_count: int = 5,
 ) -> Cycle:
-    """Mean over ``cycles`` cycles of the sampled five-phase controller, after the first ``skip`` ones; durations and
-    slips are left empty.
+    """Mean over ``cycle_count`` cycles of the sampled five-phase controller, after the first ``skipped_cycle_count``
+    ones; durations and slips are left empty.
 
     Raises RunFailed if it does not cycle.
     """
     state, driven, number, falling = wheel_at_speed.rolling(), wheel_at_speed.driven, 0, False
     starts: list[WheelState] = []
-    while len(starts) <= cycles + skip:
+    while len(starts) <= cycle_count + skipped_cycle_count:
         wheels = np.array([wheel_at_speed.radius * state.turning])
         sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, wheel_at_speed.speed)
         pressure = float(np.asarray(controller.sample(sample).pressures)[0])
@@ -274,10 +297,10 @@ def sampled_cycle(
             starts.append(state)
         falling, number = pressure < state.pressure, number + 1
         state = state._replace(pressure=pressure, torque=torque(0, pressure, state.torque, driven.brakes))
-        for _ in range(substeps):
-            state = state_after(state, 0.0, SAMPLE / substeps, driven)
-        if number * SAMPLE > (cycles + skip) * LONGEST_PHASE:
+        for _ in range(substep_count):
+            state = state_after(state, 0.0, SAMPLE / substep_count, driven)
+        if number * SAMPLE > (cycle_count + skipped_cycle_count) * LONGEST_PHASE:
             raise RunFailed("braking", "the sampled controller does not cycle", state.time)
-    first_start, last_start = starts[skip], starts[-1]
+    first_start, last_start = starts[skipped_cycle_count], starts[-1]
     time, impulse = last_start.time - first_start.time, last_start.impulse - first_start.impulse
-    return Cycle(time / cycles, (), impulse / time / wheel_at_speed.peak, ())
+    return Cycle(time / cycle_count, (), impulse / time / wheel_at_speed.peak, ())

@@ -34,10 +34,10 @@ class SlipBangBang(Common):
 class _BangBang:
     """Two-threshold logic of one wheel."""
 
-    def __init__(self, settings: SlipBangBang) -> None:
-        self._settings, self._valve = settings, APPLY
+    def __init__(self, slip_controller: SlipBangBang) -> None:
+        self._settings, self._valve = slip_controller, APPLY
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         if slip > self._settings.release:
             self._valve = RELEASE
         elif slip < self._settings.apply:
@@ -58,19 +58,19 @@ class SlipPI(Common):
 
     def __post_init__(self) -> None:
         self.check(target=SLIP_BOUNDS, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
-        self.set_logic(_Loop, pressures=True)
+        self.set_logic(_Loop, commands_pressures=True)
 
 
 class _Loop:
     """Proportional-integral loop of one wheel, whose gain grows with speed."""
 
-    def __init__(self, settings: SlipPI) -> None:
-        self._settings, self._sum = settings, 0.0
+    def __init__(self, slip_controller: SlipPI) -> None:
+        self._settings, self._sum = slip_controller, 0.0
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         settings = self._settings
         error = settings.target - (slip - settings.mix * relative_acceleration / 9.81)
-        gain = settings.gain * speed
+        gain = settings.gain * vehicle_speed
         total = self._sum + gain * error * settings.period / settings.reset
-        self._sum = min(max(total, 0.0), supply)
-        return min(max(self._sum + gain * error, 0.0), supply)
+        self._sum = min(max(total, 0.0), supply_pressure)
+        return min(max(self._sum + gain * error, 0.0), supply_pressure)

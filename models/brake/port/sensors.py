@@ -38,23 +38,25 @@ class Channels:
     ``models.core.noise``.
     """
 
-    def __init__(self, conversion: Conversion, channel_count: int, source: int) -> None:
-        self.conversion, self._count, self._source = conversion, channel_count, source
+    def __init__(self, conversion: Conversion, channel_count: int, noise_stream: int) -> None:
+        self.conversion, self._count, self._source = conversion, channel_count, noise_stream
         self._block, self._noise = -1, np.zeros((0, channel_count))
 
-    def __call__(self, sample_number: int, values: np.ndarray) -> np.ndarray:
+    def __call__(self, sample_number: int, true_values: np.ndarray) -> np.ndarray:
         """Values (count,) of one sample after gain, offset, noise and rounding of their sensors."""
         conversion = self.conversion
         if conversion.gain != 1.0 or conversion.offset != 0.0:
-            values = conversion.gain * values + conversion.offset
+            true_values = conversion.gain * true_values + conversion.offset
         if conversion.noise > 0.0:
-            values = values + conversion.noise * self._drawn(sample_number)
+            true_values = true_values + conversion.noise * self._drawn(sample_number)
         if conversion.bits is not None and conversion.range is not None:
             largest_code = 2.0**conversion.bits - 1.0
-            values = (
-                np.rint(np.clip(values / conversion.range, 0.0, 1.0) * largest_code) * conversion.range / largest_code
+            true_values = (
+                np.rint(np.clip(true_values / conversion.range, 0.0, 1.0) * largest_code)
+                * conversion.range
+                / largest_code
             )
-        return values
+        return true_values
 
     def _drawn(self, sample_number: int) -> np.ndarray:
         """Standard normal numbers (count,) for a sample's noise, taken from the block of numbers that contains them."""
@@ -91,9 +93,16 @@ class SensedController:
 
 
 def controller_behind_sensors(
-    controller: Controller, wheels: int, signals: Conversion, pressures: Conversion, **extras: Any
+    controller: Controller,
+    wheel_count: int,
+    speed_conversion: Conversion,
+    pressure_conversion: Conversion,
+    **extras: Any,
 ) -> SensedController:
     """A controller that receives the signals of W wheels through sensors."""
     return SensedController(
-        controller, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **extras
+        controller,
+        Channels(speed_conversion, wheel_count, BRAKE_SIGNALS),
+        Channels(pressure_conversion, wheel_count, BRAKE_PRESSURES),
+        **extras,
     )

@@ -115,7 +115,7 @@ def sprung_of(scene: BrakingScene) -> Any:
     from models.brake.sprung import suspended_vehicle
 
     return suspended_vehicle(
-        spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces
+        spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), trailer_spring_code=scene.run.forces
     )
 
 
