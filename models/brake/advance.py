@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from models.brake.plane_chain import ChainPoint, Direction, fill_velocity_rows
-from models.brake.plane_records import PlaneMotion, Report, report_of
-from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import Plane
-from models.brake.surfaces import is_uniform, surfaces_of, under_wheels
+from models.brake.plane_records import PlaneMotion, WheelReport, report_of
+from models.brake.plane_step import advance_one_step
+from models.brake.plane_vehicle import PlaneVehicle
+from models.brake.surfaces import fill_surfaces_under_wheels, is_uniform, surfaces_of_rows
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 
@@ -17,7 +17,7 @@ FINE, AT_REST, NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED = range(6)
 without load; a hinge of the train beyond its limit.
 """
 
-MOST_PARTS = 64
+STEP_PART_LIMIT = 64
 """Largest number of parts into which a step is cut where the vehicle is so slow that its side forces respond faster
 than the step.
 """
@@ -45,7 +45,7 @@ def end_status(vehicle_motion, plane_vehicle):
 
 
 @inlined
-def parts_of(vehicle_state, regularising_speed):
+def count_of_step_parts(vehicle_state, regularising_speed):
     """Number of equal parts into which to cut a step, so that the part's ``regularising_speed`` (m/s) is at most the
     vehicle's speed.
 
@@ -53,11 +53,11 @@ def parts_of(vehicle_state, regularising_speed):
     too far.
     """
     speed = math.hypot(vehicle_state[1, 0], vehicle_state[1, 1])
-    return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), MOST_PARTS))
+    return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), STEP_PART_LIMIT))
 
 
 @inlined
-def in_parts(part_count, vehicle_motion, brake_torques, time_step, steer_angles, vehicle, surfaces):
+def advance_in_parts(part_count, vehicle_motion, brake_torques, time_step, steer_angles, vehicle, surfaces):
     """Advance the vehicle by a step in ``part_count`` equal parts; returns the time (s) that passed, or -1 where wheel
     loads were not solved. The report holds means over the parts, but the sum of the times locked.
     """
@@ -75,7 +75,7 @@ def in_parts(part_count, vehicle_motion, brake_torques, time_step, steer_angles,
                 ends[side, i] = (
                     brake_torques[0, i] + (brake_torques[1, i] - brake_torques[0, i]) * (k + side) / part_count
                 )
-        used = step_on(vehicle_motion, ends, piece, steer_angles, regular, vehicle, surfaces)
+        used = advance_one_step(vehicle_motion, ends, piece, steer_angles, regular, vehicle, surfaces)
         if used < 0.0:
             return used
         time += used
@@ -101,18 +101,20 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle):
     steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
     wheels, time = vehicle_motion.turning.size, 0.0
-    surfaces = surfaces_of(array(doubles(4 * wheels), (4, wheels)))
+    surfaces = surfaces_of_rows(array(doubles(4 * wheels), (4, wheels)))
     for n in range(brake_torques.shape[0] - 1):
         if n == 0 or not is_uniform(vehicle.road):
-            under_wheels(vehicle_motion.state, time_step, vehicle, surfaces)
+            fill_surfaces_under_wheels(vehicle_motion.state, time_step, vehicle, surfaces)
         regular = vehicle.slope * 9.81 * time_step
-        parts = parts_of(vehicle_motion.state, regular)
+        parts = count_of_step_parts(vehicle_motion.state, regular)
         if parts <= 1:
-            used = step_on(
+            used = advance_one_step(
                 vehicle_motion, brake_torques[n : n + 2], time_step, steer_angles, regular, vehicle, surfaces
             )
         else:
-            used = in_parts(parts, vehicle_motion, brake_torques[n : n + 2], time_step, steer_angles, vehicle, surfaces)
+            used = advance_in_parts(
+                parts, vehicle_motion, brake_torques[n : n + 2], time_step, steer_angles, vehicle, surfaces
+            )
         if used < 0.0:
             return NOT_FOUND, time
         time += used
@@ -124,26 +126,26 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle):
     return FINE, time
 
 
-FATAL_ENDS = (NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED)
+FATAL_END_STATUSES = (NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED)
 """Ends of a sample after which a run cannot continue."""
 BODY_NAMES = ("vehicle", "trailer")
 HINGE_NAMES = ("the drawbar against the truck", "the trailer's body against the drawbar")
 
 
-def ending_sentence(status: int, plane_vehicle: Plane, vehicle_motion: PlaneMotion) -> str:
+def ending_sentence(status: int, plane_vehicle: PlaneVehicle, vehicle_motion: PlaneMotion) -> str:
     """Sentence on why a run ended, from the end status and the motion of its last step."""
     if status == FOLDED:
         return _folded_sentence(plane_vehicle, vehicle_motion.state[0, 2:])
     if status == NOT_FOUND:
         return "no loads were found"
-    loads = Report(*vehicle_motion.report).load
-    first = next(i for i in range(0, plane_vehicle.wheels, 4) if _side_or_axle_lifted(loads[i : i + 4]))
+    loads = WheelReport(*vehicle_motion.report).load
+    first = next(i for i in range(0, plane_vehicle.wheels, 4) if _is_side_or_axle_lifted(loads[i : i + 4]))
     return _tipping_sentence(
-        status, plane_vehicle, slice(first, first + 4), _acceleration(plane_vehicle, first, vehicle_motion), loads
+        status, plane_vehicle, slice(first, first + 4), _unit_acceleration(plane_vehicle, first, vehicle_motion), loads
     )
 
 
-def _folded_sentence(plane_vehicle: Plane, headings: np.ndarray) -> str:
+def _folded_sentence(plane_vehicle: PlaneVehicle, headings: np.ndarray) -> str:
     """Sentence on the hinge at which a train of vehicles jackknifes, with its angle."""
     angles = np.degrees(np.diff(headings))
     k = int(np.argmax(np.abs(angles)))
@@ -152,13 +154,15 @@ def _folded_sentence(plane_vehicle: Plane, headings: np.ndarray) -> str:
     return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {limit:g} deg"
 
 
-def _side_or_axle_lifted(unit_wheel_loads: np.ndarray) -> bool:
+def _is_side_or_axle_lifted(unit_wheel_loads: np.ndarray) -> bool:
     """Whether both wheels of a side, or both wheels of an axle, carry no load."""
     is_lifted = unit_wheel_loads <= 0.0
     return bool((is_lifted[0] or is_lifted[3]) and (is_lifted[1] or is_lifted[2]))
 
 
-def _acceleration(plane_vehicle: Plane, first_wheel: int, vehicle_motion: PlaneMotion) -> tuple[float, float]:
+def _unit_acceleration(
+    plane_vehicle: PlaneVehicle, first_wheel: int, vehicle_motion: PlaneMotion
+) -> tuple[float, float]:
     """Longitudinal and lateral acceleration (m/s^2) of the unit whose first wheel is ``first_wheel``, in the unit's
     axes.
     """
@@ -173,7 +177,7 @@ def _acceleration(plane_vehicle: Plane, first_wheel: int, vehicle_motion: PlaneM
 
 def _tipping_sentence(
     status: int,
-    plane_vehicle: Plane,
+    plane_vehicle: PlaneVehicle,
     unit_wheels: slice,
     unit_accelerations: tuple[float, float],
     wheel_loads: np.ndarray,

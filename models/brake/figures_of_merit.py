@@ -13,16 +13,16 @@ from models.core.errors import InputError
 
 METRES_PER_SECOND_OF_KMH = 1.0 / 3.6
 """Speed (m/s) of one kilometre per hour."""
-NOT_CHECKED = "not checked against the text of the regulation"
+NOT_CHECKED_REMARK = "not checked against the text of the regulation"
 """Remark on formulas that were not compared with the regulation."""
 ROLLING_DRIVEN, ROLLING_FREE = 0.015, 0.010
 """Rolling resistance coefficients that Annex 13 takes for an unbraked axle: driven, and not driven."""
-LEAST_UTILISATION = 0.75
+LEAST_ADHESION_UTILISATION = 0.75
 """Least adhesion utilisation of a category 1 anti-lock system."""
 
 
 @dataclass(frozen=True)
-class Axles:
+class AxleLoads:
     """Data of a two-axle vehicle: static loads (N) of front and rear axle, wheelbase (m), height of the centre of mass
     (m).
     """
@@ -55,7 +55,7 @@ def crossing_time(times: np.ndarray, speeds: np.ndarray, speed_limit: float) -> 
     return float(times[i - 1] + share * (times[i] - times[i - 1]))
 
 
-def distance_at(times: np.ndarray, distances: np.ndarray, speeds: np.ndarray, time: float) -> float:
+def distance_at_time(times: np.ndarray, distances: np.ndarray, speeds: np.ndarray, time: float) -> float:
     """Distance (m) covered at a time (s) between two samples, with constant deceleration between them."""
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
@@ -68,7 +68,7 @@ def distance_at(times: np.ndarray, distances: np.ndarray, speeds: np.ndarray, ti
     )
 
 
-def mean_fully_developed(times: np.ndarray, distances: np.ndarray, speeds: np.ndarray) -> float:
+def mean_fully_developed_deceleration(times: np.ndarray, distances: np.ndarray, speeds: np.ndarray) -> float:
     """Mean fully developed deceleration (m/s^2): (vb^2 - ve^2) / (2 (s_e - s_b)) between vb = 0.8 v0 and ve = 0.1 v0.
 
     Source: UN R13, Annex 4, d_m = (vb^2 - ve^2) / (25.92 (s_e - s_b)) in km/h and m; not checked against the text of
@@ -78,7 +78,7 @@ def mean_fully_developed(times: np.ndarray, distances: np.ndarray, speeds: np.nd
     begin, end = (crossing_time(times, speeds, speed) for speed in (high, low))
     if not np.isfinite(begin + end):
         return float("nan")
-    covered = distance_at(times, distances, speeds, end) - distance_at(times, distances, speeds, begin)
+    covered = distance_at_time(times, distances, speeds, end) - distance_at_time(times, distances, speeds, begin)
     return float((high**2 - low**2) / (2.0 * covered))
 
 
@@ -96,7 +96,7 @@ def braking_rate(higher_speed: float, lower_speed: float, duration: float) -> fl
     return (higher_speed - lower_speed) / (GRAVITY * duration)
 
 
-def mean_of_fastest(braking_times: np.ndarray) -> float:
+def mean_of_shortest_times(braking_times: np.ndarray) -> float:
     """Mean (s) of the shortest times: at most three, and only those within 1.05 times the shortest one.
 
     Source: UN R13, Annex 13, appendix 2; not checked against the text of the regulation.
@@ -107,7 +107,7 @@ def mean_of_fastest(braking_times: np.ndarray) -> float:
     return float(ordered[ordered <= 1.05 * ordered[0]][:3].mean())
 
 
-def adhesion_front(z: float, axle_loads: Axles) -> float:
+def adhesion_front(z: float, axle_loads: AxleLoads) -> float:
     """Adhesion coefficient k of the front axle, rounded to 0.001, from the braking rate z with only that axle braked
     and the rear axle driven.
 
@@ -116,7 +116,7 @@ def adhesion_front(z: float, axle_loads: Axles) -> float:
     return round((z * axle_loads.weight - ROLLING_DRIVEN * axle_loads.rear) / axle_loads.dynamic_loads(z)[0], 3)
 
 
-def adhesion_rear(z: float, axle_loads: Axles) -> float:
+def adhesion_rear(z: float, axle_loads: AxleLoads) -> float:
     """Adhesion coefficient k of the rear axle, rounded to 0.001, from the braking rate z with only that axle braked and
     the front axle not driven.
 
@@ -135,7 +135,7 @@ def adhesion_trailer(z: float, train_weight: float, axle_load: float) -> float:
     return round(z * train_weight / axle_load, 3)
 
 
-def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axle_loads: Axles) -> float:
+def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axle_loads: AxleLoads) -> float:
     """Adhesion coefficient of the vehicle, k_M = (k_f F_fdyn + k_r F_rdyn) / (P g), with the axle loads at the braking
     rate z of the anti-lock system.
 
@@ -145,15 +145,15 @@ def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axle_loads: Axl
     return (k_front * front + k_rear * rear) / axle_loads.weight
 
 
-def split_rate(k_low_side: float, k_high_side: float) -> float:
+def least_braking_rate_on_split(k_low_side: float, k_high_side: float) -> float:
     """Least braking rate z_MALS on split friction: the larger of 0.75 (4 k_L + k_H) / 5 and k_L.
 
     Source: UN R13, Annex 13, laden vehicles of category 1; not checked against the text of the regulation.
     """
-    return max(LEAST_UTILISATION * (4.0 * k_low_side + k_high_side) / 5.0, k_low_side)
+    return max(LEAST_ADHESION_UTILISATION * (4.0 * k_low_side + k_high_side) / 5.0, k_low_side)
 
 
-def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
+def yaw_rate_ratio(yaw_rate: float, speed: float, radius: float) -> float:
     """Ratio r R / v of the yaw rate to that of the circle at the present speed: 1 for a vehicle that stays on its
     circle.
 
@@ -163,7 +163,7 @@ def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
 
 
 @dataclass(frozen=True)
-class Locks:
+class WheelLockTimes:
     """How long each wheel (W,) was locked while the vehicle was above a speed: total time (s), its ratio to the time
     above the speed, and longest single lock (s).
     """
@@ -173,12 +173,12 @@ class Locks:
     longest_lock: np.ndarray
 
 
-def lock_table(
+def wheel_lock_times(
     sample_durations: np.ndarray,
     is_locked: np.ndarray,
     vehicle_speeds: np.ndarray,
     least_speed: float = 15.0 * METRES_PER_SECOND_OF_KMH,
-) -> Locks:
+) -> WheelLockTimes:
     """Locked times of the wheels while the vehicle is above a speed (m/s). lengths (n,): durations of the samples (s);
     locked (n, W): whether a wheel is locked; speeds (n,): of the vehicle (m/s).
 
@@ -191,4 +191,4 @@ def lock_table(
         longest = np.maximum(longest, locked_time)
     time = sample_durations @ counted
     time_above = float(sample_durations[vehicle_speeds > least_speed].sum())
-    return Locks(time, time / time_above if time_above else time, longest)
+    return WheelLockTimes(time, time / time_above if time_above else time, longest)

@@ -31,7 +31,7 @@ ALONG_X = Direction(1.0, 0.0)
 
 
 @lean
-def velocity(chain_point, coordinate_positions, coordinate_rates, arm_lengths):
+def chain_point_velocity(chain_point, coordinate_positions, coordinate_rates, arm_lengths):
     """Velocity (2) in m/s of a ``ChainPoint``, in the ground's axes."""
     k, x, y = chain_point
     vx, vy = coordinate_rates[0], coordinate_rates[1]
@@ -45,7 +45,7 @@ def velocity(chain_point, coordinate_positions, coordinate_rates, arm_lengths):
 
 
 @lean
-def chain_point_place(chain_point, coordinate_positions, arm_lengths):
+def chain_point_position(chain_point, coordinate_positions, arm_lengths):
     """Position (2) in m of a ``ChainPoint`` on the ground."""
     k, x, y = chain_point
     px, py = coordinate_positions[0], coordinate_positions[1]
@@ -59,7 +59,7 @@ def chain_point_place(chain_point, coordinate_positions, arm_lengths):
 
 
 @inlined
-def coordinates(plane_vehicle):
+def count_of_coordinates(plane_vehicle):
     """Number of coordinates of a ``Plane``; for a single unit a constant that compiled functions know beforehand."""
     return 2 + len(plane_vehicle.units)
 
@@ -106,12 +106,12 @@ def fill_velocity_rows(chain_point, direction, heading_vectors, coordinate_rates
 
 
 @inlined
-def inertia(heading_vectors, coordinate_rates, plane_vehicle, mass_matrix, right_side, row_along, row_across):
+def fill_mass_matrix(heading_vectors, coordinate_rates, plane_vehicle, mass_matrix, right_side, row_along, row_across):
     """Fill the mass matrix (n, n), and ``right_side`` (n,) with the centrifugal terms of the equations of motion.
 
     heading_vectors : see ``fill_headings``; row_along, row_across (n,) : room to work in.
     """
-    size = coordinates(plane_vehicle)
+    size = count_of_coordinates(plane_vehicle)
     mass_matrix[:], right_side[:] = 0.0, 0.0
     for k in range(len(plane_vehicle.units)):
         bias_along, bias_across = fill_velocity_rows(
@@ -143,11 +143,11 @@ def factorise_mass(mass_matrix, plane_vehicle):
 
 
 @inlined
-def solve(mass_matrix, plane_vehicle, right_side):
+def solve_accelerations(mass_matrix, plane_vehicle, right_side):
     """Turn the forces (n,) in ``right_side`` into accelerations of the free coordinates, in place, with the matrix from
     ``factorise_mass``.
     """
-    size, first = coordinates(plane_vehicle), count_of_prescribed(plane_vehicle)
+    size, first = count_of_coordinates(plane_vehicle), count_of_prescribed(plane_vehicle)
     if len(plane_vehicle.units) == 1:
         for a in range(size):
             right_side[a] /= mass_matrix[a, a]

@@ -12,16 +12,16 @@ import math
 from models.brake.plane_chain import (
     ChainPoint,
     Direction,
-    coordinates,
+    count_of_coordinates,
     count_of_prescribed,
     factorise_mass,
     fill_headings,
+    fill_mass_matrix,
     fill_velocity_rows,
-    inertia,
-    solve,
+    solve_accelerations,
 )
-from models.brake.plane_records import KNOWN, Frame, report_of, wheels_of
-from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
+from models.brake.plane_records import WHEEL_QUANTITY_COUNT, StepWorkspace, report_of, wheels_of
+from models.brake.wheel_step import BrakedWheel, TyreGrip, WheelStepInput, wheel_step
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 from models.tyre.tyre_table import TableCell, cell_and_share, lateral_adhesion
@@ -75,7 +75,7 @@ def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_s
             bias_along, bias_across = fill_velocity_rows(
                 ChainPoint(g, 0.0, 0.0), heading, units, rates, plane, row_along, row_across
             )
-            for a in range(coordinates(plane)):
+            for a in range(count_of_coordinates(plane)):
                 workspace.press[i, a] = plane.by_x[i] * row_along[a] + plane.by_y[i] * row_across[a]
             still[i] += plane.by_x[i] * bias_along + plane.by_y[i] * bias_across
         if at_step_start:
@@ -91,8 +91,8 @@ def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_s
             wheels.start[i] = u
         wheels.rate[i] = bias_along + v * rates[2 + k]
         set_slip_angle(i, u, v, regularising_speed, workspace.surfaces.lag, angles, wheels)
-    inertia(units, rates, plane, workspace.mass, workspace.right, workspace.out, workspace.out_before)
-    for a in range(count_of_prescribed(plane), coordinates(plane)):
+    fill_mass_matrix(units, rates, plane, workspace.mass, workspace.right, workspace.out, workspace.out_before)
+    for a in range(count_of_prescribed(plane), count_of_coordinates(plane)):
         for b in range(count_of_prescribed(plane)):
             workspace.right[a] -= workspace.mass[a, b] * vehicle_motion.accelerations[b]
     factorise_mass(workspace.mass, plane)
@@ -113,9 +113,9 @@ def set_slip_angle(wheel_index, speed_along, speed_across, regularising_speed, l
 
 
 @inlined
-def tyre(wheel_index, step_input, wheel, tyre_tables, wheels, surfaces, report):
-    """Fill the report of wheel i, whose slip angle and load are known, from a ``StepInput`` with the speeds along the
-    wheel.
+def fill_tyre_report(wheel_index, step_input, wheel, tyre_tables, wheels, surfaces, report):
+    """Fill the report of wheel i, whose slip angle and load are known, from a ``WheelStepInput`` with the speeds along
+    the wheel.
     """
     i = wheel_index
     v, speed_along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
@@ -124,11 +124,11 @@ def tyre(wheel_index, step_input, wheel, tyre_tables, wheels, surfaces, report):
     j, q = cell_and_share(tyre_tables.loads, load)
     cells = TableCell(int(wheels.cell[i]), wheels.share[i], j, q)
     w, force, slip, locked = wheel_step(
-        StepInput(
+        WheelStepInput(
             sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
         ),
-        Wheel(wheel.radius, wheel.inertia, sign * wheel.turning),
-        Grip(first, second, share, cells, load, tyre_tables.slips, tyre_tables.mu_x),
+        BrakedWheel(wheel.radius, wheel.inertia, sign * wheel.turning),
+        TyreGrip(first, second, share, cells, load, tyre_tables.slips, tyre_tables.mu_x),
     )
     k, cell_share = cell_and_share(tyre_tables.slips, abs(slip))
     side = lateral_adhesion(first, cells, k, cell_share, tyre_tables.g, tyre_tables.h)
@@ -201,7 +201,7 @@ def fill_response(vehicle_motion, torques_before, torques_after, time_step, vehi
         workspace.right,
     )
     load, still, rate, start = wheels.load, wheels.static_load, wheels.rate, wheels.start
-    size, free, lifts = coordinates(plane), count_of_prescribed(plane), False
+    size, free, lifts = count_of_coordinates(plane), count_of_prescribed(plane), False
     for a in range(size):
         response[a] = accelerations[a] if a < free else right[a]
     for i in range(load.size):
@@ -211,12 +211,12 @@ def fill_response(vehicle_motion, torques_before, torques_after, time_step, vehi
         redistribute_negative_loads(load, plane.place)
     for i in range(load.size):
         speed1 = start[i] + time_step * (rate[i] + scalar_product(rows_along[i], accelerations))
-        step_input = StepInput(start[i], speed1, torques_before[i], torques_after[i], time_step)
-        wheel = Wheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
-        tyre(i, step_input, wheel, tables, wheels, surfaces, report)
+        step_input = WheelStepInput(start[i], speed1, torques_before[i], torques_after[i], time_step)
+        wheel = BrakedWheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
+        fill_tyre_report(i, step_input, wheel, tables, wheels, surfaces, report)
         for a in range(free, size):
             response[a] += rows_along[i, a] * report.force_x[i] + rows_across[i, a] * report.force_y[i]
-    solve(workspace.mass, plane, response)
+    solve_accelerations(workspace.mass, plane, response)
 
 
 @inlined
@@ -225,8 +225,8 @@ def find_accelerations(vehicle_motion, torques_before, torques_after, time_step,
     ``vehicle_motion``.
 
     Anderson's method of depth one runs for at most ``round_limit`` rounds. If they have not converged and were
-    ``ANDERSON_ROUNDS`` or more, ``find_by_means`` takes over. Returns the estimated remaining error, from the last
-    change and the ratio of the last two.
+    ``ANDERSON_ROUNDS`` or more, ``find_mean_accelerations`` takes over. Returns the estimated remaining error, from the
+    last change and the ratio of the last two.
     """
     accelerations, response, out0, off0 = (
         vehicle_motion.accelerations,
@@ -234,7 +234,7 @@ def find_accelerations(vehicle_motion, torques_before, torques_after, time_step,
         workspace.out_before,
         workspace.off,
     )
-    size, remaining_error, last_change = coordinates(vehicle.plane), math.inf, 0.0
+    size, remaining_error, last_change = count_of_coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(round_limit):
         fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
         change, product, square = 0.0, 0.0, 0.0
@@ -255,12 +255,12 @@ def find_accelerations(vehicle_motion, torques_before, torques_after, time_step,
     return (
         remaining_error
         if remaining_error <= ACCELERATION_TOLERANCE or round_limit < ANDERSON_ROUNDS
-        else find_by_means(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
+        else find_mean_accelerations(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
     )
 
 
 @lean
-def find_by_means(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace):
+def find_mean_accelerations(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace):
     """Accelerations as from ``find_accelerations``, for steps in which wheel loads jump between two solutions, so that
     only a mean of both is in equilibrium; returns the remaining error.
 
@@ -273,7 +273,7 @@ def find_by_means(vehicle_motion, torques_before, torques_after, time_step, vehi
     (1953) 506-510; recalled, not checked.
     """
     accelerations, response, report = vehicle_motion.accelerations, workspace.out, vehicle_motion.report
-    size, share, last_change = coordinates(vehicle.plane), 0.5, math.inf
+    size, share, last_change = count_of_coordinates(vehicle.plane), 0.5, math.inf
     means = array(doubles(report.size), report.shape)
     start_accelerations = array(doubles(accelerations.size), accelerations.shape)
     fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
@@ -332,7 +332,7 @@ def time_of_rest(coordinate_rates, wheel_turning, accelerations, time_step, plan
 
 
 @lean
-def step_on(vehicle_motion, brake_torques, time_step, steer_angles, regularising_speed, vehicle, surfaces):
+def advance_one_step(vehicle_motion, brake_torques, time_step, steer_angles, regularising_speed, vehicle, surfaces):
     """Advance a ``PlaneMotion`` whose wheels are on ``Surfaces`` by one step (s).
 
     brake_torques (2, W) : of the brakes at the step's ends; steer_angles (W,) : angles of the wheels in their units
@@ -346,11 +346,11 @@ def step_on(vehicle_motion, brake_torques, time_step, steer_angles, regularising
         vehicle_motion.turning,
         vehicle_motion.accelerations,
     )
-    count, size = turning.size, coordinates(plane)
+    count, size = turning.size, count_of_coordinates(plane)
     state_rows = array(doubles(3 * count * size), (3, count, size))
     plane_rows, middle = array(doubles(6 * size), (6, size)), array(doubles(count), (count,))
-    frame = Frame(
-        wheels_of(array(doubles(KNOWN * count), (KNOWN, count))),
+    frame = StepWorkspace(
+        wheels_of(array(doubles(WHEEL_QUANTITY_COUNT * count), (WHEEL_QUANTITY_COUNT, count))),
         surfaces,
         report_of(vehicle_motion.report),
         state_rows[0],

@@ -14,7 +14,7 @@ GRAVITY = 9.81
 """Gravitational acceleration (m/s^2)."""
 
 
-class Axle(Strict):
+class TruckAxle(Strict):
     """An axle with two wheels, at one position along its unit."""
 
     x: float = quantity("m", "ahead of the unit's centre of mass", signed=True)
@@ -33,8 +33,8 @@ class Truck(Strict):
     mass: float = quantity("kg", "of the vehicle")
     yaw_inertia: float = quantity("kg m^2", "about the vertical through its centre of mass")
     height: float = quantity("m", "of the centre of mass", zero=True)
-    front: Axle
-    rear: Axle
+    front: TruckAxle
+    rear: TruckAxle
 
     @property
     def wheelbase(self) -> float:
@@ -42,7 +42,7 @@ class Truck(Strict):
         return self.front.x - self.rear.x
 
 
-class Plane(NamedTuple):
+class PlaneVehicle(NamedTuple):
     """Parameters of a vehicle in the plane, of U units and W wheels, for compiled functions.
 
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
@@ -74,12 +74,14 @@ class Plane(NamedTuple):
         return self.unit.size
 
 
-def plane_of_truck(truck: Truck, with_load_transfer: bool = True) -> Plane:
-    """``Plane`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay at their static values."""
+def plane_of_truck(truck: Truck, with_load_transfer: bool = True) -> PlaneVehicle:
+    """``PlaneVehicle`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay at their static
+    values.
+    """
     check_wheels(truck, truck.mass)
     zeros = np.zeros(4, dtype=np.int64)
-    wheel_positions, radius, spin, static, by_x, by_y = wheels(truck, with_load_transfer)
-    return Plane(
+    wheel_positions, radius, spin, static, by_x, by_y = wheel_fields_of_plane(truck, with_load_transfer)
+    return PlaneVehicle(
         np.array([truck.mass]),
         np.array([truck.yaw_inertia]),
         np.zeros((1, 1)),
@@ -105,9 +107,9 @@ def check_wheels(truck: Truck, mass: float) -> None:
         raise InputError("", "mass", mass, allowed)
 
 
-def wheels(truck: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
-    """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
-    body.
+def wheel_fields_of_plane(truck: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
+    """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``PlaneVehicle`` for the four wheels of a
+    two-axle body.
     """
     if not truck.front.x > 0.0 > truck.rear.x:
         raise InputError("", "rear.x", truck.rear.x, "must be below 0, and front.x above")
@@ -139,8 +141,8 @@ PAPER_TRUCK = Truck(
     mass=5640.0,
     yaw_inertia=25000.0,
     height=1.2,
-    front=Axle(x=1.42, track=1.9, radius=0.5, spin_inertia=13.35, roll_share=0.3),
-    rear=Axle(x=-2.19, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.7),
+    front=TruckAxle(x=1.42, track=1.9, radius=0.5, spin_inertia=13.35, roll_share=0.3),
+    rear=TruckAxle(x=-2.19, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.7),
 )
 """The paper's unladen truck of two axles as far as its printed data can be read.
 

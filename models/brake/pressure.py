@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.brake import torque
+from models.brake.brake import brake_torque
 from models.brake.controller import APPLY, RELEASE, SLOW
 from models.core.errors import InputError
 from models.machine.compiled import lean
 
-NO_VALUES = np.zeros(0)
+EMPTY_ARRAY = np.zeros(0)
 
 
-class Chambers(NamedTuple):
+class BrakeChambers(NamedTuple):
     """Dynamics of brake chambers (W,): time constants (s) of first-order filling and emptying; supply pressure (bar).
 
     volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
@@ -32,13 +32,13 @@ class Chambers(NamedTuple):
     fill_time: np.ndarray
     empty_time: np.ndarray
     supply: float
-    volumes: np.ndarray = NO_VALUES
+    volumes: np.ndarray = EMPTY_ARRAY
     reservoir: float = math.inf
     delay: float = 0.0
-    slow: np.ndarray = NO_VALUES
+    slow: np.ndarray = EMPTY_ARRAY
 
 
-class Air(NamedTuple):
+class AirState(NamedTuple):
     """State of the brakes' air system, which is updated in place.
 
     pressure, torque (W,) : bar, N m, with which the hysteresis remembers; supply (1,) : bar; commands (d + 2, W) :
@@ -46,20 +46,20 @@ class Air(NamedTuple):
     """
 
     pressure: np.ndarray
-    torque: np.ndarray
+    brake_torque: np.ndarray
     supply: np.ndarray
     commands: np.ndarray
 
 
-def resting_chambers(chambers: Chambers, sampling_period: float) -> Air:
-    """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sampling_period :
+def air_at_rest(chambers: BrakeChambers, sampling_period: float) -> AirState:
+    """``AirState`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sampling_period :
     duration (s).
     """
     wheels = chambers.fill_time.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
     rows = int(chambers.delay / sampling_period) + 2
-    return Air(
+    return AirState(
         np.zeros(wheels),
         np.zeros(wheels),
         np.array([float(chambers.supply)]),
@@ -82,7 +82,7 @@ def chamber_pressure(pressure, valve_state, duration, fill_time, empty_time, sup
 
 
 @lean
-def press(valve_states, duration, air_state, chambers, brakes):
+def advance_pressures(valve_states, duration, air_state, chambers, brakes):
     """Update chamber pressures and brake torques over a time (s) with constant valve states (W,). Every pressure
     changes monotonically, as the hysteresis of the torque requires.
     """
@@ -95,7 +95,7 @@ def press(valve_states, duration, air_state, chambers, brakes):
         )
         air_state.pressure[i], air_state.torque[i] = (
             pressure_after,
-            torque(i, pressure_after, air_state.torque[i], brakes),
+            brake_torque(i, pressure_after, air_state.torque[i], brakes),
         )
         if valve_states[i] >= APPLY and chambers.reservoir < math.inf:
             air_used += chambers.volumes[i] * (pressure_after - pressure_before)
@@ -104,7 +104,7 @@ def press(valve_states, duration, air_state, chambers, brakes):
 
 
 @lean
-def by_valves(valve_states, sampling_period, air_state, chambers, brakes, brake_torques):
+def advance_by_valves(valve_states, sampling_period, air_state, chambers, brakes, brake_torques):
     """Control by valve states (W,) over a sampling_period (s): fill ``brake_torques`` (n + 1, W) in N m at the ends of
     its n steps.
     """
@@ -118,19 +118,22 @@ def by_valves(valve_states, sampling_period, air_state, chambers, brakes, brake_
     for n in range(steps):
         wait = min(max(late - n * step, 0.0), step)
         if wait > 0.0:
-            press(air_state.commands[0], wait, air_state, chambers, brakes)
+            advance_pressures(air_state.commands[0], wait, air_state, chambers, brakes)
         if wait < step:
-            press(air_state.commands[1], step - wait, air_state, chambers, brakes)
+            advance_pressures(air_state.commands[1], step - wait, air_state, chambers, brakes)
         for i in range(valve_states.size):
             brake_torques[n + 1, i] = air_state.torque[i]
 
 
 @lean
-def by_pressures(pressures, air_state, brakes, brake_torques):
+def advance_by_pressures(pressures, air_state, brakes, brake_torques):
     """Control by pressures (W,) in bar, which are reached at once and kept for the sample; fill ``brake_torques`` (n +
     1, W) in N m.
     """
     for i in range(pressures.size):
-        air_state.pressure[i], air_state.torque[i] = pressures[i], torque(i, pressures[i], air_state.torque[i], brakes)
+        air_state.pressure[i], air_state.torque[i] = (
+            pressures[i],
+            brake_torque(i, pressures[i], air_state.torque[i], brakes),
+        )
         for n in range(brake_torques.shape[0]):
             brake_torques[n, i] = air_state.torque[i]

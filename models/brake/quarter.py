@@ -11,15 +11,15 @@ import numpy as np
 from pydantic import model_validator
 
 from models.brake.plane_records import motion_of, report_of
-from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import GRAVITY, Plane
-from models.brake.surfaces import OnRoad, Road, surfaces_of, under_wheels
+from models.brake.plane_step import advance_one_step
+from models.brake.plane_vehicle import GRAVITY, PlaneVehicle
+from models.brake.surfaces import RoadSurfaces, VehicleOnRoad, fill_surfaces_under_wheels, surfaces_of_rows
 from models.core.errors import InputError, RunFailed
 from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
 from models.tyre.tyre_table import Tables
 
-LEAST_SLIP_SPEED = 0.1
+LEAST_SLIP_ANGLE_SPEED = 0.1
 """Speed (m/s) that replaces lower speeds in slip angles; without lateral motion they are zero."""
 
 
@@ -35,7 +35,7 @@ class QuarterPath(NamedTuple):
     locked: np.ndarray
 
 
-class Quarter(Strict):
+class QuarterVehicle(Strict):
     """A quarter vehicle: one wheel, and the vehicle mass that it carries."""
 
     mass: float = quantity("kg", "of vehicle and wheel together")
@@ -43,17 +43,17 @@ class Quarter(Strict):
     spin_inertia: float = quantity("kg m^2", "of the wheel about its axle")
 
     @model_validator(mode="after")
-    def _holds_its_wheel(self) -> "Quarter":
+    def _holds_its_wheel(self) -> "QuarterVehicle":
         least_mass = self.spin_inertia / self.radius**2
         if self.mass <= least_mass:
             raise ValueError(f"mass must be above {least_mass:.4g} kg: J / r^2 of the wheel, which cannot be lighter")
         return self
 
     @property
-    def plane(self) -> Plane:
-        """The quarter vehicle as a ``Plane`` for compiled functions: one unit with one wheel at its centre."""
+    def plane(self) -> PlaneVehicle:
+        """The quarter vehicle as a ``PlaneVehicle`` for compiled functions: one unit with one wheel at its centre."""
         zeros, unit = np.zeros(1, dtype=np.int64), np.ones(1)
-        return Plane(
+        return PlaneVehicle(
             self.mass * unit,
             unit,
             np.zeros((1, 1)),
@@ -96,17 +96,19 @@ class QuarterStop:
 
 
 @njit(cache=True, error_model="numpy")
-def march(wheel_motion, brake_torques, time_step, vehicle, quarter_path):
+def march_quarter_vehicle(wheel_motion, brake_torques, time_step, vehicle, quarter_path):
     """Advance one wheel's ``wheel_motion`` in steps (s) under torques (n + 1, 1) in N m at the steps' ends; see
     ``advance``.
 
     path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
     loads were not found; a vehicle that rests is left to its torques like one that moves.
     """
-    rest_step, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
+    rest_step, straight, surfaces = -1, np.zeros(1), surfaces_of_rows(np.empty((4, 1)))
     for n in range(brake_torques.shape[0] - 1):
-        under_wheels(wheel_motion.state, time_step, vehicle, surfaces)
-        used = step_on(wheel_motion, brake_torques[n : n + 2], time_step, straight, LEAST_SLIP_SPEED, vehicle, surfaces)
+        fill_surfaces_under_wheels(wheel_motion.state, time_step, vehicle, surfaces)
+        used = advance_one_step(
+            wheel_motion, brake_torques[n : n + 2], time_step, straight, LEAST_SLIP_ANGLE_SPEED, vehicle, surfaces
+        )
         if used < 0.0:
             return -2
         if used < time_step and rest_step < 0:
@@ -120,10 +122,10 @@ def march(wheel_motion, brake_torques, time_step, vehicle, quarter_path):
     return rest_step
 
 
-def braked(
-    quarter_vehicle: Quarter,
+def stop_of_quarter_vehicle(
+    quarter_vehicle: QuarterVehicle,
     tyre_tables: Tables,
-    road: Road,
+    road: RoadSurfaces,
     brake_torques: np.ndarray,
     time_step: float,
     start_speed: float,
@@ -143,9 +145,9 @@ def braked(
     state[1, 0] = start_speed
     spin = np.array([start_speed / quarter_vehicle.radius if start_spin_speed is None else start_spin_speed])
     path.speed[0], path.turning[0] = start_speed, spin[0]
-    vehicle = OnRoad(quarter_vehicle.plane, np.zeros(1, dtype=np.int64), 0.0, tyre_tables, road)
+    vehicle = VehicleOnRoad(quarter_vehicle.plane, np.zeros(1, dtype=np.int64), 0.0, tyre_tables, road)
     ends = np.ascontiguousarray(brake_torques, dtype=float)[:, None]
-    rest_step = march(motion_of(state, spin), ends, time_step, vehicle, path)
+    rest_step = march_quarter_vehicle(motion_of(state, spin), ends, time_step, vehicle, path)
     if rest_step == -2 or not all(np.isfinite(path_array).all() for path_array in path):
         raise RunFailed("braking", "no loads were found", float(path.time.max()))
     return QuarterStop(path, rest_step)

@@ -6,8 +6,8 @@ With a = tan of the slip angle that the tyre has taken up, and u, v the speeds o
 
 which holds at rest too: there the tyre is a spring. It is solved exactly over half a step with the speeds before the
 step and over the other half with those after it; the step between takes the forces at a in its middle: order two, and
-stable at rest for steps below ``longest_step``. Below ``FADING_SPEED`` a damper across the wheel fades in, without
-which a vehicle would rock on these springs. Source: J. E. Bernard, C. L. Clover, Tire modeling for low-speed
+stable at rest for steps below ``longest_stable_step``. Below ``FADING_SPEED`` a damper across the wheel fades in,
+without which a vehicle would rock on these springs. Source: J. E. Bernard, C. L. Clover, Tire modeling for low-speed
 and high-speed calculations, SAE 950311 (recalled, not checked). Along the wheel slip does not lag.
 """
 
@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, NOT_FOUND, end_status
-from models.brake.plane_chain import ChainPoint, velocity
-from models.brake.plane_step import step_on
+from models.brake.plane_chain import ChainPoint, chain_point_velocity
+from models.brake.plane_step import advance_one_step
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.samples import compiled
-from models.brake.surfaces import surfaces_of, under_wheels
+from models.brake.samples import compiled_samples
+from models.brake.surfaces import fill_surfaces_under_wheels, surfaces_of_rows
 from models.brake.wheel_step import SLOWEST_SPEED, phi_1
 from models.machine.compiled import inlined, njit
 
@@ -31,7 +31,7 @@ DAMPING = 0.7
 """Damping ratio of the damper across a wheel at rest that bears its share of the mass."""
 
 
-class Lag(NamedTuple):
+class TyreLag(NamedTuple):
     """Tyres with lagging slip angles, each (W,): relaxation lengths (m), and tangents of the slip angles, which are
     updated in place.
     """
@@ -73,7 +73,7 @@ def advance_lagging_slip(
     slip_tangents[i] = tyre_lag.angle[i] + fade * fade * speed_across * 2.0 * DAMPING / rate
 
 
-def longest_step(cornering_coefficient: float, damping_rate: float, relaxation_length: float) -> float:
+def longest_stable_step(cornering_coefficient: float, damping_rate: float, relaxation_length: float) -> float:
     """Longest stable step (s) of a vehicle at rest on tyres with a relaxation length (m).
 
     cornering_coefficient : largest cornering coefficient (1/rad); damping_rate : rate (m/s^2) at which side forces of
@@ -89,14 +89,14 @@ def longest_step(cornering_coefficient: float, damping_rate: float, relaxation_l
 
 
 @njit(cache=True, error_model="numpy")
-def lag_on(vehicle_state, duration, steer_angles, vehicle, tyre_lag, slip_tangents):
+def advance_all_lagging_slips(vehicle_state, duration, steer_angles, vehicle, tyre_lag, slip_tangents):
     """Advance the lagging slip angles of all wheels by a time (s), and fill ``slip_tangents`` (W,): see
     ``advance_lagging_slip``.
     """
     plane = vehicle.plane
     for i in range(tyre_lag.angle.size):
         k = plane.unit[i]
-        vx, vy = velocity(
+        vx, vy = chain_point_velocity(
             ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), vehicle_state[0], vehicle_state[1], plane.reach
         )
         c, s = math.cos(vehicle_state[0, 2 + k] + steer_angles[i]), math.sin(vehicle_state[0, 2 + k] + steer_angles[i])
@@ -105,12 +105,14 @@ def lag_on(vehicle_state, duration, steer_angles, vehicle, tyre_lag, slip_tangen
 
 @njit(cache=True, error_model="numpy")
 def advance_lagging(vehicle_motion, brake_torques, time_step, steer_angles, vehicle, tyre_lag):
-    """Advance a vehicle on tyres with relaxation by n steps, as ``advance`` does; its ``Lag`` is updated in place."""
-    surfaces, time = surfaces_of(np.empty((4, vehicle_motion.turning.size))), 0.0
+    """Advance a vehicle on tyres with relaxation by n steps, as ``advance`` does; its ``TyreLag`` is updated in
+    place.
+    """
+    surfaces, time = surfaces_of_rows(np.empty((4, vehicle_motion.turning.size))), 0.0
     for n in range(brake_torques.shape[0] - 1):
-        under_wheels(vehicle_motion.state, time_step, vehicle, surfaces)
-        lag_on(vehicle_motion.state, 0.5 * time_step, steer_angles, vehicle, tyre_lag, surfaces.lag)
-        used = step_on(
+        fill_surfaces_under_wheels(vehicle_motion.state, time_step, vehicle, surfaces)
+        advance_all_lagging_slips(vehicle_motion.state, 0.5 * time_step, steer_angles, vehicle, tyre_lag, surfaces.lag)
+        used = advance_one_step(
             vehicle_motion,
             brake_torques[n : n + 2],
             time_step,
@@ -124,12 +126,12 @@ def advance_lagging(vehicle_motion, brake_torques, time_step, steer_angles, vehi
         time += used
         if used < time_step:
             return AT_REST, time
-        lag_on(vehicle_motion.state, 0.5 * time_step, steer_angles, vehicle, tyre_lag, surfaces.lag)
+        advance_all_lagging_slips(vehicle_motion.state, 0.5 * time_step, steer_angles, vehicle, tyre_lag, surfaces.lag)
         status = end_status(vehicle_motion, vehicle.plane)
         if status != FINE:
             return status, time
     return FINE, time
 
 
-by_lagging_steps = compiled(advance_lagging, "by_lagging_steps")
-"""Compiled samples of a vehicle on tyres with relaxation, as ``by_steps``: after its arguments comes a ``Lag``."""
+compiled_lagging_samples = compiled_samples(advance_lagging, "by_lagging_steps")
+"""Compiled samples of a vehicle on tyres with relaxation, as ``by_steps``: after its arguments comes a ``TyreLag``."""

@@ -24,7 +24,7 @@ class ContactLag(NamedTuple):
 
 
 @lean
-def relax(wheel_contacts, half_step, cornering_coefficient, contact_lag, surfaces):
+def advance_contact_lag(wheel_contacts, half_step, cornering_coefficient, contact_lag, surfaces):
     """Advance a ``ContactLag`` to half a step (s) after the motion in ``Contacts``; put its slip angles into the
     ``Surfaces``.
     """

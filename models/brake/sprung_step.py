@@ -6,7 +6,7 @@ step, to which half a step by the accelerations leads; the engine then marches t
 method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
 
 Springs and loads are as they are, tyres' forces as held. The table of numbers is that of ``models.multibody.forces``,
-then what the wheels hold, see ``WheelForces``. What the road has beside the moment that speeds up a
+then what the wheels hold, see ``SprungWheelForces``. What the road has beside the moment that speeds up a
 wheel's turning is on the chassis, or on the towed body that carries the wheel: brakes hold on to it, and locked wheels
 do.
 """
@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, FOLDED
-from models.brake.plane_records import TURNING_ROW, Wheels, report_of
-from models.brake.plane_step import set_slip_angle, time_of_rest, tyre
-from models.brake.surfaces import Surfaces, under_wheels
-from models.brake.wheel_step import StepInput, Wheel
+from models.brake.plane_records import TURNING_ROW, WheelStates, report_of
+from models.brake.plane_step import fill_tyre_report, set_slip_angle, time_of_rest
+from models.brake.surfaces import WheelSurfaces, fill_surfaces_under_wheels
+from models.brake.wheel_step import BrakedWheel, WheelStepInput
 from models.machine.compiled import inlined, lean, named_closure, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
@@ -55,7 +55,7 @@ VALUES_PER_WHEEL = 4
 """Number of values that stay constant over a step for each wheel."""
 
 
-class WheelForces(NamedTuple):
+class SprungWheelForces(NamedTuple):
     """Wheel quantities that are constant over a step, each (W,): steer angle (rad), mean forces on the tyre along and
     across it (N), and the mean moment that accelerates the wheel's rotation (N m).
     """
@@ -66,7 +66,7 @@ class WheelForces(NamedTuple):
     moment: np.ndarray
 
 
-class Contacts(NamedTuple):
+class WheelContacts(NamedTuple):
     """Motion and loads of the wheels, each (W,): speeds of their centres along them and of their contacts across them
     (m/s), loads (N).
     """
@@ -76,29 +76,31 @@ class Contacts(NamedTuple):
     load: np.ndarray
 
 
-class AtWheels(NamedTuple):
+class WheelData(NamedTuple):
     """Data at the wheels: quantities that are constant over a step, the state of each wheel, and the surfaces under
     them.
 
     The wheels' rates are the changes of the speeds along them, kept from step to step.
     """
 
-    wheel_forces: WheelForces
-    wheels: Wheels
-    surfaces: Surfaces
+    wheel_forces: SprungWheelForces
+    wheels: WheelStates
+    surfaces: WheelSurfaces
 
 
 @lean
 def wheel_forces_of(force_table):
-    """``WheelForces`` of views of the last numbers in a table for compiled force functions."""
+    """``SprungWheelForces`` of views of the last numbers in a table for compiled force functions."""
     wheels = int(force_table[TYRES])
     rows = array(beyond(start(force_table), int(force_table[COUNT])), (VALUES_PER_WHEEL, wheels))
-    return WheelForces(rows[0], rows[1], rows[2], rows[3])
+    return SprungWheelForces(rows[0], rows[1], rows[2], rows[3])
 
 
 @lean
 def forces_and_contacts(force_table, q, v, force_sum, wheel_contacts):
-    """Add all forces on the vehicle to ``force_sum`` (n,), with constant wheel forces, and fill the ``Contacts``."""
+    """Add all forces on the vehicle to ``force_sum`` (n,), with constant wheel forces, and fill the
+    ``WheelContacts``.
+    """
     wheel = WheelContact(
         array(doubles(10), (10,)),
         array(doubles(4), (4,)),
@@ -122,11 +124,11 @@ def forces_and_contacts(force_table, q, v, force_sum, wheel_contacts):
 
 
 @lean
-def forces(force_table, q, v, force_sum):
+def add_vehicle_forces(force_table, q, v, force_sum):
     """Add all forces on the vehicle to ``force_sum`` (n,), with constant wheel forces."""
     w = int(force_table[TYRES])
     motion = array(doubles(3 * w), (3, w))
-    forces_and_contacts(force_table, q, v, force_sum, Contacts(motion[0], motion[1], motion[2]))
+    forces_and_contacts(force_table, q, v, force_sum, WheelContacts(motion[0], motion[1], motion[2]))
 
 
 @lean
@@ -136,7 +138,7 @@ def forces_from_pointers(force_table, time, q, v, force_sum):
     """
     head = array(force_table, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
-    forces(
+    add_vehicle_forces(
         array(force_table, (int(head[COUNT]) + VALUES_PER_WHEEL * w,)),
         array(q, (n,)),
         array(v, (n,)),
@@ -158,8 +160,8 @@ def set_forces_from_block(memory_block, t, coordinate_count):
 
 @lean
 def set_slip_angles(wheel_contacts, regularising_speed, lagging_slips, table_angles, wheels):
-    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regularising_speed (m/s) : see
-    ``plane_step``; lag (W,) of ``Surfaces``; angles of the tyres' tables.
+    """Set slip angles and loads of the ``WheelStates`` from their ``WheelContacts``; regularising_speed (m/s) : see
+    ``plane_step``; lag (W,) of ``WheelSurfaces``; angles of the tyres' tables.
     """
     for i in range(wheel_contacts.load.size):
         set_slip_angle(
@@ -179,7 +181,7 @@ def store_mean_forces(at_wheels, torques_before, torques_after, time_step, vehic
     """Compute the tyres' mean forces over a step (s) between brake torques (W,) in N m, store them as the wheels'
     constant forces, and fill the report.
 
-    at_wheels : ``AtWheels`` with speeds at the start and their rates, and what ``set_slip_angles`` takes.
+    at_wheels : ``WheelData`` with speeds at the start and their rates, and what ``set_slip_angles`` takes.
     """
     wheel_forces, wheels, plane, report = (
         at_wheels.wheel_forces,
@@ -188,24 +190,24 @@ def store_mean_forces(at_wheels, torques_before, torques_after, time_step, vehic
         report_of(vehicle_motion.report),
     )
     for i in range(torques_before.size):
-        speed, wheel = wheels.start[i], Wheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
-        step_input = StepInput(
+        speed, wheel = wheels.start[i], BrakedWheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
+        step_input = WheelStepInput(
             speed, speed + time_step * wheels.rate[i], torques_before[i], torques_after[i], time_step
         )
-        tyre(i, step_input, wheel, vehicle.tables, wheels, at_wheels.surfaces, report)
+        fill_tyre_report(i, step_input, wheel, vehicle.tables, wheels, at_wheels.surfaces, report)
         wheel_forces.force_x[i], wheel_forces.force_y[i] = report.force_x[i], report.force_y[i]
         wheel_forces.moment[i] = wheel.inertia * (report.turning[i] - wheel.turning) / time_step
 
 
 OVER, GAVE_UP = 6, 7
 """Further ends of a sample: the vehicle turns over; the engine gives up."""
-UPRIGHT = 0.5
+LARGEST_LEAN = 0.5
 """Roll or pitch angle (rad) beyond which the vehicle turns over."""
-PLANE = 3
+PLANE_COORDINATE_COUNT = 3
 """Number of the first coordinates: x, y and heading of the vehicle."""
 
 
-class Units(NamedTuple):
+class TrainUnits(NamedTuple):
     """The vehicle and its trailers as units in the plane.
 
     turns (U - 1,) : numbers of the yaw coordinates of each trailer relative to the unit before it; lean_coordinates
@@ -219,14 +221,16 @@ class Units(NamedTuple):
 
 
 @lean
-def to_units(coordinate_values, hinge_columns, unit_values):
-    """Fill values (2 + U,) for the ``Units`` from values for all coordinates (n,): positions, rates or
+def fill_unit_values(coordinate_values, hinge_columns, unit_values):
+    """Fill values (2 + U,) for the ``TrainUnits`` from values for all coordinates (n,): positions, rates or
     accelerations.
     """
-    for a in range(PLANE):
+    for a in range(PLANE_COORDINATE_COUNT):
         unit_values[a] = coordinate_values[a]
     for k in range(hinge_columns.size):
-        unit_values[PLANE + k] = unit_values[PLANE + k - 1] + coordinate_values[hinge_columns[k]]
+        unit_values[PLANE_COORDINATE_COUNT + k] = (
+            unit_values[PLANE_COORDINATE_COUNT + k - 1] + coordinate_values[hinge_columns[k]]
+        )
 
 
 @inlined
@@ -237,29 +241,30 @@ def status_at_end(q, train_units, jackknife_angle):
         if not abs(q[train_units.turns[k]]) <= jackknife_angle:
             status = FOLDED
     for k in range(train_units.lean_coordinates.size):
-        if not abs(q[train_units.lean_coordinates[k]]) <= UPRIGHT:
+        if not abs(q[train_units.lean_coordinates[k]]) <= LARGEST_LEAN:
             status = OVER
     return status
 
 
-class OnEngine(NamedTuple):
+class SprungStepData(NamedTuple):
     """Data that a step of a vehicle on its suspension needs in addition to the data of a plane step.
 
-    numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
+    numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``add_vehicle_forces`` (n,)
+    were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see
-    ``EngineSprungVehicle``; engine : its model; units : ``Units``; lag : of ``models.brake.sprung_relaxation``, empty
-    where tyres answer at once.
+    ``EngineSprungVehicle``; engine : its model; units : ``TrainUnits``; lag : of ``models.brake.sprung_relaxation``,
+    empty where tyres answer at once.
     """
 
     numbers: np.ndarray
-    known: AtWheels
-    contacts: Contacts
-    forces: np.ndarray
+    known: WheelData
+    contacts: WheelContacts
+    add_vehicle_forces: np.ndarray
     middle: np.ndarray
     rates: np.ndarray
     liveliness: float
     engine: Any
-    units: Units
+    units: TrainUnits
     lag: Any = ()
 
 
@@ -306,9 +311,9 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle, eng
     known.wheel_forces.steer[:] = steer_angles
     for n in range(brake_torques.shape[0] - 1):
         torques_before, torques_after = brake_torques[n], brake_torques[n + 1]
-        to_units(q, turns, plane[0])
-        to_units(v, turns, plane[1])
-        under_wheels(plane, time_step, vehicle, known.surfaces)
+        fill_unit_values(q, turns, plane[0])
+        fill_unit_values(v, turns, plane[1])
+        fill_surfaces_under_wheels(plane, time_step, vehicle, known.surfaces)
         engine_run.forces[:] = 0.0
         forces_and_contacts(engine_run.numbers, q, v, engine_run.forces, contacts)
         wheels.start[:] = contacts.along
@@ -316,11 +321,11 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle, eng
         set_slip_angles(contacts, regular, known.surfaces.lag, angles, wheels)
         store_mean_forces(known, torques_before, 0.5 * (torques_before + torques_after), half, vehicle_motion, vehicle)
         accelerate(engine_run.engine, q, v, rates)
-        to_units(rates, turns, accelerations)
+        fill_unit_values(rates, turns, accelerations)
         rest_time = time_of_rest(plane[1], turning, accelerations, time_step, vehicle.plane)
         if rest_time >= 0.0:
             q += rest_time * v + 0.5 * rest_time**2 * rates
-            v[:PLANE], turning[:] = 0.0, 0.0
+            v[:PLANE_COORDINATE_COUNT], turning[:] = 0.0, 0.0
             for k in range(turns.size):
                 v[turns[k]] = 0.0
             if rest_time < time_step:

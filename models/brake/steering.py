@@ -10,7 +10,7 @@ REACHED_SHARE, HALF_SHARE = 0.9, 0.5
 """Share of the steady yaw rate at which the response time ends, and share of the final steer angle at which it
 begins.
 """
-STEADY_RANGE = 0.05
+STEADY_YAW_RATE_RANGE = 0.05
 """Largest ratio of a yaw rate's range to its mean at which it counts as steady."""
 
 
@@ -60,7 +60,7 @@ def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half_angle_time: floa
     """
     end = yaw_rates[times >= times[-1] - 1.0]
     steady = float(end.mean())
-    if np.ptp(end) > STEADY_RANGE * abs(steady) or steady == 0.0:
+    if np.ptp(end) > STEADY_YAW_RATE_RANGE * abs(steady) or steady == 0.0:
         return None
     share = yaw_rates / steady
     return YawResponse(

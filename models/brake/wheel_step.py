@@ -23,10 +23,10 @@ from models.tyre.tyre_table import TableCell, cell_and_share, longitudinal_adhes
 
 SLOWEST_SPEED = 1e-9
 """Speed (m/s) that replaces lower speeds of a wheel's centre: slip has no meaning at rest."""
-MOST_PIECES = 100_000
+PIECE_LIMIT = 100_000
 
 
-class Wheel(NamedTuple):
+class BrakedWheel(NamedTuple):
     """A rotating wheel: radius (m), inertia about its axle (kg m^2), and rotational speed at the start of a step
     (rad/s), negative if against the direction of the wheel's centre.
     """
@@ -36,7 +36,7 @@ class Wheel(NamedTuple):
     turning: float
 
 
-class Grip(NamedTuple):
+class TyreGrip(NamedTuple):
     """Longitudinal tyre force as a function of slip, at a constant slip angle and load.
 
     first, second : its two tables; share : of the second; cells : of the slip angle and the load in both; load : N;
@@ -52,7 +52,7 @@ class Grip(NamedTuple):
     mu_x: np.ndarray
 
 
-class StepInput(NamedTuple):
+class WheelStepInput(NamedTuple):
     """Input of a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, not negative),
     both at the step's two ends and linear in time between.
     """
@@ -64,7 +64,7 @@ class StepInput(NamedTuple):
     step: float
 
 
-class Rolled(NamedTuple):
+class WheelStepResult(NamedTuple):
     """A wheel after a step: rotational speed at the end (rad/s), mean force (N, positive if it brakes the vehicle),
     mean slip, for which slips below -1 count as -1, and the time (s) for which the wheel was locked.
     """
@@ -105,7 +105,7 @@ def slip_at_table_node(node_index, table_slips):
 
 @lean
 def node_force(node_index, tyre_grip):
-    """Force (N) of a ``Grip`` at slip node k; for a negative k, minus the force at node -k."""
+    """Force (N) of a ``TyreGrip`` at slip node k; for a negative k, minus the force at node -k."""
     mu = longitudinal_adhesion(tyre_grip.first, tyre_grip.cells, abs(node_index), tyre_grip.mu_x)
     if tyre_grip.share > 0.0:
         mu += tyre_grip.share * (
@@ -115,7 +115,7 @@ def node_force(node_index, tyre_grip):
 
 
 @lean
-def roll(slip, time_limit, slip_sensitivity, relative_speed_rate, brake_force, tyre_grip):
+def advance_at_rolling_slip(slip, time_limit, slip_sensitivity, relative_speed_rate, brake_force, tyre_grip):
     """Advance a wheel with a slip from -1 to 1 for at most ``time_limit`` seconds, or until the slip leaves this range.
 
     slip_sensitivity : r^2 / (J u) in 1/(N s); relative_speed_rate : u' / u in 1/s; brake_force : T / r in N. Returns
@@ -127,7 +127,7 @@ def roll(slip, time_limit, slip_sensitivity, relative_speed_rate, brake_force, t
     if slip < 0.0:
         cell = -cell - 1
     low, high = node_force(cell, tyre_grip), node_force(cell + 1, tyre_grip)
-    for _ in range(MOST_PIECES):
+    for _ in range(PIECE_LIMIT):
         bottom, top = slip_at_table_node(cell, slips), slip_at_table_node(cell + 1, slips)
         slope = (high - low) / (top - bottom)
         rate = slip_sensitivity * (brake_force - high - slope * (slip - top)) + (1.0 - slip) * relative_speed_rate
@@ -172,7 +172,9 @@ def _time_of_distance(decay_rate, rate, distance):
 
 @lean
 def wheel_step(step_input, rotating_wheel, tyre_grip):
-    """Advance a ``Wheel`` over a ``StepInput``, whose speeds are 0 or more, on a ``Grip``; returns a ``Rolled``."""
+    """Advance a ``BrakedWheel`` over a ``WheelStepInput``, whose speeds are 0 or more, on a ``TyreGrip``; returns a
+    ``WheelStepResult``.
+    """
     torque0, torque1, step = step_input.torque0, step_input.torque1, step_input.step
     radius, inertia, w0 = rotating_wheel.radius, rotating_wheel.inertia, rotating_wheel.turning
     u0, u1 = max(step_input.speed0, SLOWEST_SPEED), max(step_input.speed1, 0.0)
@@ -184,7 +186,7 @@ def wheel_step(step_input, rotating_wheel, tyre_grip):
     if slip > 1.0:  # it turns backwards: road and brake both stop that
         stops = sliding * radius + 0.5 * (torque0 + torque1)
         if stops * step <= -inertia * w0:
-            return Rolled(w0 + stops * step / inertia, sliding, slip, 0.0)
+            return WheelStepResult(w0 + stops * step / inertia, sliding, slip, 0.0)
         rest_time = -inertia * w0 / stops
         impulse, area, slip = sliding * rest_time, rest_time, 1.0
     freed = False
@@ -209,10 +211,10 @@ def wheel_step(step_input, rotating_wheel, tyre_grip):
             area -= used
             if rest_time >= step:
                 turning_end = start - radius * (sliding + end_force) * used / inertia
-                return Rolled(turning_end, impulse / step, area / step, locked)
+                return WheelStepResult(turning_end, impulse / step, area / step, locked)
             slip, freed = -1.0, False
             continue
-        used, slip, slip_integral = roll(min(slip, 1.0), left, kappa, fade, end_force, tyre_grip)
+        used, slip, slip_integral = advance_at_rolling_slip(min(slip, 1.0), left, kappa, fade, end_force, tyre_grip)
         if used == 0.0:  # by rounding alone: neither what lies beyond nor this takes it
             used = left
         rest_time += used
@@ -221,5 +223,5 @@ def wheel_step(step_input, rotating_wheel, tyre_grip):
         area += slip_integral
         freed = False
         if not slip <= 1.0:
-            return Rolled(math.nan, math.nan, math.nan, math.nan)
-    return Rolled(u1 * (1.0 - slip) / radius, impulse / step, area / step, locked)
+            return WheelStepResult(math.nan, math.nan, math.nan, math.nan)
+    return WheelStepResult(u1 * (1.0 - slip) / radius, impulse / step, area / step, locked)

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import FINE, advance
-from models.brake.plane_records import PlaneMotion, Report
-from models.brake.plane_vehicle import Plane
-from models.brake.samples import moved
-from models.brake.surfaces import OnRoad
+from models.brake.plane_records import PlaneMotion, WheelReport
+from models.brake.plane_vehicle import PlaneVehicle
+from models.brake.samples import samples_with_step
+from models.brake.surfaces import VehicleOnRoad
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond
@@ -77,7 +77,7 @@ def set_held(block, t, n):
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
 
 
-def bodies(plane: Plane) -> SpatialVehicle:
+def bodies(plane: PlaneVehicle) -> SpatialVehicle:
     """The units of a plane vehicle (tractor, trailers) as bodies of an engine. Each unit after the first turns about
     its hinge.
 
@@ -100,7 +100,7 @@ class EngineChassis:
     """The chassis of a plane vehicle in an engine. Its ``advance`` replaces the compiled function
     ``models.brake.advance.advance``."""
 
-    def __init__(self, engine: str, plane: Plane) -> None:
+    def __init__(self, engine: str, plane: PlaneVehicle) -> None:
         units, none = plane.masses.size, np.zeros((3, plane.wheels))
         wheels = np.vstack((plane.unit, plane.place.T, none))
         numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
@@ -109,11 +109,17 @@ class EngineChassis:
         self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
 
     def advance(
-        self, motion: PlaneMotion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
+        self,
+        motion: PlaneMotion,
+        torques: np.ndarray,
+        step: float,
+        steer: np.ndarray,
+        vehicle: VehicleOnRoad,
+        *lag: Any,
     ) -> tuple[int, float]:
         """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``Lag``); the
         engine computes the motion in each step (s). Returns the status and the time (s)."""
-        time, report, go = 0.0, Report(*motion.report), advance
+        time, report, go = 0.0, WheelReport(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go
         for n in range(len(torques) - 1):
@@ -128,9 +134,10 @@ class EngineChassis:
         return FINE, time
 
     def moving(self, *arguments: Any) -> Iterator[tuple[int, float, float, float]]:
-        """Generator that marches a braked vehicle as ``models.brake.samples.samples`` does; the engine computes the
-        motion in each step."""
-        return moved(self.advance)(*arguments)
+        """Generator that marches a braked vehicle as ``models.brake.samples.sample_generator`` does; the engine
+        computes the motion in each step.
+        """
+        return samples_with_step(self.advance)(*arguments)
 
     def _state_after_step(self, state_before: np.ndarray, step: float) -> np.ndarray:
         """Positions and rates (2, 2 + U) of the U units after a step (s) of the engine."""

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from models.brake.controller import APPLY, RELEASE, SAMPLE, Command, Sample
+from models.brake.controller import APPLY, RELEASE, SAMPLING_PERIOD, Command, Sample
 from models.core.errors import InputError
 
-SLOPE_MEMORY = 0.1
+ACCELERATION_SMOOTHING_TIME = 0.1
 """Time constant (s) over which the vehicle's acceleration is smoothed."""
 SMALLEST_FLOAT = 5e-324
 """Smallest positive number; its negative as an exclusive lower bound admits zero, and as an upper bound excludes
@@ -26,7 +26,7 @@ SLIP_BOUNDS = (0.0, 1.0)
 """Bounds of slip thresholds: a locked wheel has slip 1."""
 
 
-class Logic(Protocol):
+class WheelLogic(Protocol):
     """Protocol of the anti-lock logic for one wheel, or for one axle on the basis of its slower wheel."""
 
     def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
@@ -36,7 +36,7 @@ class Logic(Protocol):
 
 
 @dataclass(kw_only=True)
-class Common:
+class AntiLockController:
     """Parameters that every anti-lock controller has.
 
     wheels : how many there are; select_low : axles, from 0, whose two wheels get what the slower one needs; cut_off :
@@ -47,13 +47,13 @@ class Common:
     wheels: int = field(kw_only=False)
     select_low: tuple[int, ...] = ()
     cut_off: float = 1.5
-    period: float = SAMPLE
+    period: float = SAMPLING_PERIOD
 
-    def set_logic(self, make_wheel_logic: Callable[[Any], Logic], commands_pressures: bool = False) -> None:
+    def set_logic(self, make_wheel_logic: Callable[[Any], WheelLogic], commands_pressures: bool = False) -> None:
         """Set up one ``make_wheel_logic`` per wheel or axle; ``commands_pressures`` : whether it commands pressures
         instead of valve states.
         """
-        self._loop = PerWheel(self.wheels, self, make_wheel_logic, commands_pressures)
+        self._loop = PerWheelLoop(self.wheels, self, make_wheel_logic, commands_pressures)
 
     def sample(self, sample: Sample) -> Command:
         """Command for a sample: states of the valves, or pressures."""
@@ -63,7 +63,7 @@ class Common:
         """Refuse a parameter that is no number or outside its bounds: it must be above the first and at most the
         second.
 
-        Raises InputError. Axles that do not exist are refused by ``PerWheel``.
+        Raises InputError. Axles that do not exist are refused by ``PerWheelLoop``.
         """
         for name, (bound_below, bound_above) in {
             "period": (0.0, 1.0),
@@ -80,13 +80,17 @@ class Common:
         self.select_low = tuple(self.select_low)
 
 
-class PerWheel:
+class PerWheelLoop:
     """Loop over wheels or axles that all controllers share; ``pressures`` : whether they command pressures instead of
     valve states.
     """
 
     def __init__(
-        self, wheel_count: int, controller: Common, make_wheel_logic: Callable[[Any], Logic], commands_pressures: bool
+        self,
+        wheel_count: int,
+        controller: AntiLockController,
+        make_wheel_logic: Callable[[Any], WheelLogic],
+        commands_pressures: bool,
     ) -> None:
         for axle in controller.select_low:
             if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheel_count):
@@ -128,12 +132,14 @@ class PerWheel:
         return self._commands_of_logics(commands)
 
     def _smoothed_acceleration(self, vehicle_speed: float) -> float:
-        """Mean acceleration of the vehicle (m/s^2), negative while it brakes, smoothed over about ``SLOPE_MEMORY``
-        seconds.
+        """Mean acceleration of the vehicle (m/s^2), negative while it brakes, smoothed over about
+        ``ACCELERATION_SMOOTHING_TIME`` seconds.
         """
         if self._speed == self._speed:
             latest = (vehicle_speed - self._speed) / self._common.period
-            self._mean_acceleration += (latest - self._mean_acceleration) * min(self._common.period / SLOPE_MEMORY, 1.0)
+            self._mean_acceleration += (latest - self._mean_acceleration) * min(
+                self._common.period / ACCELERATION_SMOOTHING_TIME, 1.0
+            )
         self._speed = vehicle_speed
         return self._mean_acceleration
 

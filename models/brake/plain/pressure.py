@@ -10,24 +10,24 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.brake.brake import Brakes
+from models.brake.brake import WheelBrakes
 from models.brake.controller import APPLY, RELEASE, SLOW
-from models.brake.pressure import Air, Chambers
+from models.brake.pressure import AirState, BrakeChambers
 
 STEP_END_SHARE = 1e-9
 """Share of a step at its ends within which a command counts as arriving at the end."""
 
 
 @dataclass(eq=False)
-class Pressures:
+class PlainAirSystem:
     """The brakes' air system: all commands so far, and its state ``air``, which is updated in place; sample : duration
     (s).
     """
 
-    chambers: Chambers
-    brakes: Brakes
+    chambers: BrakeChambers
+    brakes: WheelBrakes
     sample: float
-    air: Air
+    air: AirState
     commands: list[np.ndarray] = field(default_factory=list)
 
     def by_valves(self, valve_states: np.ndarray, brake_torques: np.ndarray) -> None:

@@ -13,7 +13,7 @@ FADING_SPEED, DAMPING, SLOWEST_SPEED = 1.0, 0.7, 1e-9
 """Speed (m/s) below which the damper fades in, its damping ratio at rest, and speed (m/s) that counts as rest."""
 
 
-def lag_on(
+def advance_slip_tangents(
     slip_tangents: np.ndarray,
     wheel_speeds: np.ndarray,
     duration: float,
@@ -60,7 +60,7 @@ class LaggingTyres:
         """Advance the lagging slip angles to half a step (s) after the motion with speeds (2, W) along and across the
         wheels (m/s).
         """
-        self.angle, self.slips_for_forces = lag_on(
+        self.angle, self.slips_for_forces = advance_slip_tangents(
             self.angle, wheel_speeds, self.time_behind + half_step, self.length, self.slope
         )
         self.time_behind = half_step

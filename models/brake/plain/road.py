@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from models.brake.plain.tyre import Surface
-from models.brake.surfaces import Road
+from models.brake.plain.tyre import WheelSurface
+from models.brake.surfaces import RoadSurfaces
 
 
-def under_wheels(road: Road, wheel_paths: np.ndarray, surface_kinds: np.ndarray) -> list[Surface]:
+def surfaces_under_wheels(road: RoadSurfaces, wheel_paths: np.ndarray, surface_kinds: np.ndarray) -> list[WheelSurface]:
     """Surface under each wheel. wheel_paths (W, 2, 2) : x, y (m) at the start and at the end of the step, joined by a
     straight line; surface_kinds (W,) : kind of each wheel's tyre.
     """
@@ -15,7 +15,7 @@ def under_wheels(road: Road, wheel_paths: np.ndarray, surface_kinds: np.ndarray)
     ]
 
 
-def _surface_under(road: Road, wheel_path: np.ndarray, surface_kind: int) -> Surface:
+def _surface_under(road: RoadSurfaces, wheel_path: np.ndarray, surface_kind: int) -> WheelSurface:
     """Surface under one wheel whose path (2, 2) in m may cross from one stretch or side of the road to another."""
     (behind, front_end), (right, left) = np.sort(wheel_path[:, 0]), np.sort(wheel_path[:, 1])
     first_stretch, last_stretch = _stretch_at(road, behind), _stretch_at(road, front_end)
@@ -31,10 +31,10 @@ def _surface_under(road: Road, wheel_path: np.ndarray, surface_kind: int) -> Sur
     else:
         sides, share = 2 * [int((road.left if right >= road.line else road.right)[first_stretch])], 0.0
     near, far = (side * road.kinds + surface_kind for side in sides)
-    return Surface(near, far, float(share) if near != far else 0.0)
+    return WheelSurface(near, far, float(share) if near != far else 0.0)
 
 
-def _stretch_at(road: Road, x: float) -> int:
+def _stretch_at(road: RoadSurfaces, x: float) -> int:
     """Index of the stretch of road at x (m): the last one that begins at or before x."""
     return max(sum(bool(start <= x) for start in road.starts) - 1, 0)
 
@@ -54,7 +54,7 @@ def ground_paths(
     return np.stack([np.column_stack((ends.real, ends.imag)) for ends in (begin, end)], axis=1)
 
 
-def in_row(
+def unit_position_in_train(
     unit_coordinates: np.ndarray, unit_rates: np.ndarray, arm_lengths: np.ndarray, unit_index: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Position x, y and heading (3,) of a unit's centre in a train, and their rates, from the train's coordinates (2 +

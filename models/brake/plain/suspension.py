@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.brake.sprung import Sprung
+from models.brake.sprung import SprungVehicle
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
 from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
@@ -20,7 +20,7 @@ from models.vehicles.free_vehicle import CARRIER, chassis_of
 UPWARD = np.array([0.0, 0.0, 1.0])
 
 
-def round_the_vertical(vector: np.ndarray) -> np.ndarray:
+def product_with_upward(vector: np.ndarray) -> np.ndarray:
     """Vector product (3,) of the upward unit vector with a vector."""
     return np.array([-vector[1], vector[0], 0.0])
 
@@ -40,7 +40,7 @@ class TyreContact:
 
 
 @dataclass(frozen=True, eq=False)
-class WheelForces:
+class ConstantWheelForces:
     """Wheel quantities that are constant over a step: steer angles (rad), mean forces (W, 2) on the tyres along and
     across the wheels (N), and the mean moments (N m) that accelerate their rotation.
     """
@@ -50,10 +50,10 @@ class WheelForces:
     spin_moments: np.ndarray
 
 
-class Suspension:
-    """A vehicle on its springs and tyres; turns, leans : indices of its coordinates, see ``Sprung``."""
+class PlainSuspension:
+    """A vehicle on its springs and tyres; turns, leans : indices of its coordinates, see ``SprungVehicle``."""
 
-    def __init__(self, sprung_vehicle: Sprung) -> None:
+    def __init__(self, sprung_vehicle: SprungVehicle) -> None:
         free = sprung_vehicle.handling.vehicle
         self.bodies, self.tyres = Bodies(free), free.tyres
         self.parts = PlainParts(self.bodies, free, CARRIER)
@@ -106,7 +106,7 @@ class Suspension:
         turning = hub_turning + axle * (
             axle @ (carrying - hub_turning)
         )  # the rim does not turn beside what carries the wheel about its axle
-        sliding = hub_motion[RATE] + height * round_the_vertical(turning)
+        sliding = hub_motion[RATE] + height * product_with_upward(turning)
         return TyreContact(
             rolling_direction,
             axle,
@@ -122,7 +122,7 @@ class Suspension:
         elastic = self.loads[wheel_index] - tyre.stiffness * (hub_motion[PLACE, 2] - tyre.point[2])
         return float(max(elastic - tyre.damping * hub_motion[RATE, 2], 0.0)) if elastic > 0.0 else 0.0
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, wheel_forces: WheelForces) -> np.ndarray:
+    def acceleration(self, q: np.ndarray, v: np.ndarray, wheel_forces: ConstantWheelForces) -> np.ndarray:
         """Accelerations (n,) of the vehicle at coordinates and rates (n,), under constant wheel forces."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._gravity)
@@ -145,14 +145,14 @@ class Suspension:
         forces: np.ndarray = centre[FIRST_DERIVATIVE:] @ (-self._drag * abs(speed) * speed * forward)
         return forces
 
-    def _by_tyres(self, vehicle_motion: PlainMotion, wheel_forces: WheelForces) -> np.ndarray:
+    def _by_tyres(self, vehicle_motion: PlainMotion, wheel_forces: ConstantWheelForces) -> np.ndarray:
         """Generalised forces (n,) of all tyres; torques of brakes and locked wheels act on the bodies that carry the
         wheels.
         """
         hubs, total = vehicle_motion.at(self._hubs), np.zeros(self.size)
         for i, contact in enumerate(self.contacts(vehicle_motion, wheel_forces.steer)):
             creep = contact.along * wheel_forces.forces[i, 0] + contact.axle * wheel_forces.forces[i, 1]
-            moment = -contact.height * round_the_vertical(creep)
+            moment = -contact.height * product_with_upward(creep)
             rolling = contact.axle * (contact.axle @ moment)
             total += hubs[i, FIRST_DERIVATIVE:] @ (creep + contact.load * UPWARD)
             total += vehicle_motion.moment_forces(int(self._hubs.rows[i]), moment - rolling)

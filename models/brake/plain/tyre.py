@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.brake.plain.wheel import Force, WheelStep, wheel_step
+from models.brake.plain.wheel import TyreForceCurve, WheelStepData, wheel_step
 from models.tyre.tyre_table import Tables
 
 LOCKING_SLIP = 0.98
@@ -30,7 +30,7 @@ def interpolation_weights(nodes: np.ndarray, position: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Surface:
+class WheelSurface:
     """Surface under a wheel: indices of two friction tables, and the share of the second one in the mixture."""
 
     first: int
@@ -39,11 +39,11 @@ class Surface:
 
 
 @dataclass(frozen=True, eq=False)
-class Friction:
+class TyreFriction:
     """Friction of a tyre at one slip angle (rad, from 0) and load (N) on a surface."""
 
     tables: Tables
-    surface: Surface
+    surface: WheelSurface
     angle: float
     load: float
 
@@ -55,7 +55,7 @@ class Friction:
         mixed: np.ndarray = (1.0 - share) * table_values[self.surface.first] + share * table_values[self.surface.second]
         return mixed
 
-    def force_along(self) -> Force:
+    def force_along(self) -> TyreForceCurve:
         """Force (N) along the wheel as a function of slip."""
         t = self.tables
         mu = np.einsum(
@@ -64,7 +64,7 @@ class Friction:
             interpolation_weights(t.loads, self.load),
             t.mu_x,
         )
-        return Force(t.slips, self.load * self.mixed_values(mu))
+        return TyreForceCurve(t.slips, self.load * self.mixed_values(mu))
 
     def side_force(self, slip: float) -> float:
         """Magnitude (N) of the force across the wheel at a slip."""
@@ -116,15 +116,15 @@ class BrakedStep:
     turning: float
 
 
-def tyre(
-    tyre_tables: Tables, surface: Surface, wheel_motion: WheelMotion, load: float, braked_step: BrakedStep
+def tyre_report(
+    tyre_tables: Tables, surface: WheelSurface, wheel_motion: WheelMotion, load: float, braked_step: BrakedStep
 ) -> np.ndarray:
     """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
     mean slip, slip angle (rad), time locked (s), rotational speed (rad/s) at the end.
     """
-    friction, sense = Friction(tyre_tables, surface, wheel_motion.angle, load), wheel_motion.direction
+    friction, sense = TyreFriction(tyre_tables, surface, wheel_motion.angle, load), wheel_motion.direction
     speeds = sense * wheel_motion.start, sense * (wheel_motion.start + braked_step.step * wheel_motion.rate)
-    wheel = WheelStep(speeds, braked_step.torques, braked_step.step, braked_step.radius, braked_step.inertia)
+    wheel = WheelStepData(speeds, braked_step.torques, braked_step.step, braked_step.radius, braked_step.inertia)
     turning, force_along, slip, locked = wheel_step(wheel, sense * braked_step.turning, friction.force_along())
     forces = _turned_to_sliding(np.array([force_along, friction.side_force(slip)]), slip, wheel_motion)
     side = -math.copysign(forces[1], wheel_motion.across) if wheel_motion.across else 0.0

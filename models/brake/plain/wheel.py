@@ -19,7 +19,7 @@ LOCKED_SLIP = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Force:
+class TyreForceCurve:
     """Tyre force as a function of slip: slips (s,) from 0 to 1, and the forces (s,) in N at these; the force is odd in
     the slip.
     """
@@ -38,7 +38,7 @@ class Force:
 
 
 @dataclass(frozen=True)
-class WheelStep:
+class WheelStepData:
     """Data of a wheel over a step: at both ends, speeds of its centre (m/s) and torques of its brake (N m), both linear
     in time and not negative; step (s), radius (m), inertia (kg m^2).
     """
@@ -87,7 +87,9 @@ class WheelProgress:
     has_been_freed: bool = False
 
 
-def wheel_step(wheel_step_data: WheelStep, rim_turning: float, tyre_force: Force) -> tuple[float, float, float, float]:
+def wheel_step(
+    wheel_step_data: WheelStepData, rim_turning: float, tyre_force: TyreForceCurve
+) -> tuple[float, float, float, float]:
     """Rotational speed (rad/s) at the end of a step, mean force (N), mean slip and time locked (s) of a braked wheel.
 
     rim_turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
@@ -137,7 +139,7 @@ def _advance_at_slip(wheel_progress: WheelProgress, duration: float, tyre_force:
     )
 
 
-def _stays_locked(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force: Force) -> bool:
+def _stays_locked(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> bool:
     """Whether the brake holds a locked wheel, by its torque now or by its mean torque over the remaining step."""
     holds = (
         max(wheel_step_data.torque(wheel_progress.time), wheel_step_data.mean_torque(wheel_progress.time))
@@ -147,7 +149,7 @@ def _stays_locked(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyr
     return wheel_progress.slip >= LOCKED_SLIP and not wheel_progress.has_been_freed and holds
 
 
-def _advance_locked(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force: Force) -> None:
+def _advance_locked(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> None:
     """Advance a locked wheel until the brake torque falls below the torque of the sliding force, or the step ends."""
     needed, time = tyre_force.locked_force * wheel_step_data.radius, wheel_step_data.step - wheel_progress.time
     if wheel_step_data.torques[1] < needed:
@@ -160,7 +162,7 @@ def _advance_locked(wheel_step_data: WheelStep, wheel_progress: WheelProgress, t
     wheel_progress.locked, wheel_progress.has_been_freed = wheel_progress.locked + time, True
 
 
-def _excess_rate(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force: Force) -> float:
+def _excess_rate(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> float:
     """Rate (m/s^2) of the rim speed less twice the centre's speed, while the wheel slides at slip -1."""
     return (
         -wheel_step_data.radius
@@ -170,14 +172,16 @@ def _excess_rate(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre
     )
 
 
-def _is_spinning(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force: Force) -> bool:
+def _is_spinning(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> bool:
     """Whether the rim's speed is above twice the centre's speed and stays there."""
     return wheel_progress.slip < -1.0 or (
         wheel_progress.slip == -1.0 and _excess_rate(wheel_step_data, wheel_progress, tyre_force) > 0.0
     )
 
 
-def _advance_spinning(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force: Force) -> float:
+def _advance_spinning(
+    wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve
+) -> float:
     """Advance a wheel that spins at a slip counted as -1, until the step ends or that slip is reached; returns its
     rotation (rad/s)."""
     turning, excess = (
@@ -198,7 +202,7 @@ def _advance_spinning(wheel_step_data: WheelStep, wheel_progress: WheelProgress,
     return turning - slowing * time
 
 
-def _roll(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force: Force) -> None:
+def _roll(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> None:
     """Advance a wheel with a slip between -1 and 1 until the step ends or the slip reaches one of them. The mean force
     follows from the wheel's momentum.
     """
@@ -213,7 +217,7 @@ def _roll(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force:
         kappa * (mean / wheel_step_data.radius - forces)
         + (1.0 - nodes) * wheel_step_data.gain / wheel_step_data.mean_speed
     )
-    time, wheel_progress.slip, area = along_nodes(slip, nodes, rates, wheel_step_data.step - start_time)
+    time, wheel_progress.slip, area = advance_slip_along_nodes(slip, nodes, rates, wheel_step_data.step - start_time)
     if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
         time = wheel_step_data.step - start_time
     wheel_progress.time, wheel_progress.has_been_freed = start_time + time, False
@@ -230,7 +234,7 @@ def _roll(wheel_step_data: WheelStep, wheel_progress: WheelProgress, tyre_force:
     wheel_progress.slip_integral += area
 
 
-def along_nodes(
+def advance_slip_along_nodes(
     start_slip: float, slip_nodes: np.ndarray, slip_rates: np.ndarray, time_limit: float
 ) -> tuple[float, float, float]:
     """Time (s) that passes, slip at its end and integral of slip (s), over ``time_limit`` seconds or until the last
@@ -247,7 +251,7 @@ def along_nodes(
     for k in nodes_passed:
         slip_to_node, ratio = float(slip_nodes[k]) - start_slip, float(slip_rates[k]) / rate
         grows = (ratio - 1.0) * rate / slip_to_node
-        needed = slip_to_node / rate * _log_over(ratio - 1.0) if ratio > 0.0 else math.inf
+        needed = slip_to_node / rate * _log_quotient(ratio - 1.0) if ratio > 0.0 else math.inf
         if time + needed >= time_limit:
             remaining_time = time_limit - time
             z = grows * remaining_time
@@ -262,7 +266,7 @@ def along_nodes(
     return time, start_slip, area
 
 
-def _log_over(x: float) -> float:
+def _log_quotient(x: float) -> float:
     """The quotient log(1 + x) / x, also for x near 0."""
     return math.log1p(x) / x if abs(x) > SERIES_LIMIT else math.fsum((-x) ** k / (k + 1) for k in range(6))
 

@@ -51,7 +51,7 @@ class ControllerFailed(RunFailed):
         super().__init__("controller", f"sample {sample.number}: {fault_name}: {reason}", 1e-9 * sample.time)
 
 
-def ask(
+def checked_command(
     controller: Controller,
     sample: Sample,
     allowed_states: frozenset[int] = VALVE_STATES,
@@ -67,7 +67,7 @@ def ask(
         raise
     except (Exception, SystemExit) as error:
         raise ControllerFailed(sample, "crash", exception_text(error)) from error
-    return checked_answer(command, sample, allowed_states, maximum_pressure)
+    return usable_command(command, sample, allowed_states, maximum_pressure)
 
 
 def exception_text(exception: BaseException) -> str:
@@ -92,10 +92,10 @@ class CheckedController:
 
     def sample(self, sample: Sample) -> Command:
         """The controller's checked command for a sample; raises ControllerFailed."""
-        return ask(self.controller, sample, self.states, sample.supply)
+        return checked_command(self.controller, sample, self.states, sample.supply)
 
 
-def checked_answer(
+def usable_command(
     command: Command,
     sample: Sample,
     allowed_states: frozenset[int] = VALVE_STATES,
@@ -114,7 +114,7 @@ def checked_answer(
         and allowed_states.issuperset(valve_states.tolist())
     ):
         return command
-    values = _answer_array(command.pressures if command.valves is None else command.valves, sample)
+    values = _command_array(command.pressures if command.valves is None else command.valves, sample)
     for value in values.tolist():
         if not math.isfinite(value):
             raise ControllerFailed(sample, "not a number", f"{value:g} for a wheel")
@@ -126,16 +126,16 @@ def checked_answer(
             )
         if command.valves is not None and value not in allowed_states:
             raise ControllerFailed(
-                sample, "no state of a valve", f"{value:g} is none of {_listed_text(allowed_states)}"
+                sample, "no state of a valve", f"{value:g} is none of {_states_text(allowed_states)}"
             )
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
 
 
-def _listed_text(allowed_states: frozenset[int]) -> str:
+def _states_text(allowed_states: frozenset[int]) -> str:
     return ", ".join(map(str, sorted(allowed_states)))
 
 
-def _answer_array(command_values: object, sample: Sample) -> np.ndarray:
+def _command_array(command_values: object, sample: Sample) -> np.ndarray:
     """Values (W,) of a command as numbers; raises ControllerFailed where they are not one number per wheel."""
     if np.ma.is_masked(command_values):
         raise ControllerFailed(sample, "not a number", "a masked value for a wheel")

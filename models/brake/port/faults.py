@@ -13,7 +13,7 @@ from models.brake.controller import APPLY, RELEASE, Command, Controller, Sample
 from models.core.strict import Strict, quantity
 
 
-class Fault(Strict):
+class ControllerFault(Strict):
     """A planned fault. ``lost``: signals stay as they were at the last sample before it; ``delayed``: they are the
     signals of ``samples`` samples ago; ``stuck``: a valve stays in ``state``, or in the state of its last sample before
     it; ``tooth``: the tooth of this number is missing, for signals that are counted from teeth.
@@ -28,7 +28,7 @@ class Fault(Strict):
     tooth: int | None = Field(default=None, ge=0, description="number of the missing tooth, from 0")
 
     @model_validator(mode="after")
-    def _one_kind(self) -> "Fault":
+    def _one_kind(self) -> "ControllerFault":
         for key, kind, needed in (("samples", "delayed", True), ("state", "stuck", False), ("tooth", "tooth", True)):
             if getattr(self, key) is not None and self.kind != kind:
                 raise ValueError(f"{key} has no meaning for a fault of kind {self.kind}")
@@ -52,7 +52,7 @@ class FaultyController:
     """A controller whose signals and commands are changed by faults; a new one is made for every run."""
 
     controller: Controller
-    faults: list[Fault]
+    faults: list[ControllerFault]
     _past_signals: deque[np.ndarray] = field(init=False)
     _last_signals: np.ndarray | None = None
     _last_valves: np.ndarray | None = None
@@ -71,7 +71,7 @@ class FaultyController:
             else Command(valves=self._stuck_valves(np.array(command.valves), active_faults))
         )
 
-    def _faulty_signals(self, wheel_speeds: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
+    def _faulty_signals(self, wheel_speeds: np.ndarray, active_faults: list[ControllerFault]) -> np.ndarray:
         self._past_signals.append(wheel_speeds)
         faulty_wheels = wheel_speeds.copy()
         for fault in active_faults:
@@ -83,7 +83,7 @@ class FaultyController:
         self._last_signals = faulty_wheels
         return faulty_wheels
 
-    def _stuck_valves(self, valve_states: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
+    def _stuck_valves(self, valve_states: np.ndarray, active_faults: list[ControllerFault]) -> np.ndarray:
         for fault in active_faults:
             for i in fault.affected_wheels(valve_states.size) if fault.kind == "stuck" else ():
                 if fault.state is not None:
@@ -94,7 +94,7 @@ class FaultyController:
         return valve_states
 
 
-def missing_teeth(faults: list[Fault], wheel_index: int, tooth_index: int, time: float) -> bool:
+def missing_teeth(faults: list[ControllerFault], wheel_index: int, tooth_index: int, time: float) -> bool:
     """Whether a tooth of a wheel is missing at a time (s), by any of the faults."""
     return any(
         fault.kind == "tooth"

@@ -21,7 +21,7 @@ from models.brake.controller import Command, Sample
 from models.brake.port.ask import FAULT_NAMES, ControllerFailed
 from models.brake.port.frame import ANSWER_LAYOUT, WrongFrame, command_of_answer, question_frame
 from models.brake.port.host import FAILURE_MARK, HEAD_LAYOUT, LENGTH_LAYOUT, READY_MARK, HostedController
-from models.brake.port.socket_port import START_REMEDY, controller_behind_socket, end_of_process
+from models.brake.port.socket_port import START_REMEDY, controller_behind_socket, process_end_phrase
 from models.core.errors import InputError, RunFailed
 
 FAILURE_TEXT_BYTES = 100_000
@@ -60,7 +60,7 @@ class ProcessController:
             ) from None
         except (OSError, EOFError):
             raise RunFailed(
-                "controller", f"crash: it ended as it was made{end_of_process(self.process, self.timeout)}"
+                "controller", f"crash: it ended as it was made{process_end_phrase(self.process, self.timeout)}"
             ) from None
 
     def sample(self, sample: Sample) -> Command:
@@ -79,7 +79,7 @@ class ProcessController:
         except TimeoutError:
             raise ControllerFailed(sample, "silence", f"no answer within {self.timeout:g} s") from None
         except (OSError, EOFError):
-            lost = f"the controller was lost{end_of_process(self.process, self.timeout)}"
+            lost = f"the controller was lost{process_end_phrase(self.process, self.timeout)}"
             raise ControllerFailed(sample, "crash", lost) from None
 
     def _receive(self, question_bytes: bytes, byte_count: int, expected_start: bytes, time_limit: float) -> bytes:

@@ -62,7 +62,7 @@ def log_refusal(log_path: Path) -> str:
     return "" if known else "is a file that is no log, and would be overwritten: name another one"
 
 
-class Replay:
+class ReplayedController:
     """Controller that repeats the commands of a log as long as the samples equal the logged ones; raises InputError for
     another scene's log.
     """

@@ -16,7 +16,7 @@ from models.core.noise import BRAKE_PRESSURES, BRAKE_SIGNALS, SAMPLES_PER_BLOCK,
 from models.core.strict import Strict, quantity
 
 
-class Conversion(Strict):
+class SensorConversion(Strict):
     """Conversion of a signal by its sensor; with ``bits`` it needs a ``range``."""
 
     gain: float = quantity("", "factor", default=1.0)
@@ -27,18 +27,18 @@ class Conversion(Strict):
     range: float | None = quantity("unit of the signal", "value of the last code", default=None)
 
     @model_validator(mode="after")
-    def _converted(self) -> "Conversion":
+    def _converted(self) -> "SensorConversion":
         if (self.bits is None) != (self.range is None):
             raise ValueError("bits and range are given together")
         return self
 
 
-class Channels:
+class SensorChannels:
     """Conversion of several signals by sensors, sample by sample from 0 on. source: of the noise, see
     ``models.core.noise``.
     """
 
-    def __init__(self, conversion: Conversion, channel_count: int, noise_stream: int) -> None:
+    def __init__(self, conversion: SensorConversion, channel_count: int, noise_stream: int) -> None:
         self.conversion, self._count, self._source = conversion, channel_count, noise_stream
         self._block, self._noise = -1, np.zeros((0, channel_count))
 
@@ -77,8 +77,8 @@ class SensedController:
     """
 
     controller: Controller
-    wheels: Channels
-    pressures: Channels
+    wheels: SensorChannels
+    pressures: SensorChannels
     tooth_counter: ToothCounter | None = None
 
     def sample(self, sample: Sample) -> Command:
@@ -95,14 +95,14 @@ class SensedController:
 def controller_behind_sensors(
     controller: Controller,
     wheel_count: int,
-    speed_conversion: Conversion,
-    pressure_conversion: Conversion,
+    speed_conversion: SensorConversion,
+    pressure_conversion: SensorConversion,
     **extras: Any,
 ) -> SensedController:
     """A controller that receives the signals of W wheels through sensors."""
     return SensedController(
         controller,
-        Channels(speed_conversion, wheel_count, BRAKE_SIGNALS),
-        Channels(pressure_conversion, wheel_count, BRAKE_PRESSURES),
+        SensorChannels(speed_conversion, wheel_count, BRAKE_SIGNALS),
+        SensorChannels(pressure_conversion, wheel_count, BRAKE_PRESSURES),
         **extras,
     )

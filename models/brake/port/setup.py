@@ -17,19 +17,19 @@ from pydantic import Field, model_validator
 from models.brake.controller import Controller
 from models.brake.port import socket_port
 from models.brake.port.ask import STATES_WITH_SLOW_APPLY, VALVE_STATES, CheckedController
-from models.brake.port.faults import Fault, FaultyController, missing_teeth
+from models.brake.port.faults import ControllerFault, FaultyController, missing_teeth
 from models.brake.port.host import HostedController
 from models.brake.port.hosted import controller_in_process
-from models.brake.port.log import Replay, log_refusal, logged_controller, scene_hash
-from models.brake.port.pace import WallClock
-from models.brake.port.sensors import Conversion, controller_behind_sensors
-from models.brake.port.teeth import Teeth, ToothCounter
+from models.brake.port.log import ReplayedController, log_refusal, logged_controller, scene_hash
+from models.brake.port.pace import WallClockController
+from models.brake.port.sensors import SensorConversion, controller_behind_sensors
+from models.brake.port.teeth import ToothCounter, ToothedWheel
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
 
 PORT_KEYS = ("callable", "command", "port", "fmu", "replay")
 """Keys for what can stand behind the port in place of the scene's controller; at most one is given."""
-MANUAL_START_SECONDS = 20.0
+MANUAL_CONNECTION_SECONDS = 20.0
 """Time (s) within which a process that somebody starts by hand must connect to a port, where the scene does not say."""
 
 
@@ -52,17 +52,19 @@ class PortTable(Strict):
     )
     pace: Literal["simulated", "wall"] = Field(default="simulated", description="simulated, or wall: the clock's")
     log: str | None = Field(default=None, description="file to which every exchange is written")
-    signals: Conversion = Conversion()
-    pressures: Conversion = Conversion()
-    teeth: Teeth | None = Field(default=None, description="signals are counted from teeth; not named, they are known")
-    faults: list[Fault] = Field(default_factory=list, description="on demand")
+    signals: SensorConversion = SensorConversion()
+    pressures: SensorConversion = SensorConversion()
+    teeth: ToothedWheel | None = Field(
+        default=None, description="signals are counted from teeth; not named, they are known"
+    )
+    faults: list[ControllerFault] = Field(default_factory=list, description="on demand")
 
     @property
     def patience(self) -> float:
         """Time (s) within which the controller must be ready."""
         if self.start is not None:
             return self.start
-        return self.timeout if self.port is None else MANUAL_START_SECONDS
+        return self.timeout if self.port is None else MANUAL_CONNECTION_SECONDS
 
     @model_validator(mode="after")
     def _one_behind(self) -> "PortTable":
@@ -77,7 +79,7 @@ class PortTable(Strict):
 
 
 @dataclass(frozen=True)
-class ControllerRun:
+class ControllerRunData:
     """Data of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, which identifies
     logs; folder: from which paths start; file: name of the scene, for messages; procedure, engine: names that file
     names may contain; slow: whether valves can apply slowly.
@@ -99,8 +101,8 @@ class ControllerRun:
 
 @contextmanager
 def controller_of_run(
-    port_table: PortTable, controller_run: ControllerRun, controller: Controller
-) -> Iterator[tuple[Controller, WallClock | None]]:
+    port_table: PortTable, controller_run: ControllerRunData, controller: Controller
+) -> Iterator[tuple[Controller, WallClockController | None]]:
     """The controller of one run as a context manager, and its wall clock if it is paced by one.
 
     controller : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
@@ -111,7 +113,7 @@ def controller_of_run(
             stack.enter_context(_possible_controllers(port_table, controller_run, controller)),
             STATES_WITH_SLOW_APPLY if controller_run.slow else VALVE_STATES,
         )
-        clock = WallClock(inner, controller_run.sample) if port_table.pace == "wall" else None
+        clock = WallClockController(inner, controller_run.sample) if port_table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if port_table.log is not None:
             watched = stack.enter_context(
@@ -123,7 +125,7 @@ def controller_of_run(
             if port_table.teeth is None
             else ToothCounter(port_table.teeth, controller_run.radius, partial(missing_teeth, port_table.faults))
         )
-        plain = teeth is None and port_table.signals == port_table.pressures == Conversion()
+        plain = teeth is None and port_table.signals == port_table.pressures == SensorConversion()
         wheels = controller_run.radius.size
         yield (
             faulty
@@ -137,7 +139,7 @@ def controller_of_run(
 
 @contextmanager
 def _possible_controllers(
-    port_table: PortTable, controller_run: ControllerRun, controller: Controller
+    port_table: PortTable, controller_run: ControllerRunData, controller: Controller
 ) -> Iterator[Controller]:
     """The controller that the table names, as a context manager: behind a socket, in a hosted process or a replayed
     log; else ``controller``.
@@ -156,7 +158,7 @@ def _possible_controllers(
             yield entered
         elif port_table.replay is not None:
             with _errors_of_scene_key(port_table, controller_run):
-                replay = Replay(controller_run.path(port_table.replay), scene_hash(controller_run.scene))
+                replay = ReplayedController(controller_run.path(port_table.replay), scene_hash(controller_run.scene))
             yield replay
         elif port_table.callable is not None or port_table.fmu is not None:
             folder = (
@@ -180,7 +182,7 @@ def _possible_controllers(
 
 
 @contextmanager
-def _errors_of_scene_key(port_table: PortTable, controller_run: ControllerRun) -> Iterator[None]:
+def _errors_of_scene_key(port_table: PortTable, controller_run: ControllerRunData) -> Iterator[None]:
     """Context that converts errors about a named controller into errors about the scene's key; errors inside a file
     name that file.
     """
@@ -194,7 +196,7 @@ def _errors_of_scene_key(port_table: PortTable, controller_run: ControllerRun) -
         ) from None
 
 
-def check_port(port_table: PortTable, controller_run: ControllerRun) -> None:
+def check_port(port_table: PortTable, controller_run: ControllerRunData) -> None:
     """Refuse files that do not exist or would be overwritten, and faults of wheels or teeth that do not exist."""
     for key in ("fmu", "replay"):
         name = getattr(port_table, key)

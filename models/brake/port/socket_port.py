@@ -21,7 +21,7 @@ STANDARD_ERROR = 2
 """File number of standard error, to which a controller's prints go: standard output is for the results alone."""
 START_REMEDY = "if it needs longer, give start (s) under [port]"
 """Text on the remedy where a controller does not connect in time."""
-GRACE_SECONDS = 0.5
+PROCESS_END_SECONDS = 0.5
 """Time (s) for a process to end by itself once its connection is closed at the end of a run."""
 
 
@@ -51,7 +51,7 @@ class SocketPort:
             raise ControllerFailed(
                 sample,
                 "crash",
-                f"the connection broke: {error.strerror or error}{end_of_process(self.process, self.timeout)}",
+                f"the connection broke: {error.strerror or error}{process_end_phrase(self.process, self.timeout)}",
             ) from None
 
     def _frame(self, sample: Sample, deadline: float) -> bytes:
@@ -71,7 +71,7 @@ class SocketPort:
                     sample,
                     "crash",
                     "the connection was closed after "
-                    f"{_received_bytes(got)}{end_of_process(self.process, self.timeout)}",
+                    f"{_received_bytes(got)}{process_end_phrase(self.process, self.timeout)}",
                 )
             got += received_part
             if len(got) < ANSWER_LAYOUT.size:
@@ -81,12 +81,12 @@ class SocketPort:
         return got
 
 
-def end_of_process(process: subprocess.Popen[bytes] | None, waiting_time: float) -> str:
+def process_end_phrase(process: subprocess.Popen[bytes] | None, waiting_time: float) -> str:
     """Phrase on how a process with a closed connection ended; "" if it did not end within some tenths of a second."""
     if process is None:
         return ""
     with suppress(subprocess.TimeoutExpired):
-        status = process.wait(min(waiting_time, GRACE_SECONDS))
+        status = process.wait(min(waiting_time, PROCESS_END_SECONDS))
         return (
             f", its process ended with status {status}" if status >= 0 else f", its process got {_signal_name(-status)}"
         )
@@ -175,7 +175,7 @@ def _started_process(
     grace = 0.0
     try:
         yield process
-        grace = GRACE_SECONDS
+        grace = PROCESS_END_SECONDS
     finally:
         _wait_for_end(process, grace)
 

@@ -15,10 +15,10 @@ from pydantic import Field
 from models.brake.controller import Sample
 from models.core.strict import Strict, quantity
 
-Missing = Callable[[int, int, float], bool]
+IsToothMissing = Callable[[int, int, float], bool]
 
 
-class Teeth(Strict):
+class ToothedWheel(Strict):
     """A toothed wheel with its timer."""
 
     teeth: int = Field(default=100, ge=1, le=10000, description="of one turn")
@@ -30,24 +30,26 @@ class ToothCounter:
     whether a tooth is missing.
     """
 
-    def __init__(self, toothed_wheel: Teeth, wheel_radii: np.ndarray, is_tooth_missing: Missing | None = None) -> None:
+    def __init__(
+        self, toothed_wheel: ToothedWheel, wheel_radii: np.ndarray, is_tooth_missing: IsToothMissing | None = None
+    ) -> None:
         self._teeth, self._missing = toothed_wheel, is_tooth_missing
         self._way = (2.0 * math.pi / toothed_wheel.teeth * wheel_radii).tolist()
-        self._wheels: list[_Wheel] = []
+        self._wheels: list[_ToothedWheelState] = []
         self._before = 0.0
 
     def __call__(self, sample: Sample) -> np.ndarray:
         """Speed signals (W,) in m/s at a sample."""
         speeds, sample_time = np.abs(sample.wheels).tolist(), 1e-9 * sample.time
         if not self._wheels:
-            self._wheels = [_Wheel(speed) for speed in speeds]
+            self._wheels = [_ToothedWheelState(speed) for speed in speeds]
         elif sample_time > self._before:
             for i, (wheel, speed) in enumerate(zip(self._wheels, speeds, strict=True)):
                 self._advance_counter(i, wheel, speed, sample_time)
         self._before = sample_time
         return np.array([wheel.shown for wheel in self._wheels])
 
-    def _advance_counter(self, wheel_index: int, wheel: "_Wheel", wheel_speed: float, time: float) -> None:
+    def _advance_counter(self, wheel_index: int, wheel: "_ToothedWheelState", wheel_speed: float, time: float) -> None:
         """Advance the tooth counter of wheel i from the last sample to ``time`` (s)."""
         tooth_pitch, step = self._way[wheel_index], time - self._before
         turned_teeth = wheel.turned + 0.5 * (wheel.speed + wheel_speed) * step / tooth_pitch
@@ -69,7 +71,7 @@ class ToothCounter:
         wheel.turned, wheel.speed = turned_teeth, wheel_speed
 
 
-class _Wheel:
+class _ToothedWheelState:
     """State of a toothed wheel's sensor: angle in teeth since the start, true and measured speed (m/s), and time of the
     last edge (s).
     """
