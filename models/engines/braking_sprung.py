@@ -44,6 +44,7 @@ from models.engines.towed_springs import shared_numbers, towed_division
 from models.vehicles.spatial_linear import linearise, mass
 
 if TYPE_CHECKING:
+    from models.brake.relaxation import TyreLag
     from models.brake.sprung_relaxation import ContactLag
 
 BLINK = 1e-5

@@ -26,6 +26,7 @@ from models.vehicles.spatial_linear import linearise
 
 if TYPE_CHECKING:
     from models.brake.plain.relaxation import LaggingTyres
+    from models.brake.relaxation import TyreLag
 
 NAME = "reference"
 
