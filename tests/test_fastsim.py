@@ -108,7 +108,10 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
 @pytest.mark.parametrize("kind", ["blended", "one", "three"])
 def test_derivatives_are_those_of_the_march(kind, growing):
     given = case.creepage_contacts(tuple(case.CREEPAGE_KINDS), (0.2, 2.0))
-    own = derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, growing=growing).slopes[..., 3] * case.LOAD
+    own = (
+        derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, axes_grow_with_load=growing).slopes[..., 3]
+        * case.LOAD
+    )
     ends = []
     for share in (1e-6, -1e-6):
         grown = (1 + share) ** (1 / 3) if growing else 1.0

@@ -37,7 +37,7 @@ def test_numbers_are_those_of_the_package(name):
     for approach in (1.2e-5, 4e-5, 1.1e-4):
         motion = rng.normal(0.0, [2e-3, 2e-3, 0.5])
         pressed = press(bodies, PAIR, approach=approach)
-        rolled = roll(pressed, 0.3, *motion, cells=9)
+        rolled = roll(pressed, 0.3, *motion, cell_count=9)
         status, out = solved(bodies, approach, 0.3, motion)
         assert status == k.FINE
         # both settle to 1e-11 or better, by different methods

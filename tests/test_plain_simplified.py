@@ -88,14 +88,14 @@ def test_the_least_of_a_row_and_its_place():
 @pytest.mark.parametrize("options", OPTIONS, ids=lambda each: each.fit)
 @pytest.mark.parametrize("name", HEIGHTS)
 def test_load_and_forces_of_the_package(name, options):
-    pressed = press(bodies(name)[0], PAIR, approach=APPROACH, options=options)
+    pressed = press(bodies(name)[0], PAIR, approach=APPROACH, simplified_options=options)
     truth, rolled = expected(name, options)
     assert pressed.load == pytest.approx(truth.load, rel=CLOSE)
     assert pressed.patches[0].stiffness == pytest.approx(truth.stiffness, rel=CLOSE)
-    by_load = press(bodies(name)[0], PAIR, load=truth.load, options=options)
+    by_load = press(bodies(name)[0], PAIR, load=truth.load, simplified_options=options)
     assert by_load.approach == pytest.approx(APPROACH, rel=CLOSE)
     for motion, (forces, flexibility) in zip(MOTIONS, rolled, strict=True):
-        computed = roll(pressed, MU, *motion, cells=CELLS)
+        computed = roll(pressed, MU, *motion, cell_count=CELLS)
         unit = MU * truth.load * np.array([1.0, 1.0, 5e-3])
         assert np.abs((np.array([computed.fx, computed.fy, computed.mz]) - forces[:3]) / unit).max() <= CLOSE
         assert computed.stick_share == pytest.approx(forces[3], abs=1e-9)

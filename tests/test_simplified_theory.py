@@ -50,7 +50,7 @@ def pressed():
 
 @pytest.mark.parametrize("options", [SimplifiedOptions(), PAPER])
 def test_hertz_is_met(options):
-    found = press(ELLIPSE, PAIR, load=1e5, options=options)
+    found = press(ELLIPSE, PAIR, load=1e5, simplified_options=options)
     assert found.load == pytest.approx(1e5, rel=1e-12)
     assert found.approach == pytest.approx(float(HERTZ.approach), rel=0.005)  # 0.3 % seen, 2 % allowed
     if options.shape == "elliptic":
@@ -60,7 +60,7 @@ def test_hertz_is_met(options):
 
 def test_the_paper_makes_the_area_of_a_circle_a_fifth_too_large():
     exact = by_load(A, A, 1e5, PAIR)
-    found = press(quadratic(A, A, 0.016, 0.016), PAIR, load=1e5, options=PAPER)
+    found = press(quadratic(A, A, 0.016, 0.016), PAIR, load=1e5, simplified_options=PAPER)
     assert found.area / (math.pi * float(exact.a) ** 2) == pytest.approx(
         1.19, abs=0.02
     )  # an independent prototype: +20 %
@@ -263,8 +263,11 @@ BAD = {
     "saddle": (lambda: press(SADDLE, PAIR, load=1e3), "no bottom inside"),
     "saddle by approach": (lambda: press(SADDLE, PAIR, approach=1e-5), "no bottom inside"),
     "several creepages": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, [1e-3, 2e-3], 0.0, 0.0), "not an array"),
-    "cells of a half": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cells=45.0), "whole number"),
-    "no cells": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cells=0), "from 3 to"),
+    "cells of a half": (
+        lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cell_count=45.0),
+        "whole number",
+    ),
+    "no cells": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cell_count=0), "from 3 to"),
     "net": (lambda: SimplifiedOptions(net=2), "3 to 100"),
     "net of a half": (lambda: SimplifiedOptions(net=4.5), "whole number"),  # type: ignore[arg-type]
     "shape": (lambda: SimplifiedOptions(shape="eliptic"), "did you mean 'elliptic'"),

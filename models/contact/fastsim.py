@@ -143,7 +143,7 @@ class Ellipse:
 
     def __init__(
         self,
-        ratio: float,
+        axis_ratio: float,
         material_pair: MaterialPair,
         *,
         cells: int = 21,
@@ -152,7 +152,7 @@ class Ellipse:
         march: March = "second-order",
     ) -> None:
         check_choices(cells, bound, flexibilities, march)
-        self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
+        self.ratio = number("ratio", axis_ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
         self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
         size = 1e-3
         flexible = linear_flexibilities(size, size / self.ratio, material_pair)

@@ -44,48 +44,48 @@ class Grid:
         return Strips(y, half, spread, part), Cells(centre, bound, middle, before, rate, self.middle)
 
 
-def strips_of(ratio: Array, cells: int) -> Array:
-    """Number of strips of a grid with ``cells`` cells per strip, for ellipses of a/b = ``ratio``: even, and at least
-    ``cells``.
+def strips_of(axis_ratios: Array, cell_count: int) -> Array:
+    """Number of strips of a grid with ``cell_count`` cells per strip, for ellipses of a/b = ``axis_ratios``: even, and at least
+    ``cell_count``.
 
     Under spin the traction turns about a pole, within a distance of a: strips of a narrow ellipse must not be wider.
     An even number, because a strip through the pole of pure spin would stand for both its sides.
     """
-    wanted = cells * np.clip((0.5 / ratio) ** 0.6, 1.0, MOST_STRIPS)
+    wanted = cell_count * np.clip((0.5 / axis_ratios) ** 0.6, 1.0, MOST_STRIPS)
     return 2 * np.ceil(wanted / 2.0 - 1e-9).astype(int)
 
 
-def nets(ratio: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]:
-    """Pairs of indices and grid: the contacts among axis ratios a/b = ``ratio`` (n,) that share a grid, and that
+def nets(axis_ratios: Array, cell_count: int, bound_shape: Bound) -> Iterator[tuple[Array, Grid]]:
+    """Pairs of indices and grid: the contacts among axis ratios a/b = ``axis_ratios`` (n,) that share a grid, and that
     grid.
     """
-    strips = strips_of(ratio, cells)
+    strips = strips_of(axis_ratios, cell_count)
     for count in np.unique(strips):
-        yield np.flatnonzero(strips == count), grid(cells, int(count), bound)
+        yield np.flatnonzero(strips == count), grid(cell_count, int(count), bound_shape)
 
 
 @lru_cache(maxsize=256)
-def grid(cells: int, strips: int, bound: Bound) -> Grid:
-    """FASTSIM's grid of ``strips`` strips of equal width with ``cells`` cells each; cells of a strip have equal
+def grid(cell_count: int, strip_count: int, bound_shape: Bound) -> Grid:
+    """FASTSIM's grid of ``strip_count`` strips of equal width with ``cell_count`` cells each; cells of a strip have equal
     lengths.
 
     Pressure is sampled at the cells' centres and scaled so that its sum over all cells is the load exactly.
     """
-    y = (strips - 1.0 - 2.0 * np.arange(strips)) / strips  # mirrored in y to the last digit
+    y = (strip_count - 1.0 - 2.0 * np.arange(strip_count)) / strip_count  # mirrored in y to the last digit
     half = np.sqrt((1.0 - y) * (1.0 + y))
-    edges = np.linspace(1.0, -1.0, cells + 1)
+    edges = np.linspace(1.0, -1.0, cell_count + 1)
     centre = (edges[:-1] + edges[1:]) / 2.0
     middle = np.append((1.0 + centre[0]) / 2.0, edges[1:-1])
-    across, height = _pressure(y, bound), _pressure(centre, bound)
+    across, height = _pressure(y, bound_shape), _pressure(centre, bound_shape)
     before = np.append(0.0, height[:-1]) * ROUNDED
-    along = np.array([centre, height, middle, before, 0.125 / _pressure(middle, bound)])
+    along = np.array([centre, height, middle, before, 0.125 / _pressure(middle, bound_shape)])
     share = across * half
     carried = share.sum() * height.sum()
-    return Grid(np.array([y, half, half / across, share / carried]), along, cells * strips / (4.0 * carried))
+    return Grid(np.array([y, half, half / across, share / carried]), along, cell_count * strip_count / (4.0 * carried))
 
 
-def _pressure(t: Array, bound: Bound) -> Array:
-    """Ratio of the pressure that bounds the traction, at the distance ``t`` from the centre (in semi-axes), to that in
+def _pressure(position: Array, bound_shape: Bound) -> Array:
+    """Ratio of the pressure that bounds the traction, at the distance ``position`` from the centre (in semi-axes), to that in
     the centre.
     """
-    return ((1.0 - t) * (1.0 + t)) ** POWERS[bound]
+    return ((1.0 - position) * (1.0 + position)) ** POWERS[bound_shape]

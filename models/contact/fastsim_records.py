@@ -69,12 +69,12 @@ class Workspace(NamedTuple):
 
 
 @inlined
-def strips_in(table):
+def strips_in(strip_table):
     """``Strips`` as views of a grid's table (4, m)."""
-    return Strips(table[0], table[1], table[2], table[3])
+    return Strips(strip_table[0], strip_table[1], strip_table[2], strip_table[3])
 
 
 @inlined
-def cells_in(table, peak):
+def cells_in(cell_table, peak_pressure):
     """``Cells`` as views of a grid's table (5, n)."""
-    return Cells(table[0], table[1], table[2], table[3], table[4], peak)
+    return Cells(cell_table[0], cell_table[1], cell_table[2], cell_table[3], cell_table[4], peak_pressure)

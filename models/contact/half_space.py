@@ -80,15 +80,15 @@ class Convolution:
         shifted = np.roll(shifted, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
         self._spectrum = fft.rfft2(np.moveaxis(shifted, (0, 1), (-2, -1)), workers=1)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, cell_values: Array) -> Array:
         """Sums (ny, nx, out) over all cells of kernel times values (ny, nx, in)."""
-        spectrum = fft.rfft2(np.moveaxis(values, -1, 0), self._size, workers=1)
+        spectrum = fft.rfft2(np.moveaxis(cell_values, -1, 0), self._size, workers=1)
         sums = fft.irfft2(np.einsum("ijyx,jyx->iyx", self._spectrum, spectrum), self._size, workers=1)
         return np.moveaxis(sums[:, : self.cells[0], : self.cells[1]], 0, -1)
 
 
-def offsets(cells: int, step: float) -> Array:
-    """All differences (m) between the centres of two cells in a row of ``cells`` cells of length ``step`` (m): (2 cells
+def offsets(cell_count: int, cell_size: float) -> Array:
+    """All differences (m) between the centres of two cells in a row of ``cell_count`` cells of length ``cell_size`` (m): (2 cells
     - 1,), ascending.
     """
-    return np.arange(1 - cells, cells) * step
+    return np.arange(1 - cell_count, cell_count) * cell_size

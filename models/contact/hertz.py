@@ -130,48 +130,54 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
 
 
 def _contact(
-    A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
+    A: Array,
+    B: Array,
+    load: Array,
+    short_axis: Array,
+    axis_ratio: Array,
+    curvature_sum: Array,
+    material_pair: MaterialPair,
 ) -> Hertz:
     """Hertzian contact from its short semi-axis (m); all results are zero where this axis is. ``curvature_sum`` is K =
     B + D.
     """
-    long = short / ratio
-    area = math.pi * short * long
+    long = short_axis / axis_ratio
+    area = math.pi * short_axis * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
     along = A <= B  # the long axis lies along the smaller curvature
-    a, b = np.where(along, long, short), np.where(along, short, long)
-    fields = (a, b, p0, p0 * short * curvature_sum / material_pair.modulus, load, A, B)
+    a, b = np.where(along, long, short_axis), np.where(along, short_axis, long)
+    fields = (a, b, p0, p0 * short_axis * curvature_sum / material_pair.modulus, load, A, B)
     return Hertz(*(field[()] for field in fields))  # numbers from numbers
 
 
-def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
+def aspects(curvature_ratios: Array) -> tuple[Array, Array, Array]:
     """Results of ``aspect`` for an array of curvature ratios: three arrays of the same shape."""
-    ratio_and_integrals = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
+    ratio_and_integrals = _aspects(np.ascontiguousarray(curvature_ratios).ravel()).reshape(3, *curvature_ratios.shape)
     return ratio_and_integrals[0], ratio_and_integrals[1], ratio_and_integrals[2]
 
 
 @njit(cache=True)
-def _aspects(curvatures: Array) -> Array:
-    results = np.empty((3, curvatures.size))
-    for i in range(curvatures.size):
-        results[0, i], results[1, i], results[2, i] = aspect(curvatures[i])
+def _aspects(curvature_ratios: Array) -> Array:
+    results = np.empty((3, curvature_ratios.size))
+    for i in range(curvature_ratios.size):
+        results[0, i], results[1, i], results[2, i] = aspect(curvature_ratios[i])
     return results
 
 
 @njit(cache=True)
-def aspect(curvatures: float) -> tuple[float, float, float]:
+def aspect(curvature_ratio: float) -> tuple[float, float, float]:
     """Ratio g of the short to the long semi-axis of a Hertzian ellipse, and the elliptic integrals B and D at this g.
 
-    curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
+    curvature_ratio : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
     ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.
     """
-    g = curvatures ** (2.0 / 3.0)
+    g = curvature_ratio ** (2.0 / 3.0)
     for _ in range(50):
         cosine, sine = integrals(g)
         e2 = (1.0 - g) * (1.0 + g)
         third = (sine - cosine) / e2 if e2 > 1e-4 else math.pi / 16.0
         slope = 1.0 + third * (1.0 / sine + g * g / cosine)
-        step = math.log(g * g * sine / cosine / curvatures) / slope
+        step = math.log(g * g * sine / cosine / curvature_ratio) / slope
         g = min(g * math.exp(-step), 1.0)
         if abs(step) < 1e-9:  # the next step would be the square of this
             break
@@ -179,11 +185,11 @@ def aspect(curvatures: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True)
-def integrals(g: float) -> tuple[float, float]:
+def integrals(axis_ratio: float) -> tuple[float, float]:
     """Elliptic integrals B and D (formulas in this module's docstring) at g = sqrt(1 - e^2), 0 < g <= 1, exact to
     rounding.
     """
-    other, mean = g, 1.0
+    other, mean = axis_ratio, 1.0
     a_b, b_b, a_d, b_d = 1.0, 0.0, 0.0, 1.0  # the integrands as (a cos^2 + b sin^2) / sqrt(...)
     while True:
         a_b, b_b = a_b + b_b / mean, 2.0 * (b_b + a_b * other)

@@ -44,14 +44,14 @@ class Pointer:
         return int(self.net.ctypes.data)
 
 
-def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
-    """Pointer to the compiled contact with the grid table for ``cells`` cells per strip, or 0 for the linear theory.
+def pointer(cell_count: int = 21, undeformed_distance: Distance | None = None) -> Pointer:
+    """Pointer to the compiled contact with the grid table for ``cell_count`` cells per strip, or 0 for the linear theory.
     Raises InputError.
 
-    distance : of bodies whose contact is no ellipse; then the table is theirs, for Kalker's theory of 1983.
+    undeformed_distance : of bodies whose contact is no ellipse; then the table is theirs, for Kalker's theory of 1983.
     """
     compiled = _compiled()
-    mesh = net(cells) if distance is None else table(distance, cells)
+    mesh = net(cell_count) if undeformed_distance is None else table(undeformed_distance, cell_count)
     return Pointer(int(compiled.address), mesh, compiled.ctypes)
 
 
@@ -62,7 +62,7 @@ def _compiled() -> Any:
     """
 
     @cfunc(SIGNATURE, error_model="numpy")
-    def twinrig_contact(kind, table, inputs, outputs):
-        return contact(kind, inputs, table, outputs)
+    def twinrig_contact(input_kind, table_pointer, input_pointer, output_pointer):
+        return contact(input_kind, input_pointer, table_pointer, output_pointer)
 
     return twinrig_contact

@@ -63,19 +63,21 @@ class Coefficients:
     c33: Array
 
 
-def coefficients(ratio: Any, nu: Any) -> Coefficients:
+def coefficients(axis_ratio: Any, nu: Any) -> Coefficients:
     """Kalker's creepage and spin coefficients for axis ratios and Poisson's ratios.
 
-    ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
+    axis_ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
 
     Between the nodes of the table ln C is a cubic of ln(a/b), and 1/C (of C33 the power 3/4) a parabola of nu. Below
     a/b = 0.1 and above 10 Kalker's asymptotes for slender patches hold, times a factor that makes them meet the table
     and goes to 1 with the slenderness: good to 3 %, seen from 1/30 to 30. C33 above 10 has nodes of its own up to 100,
     good to 10 %; beyond, their last slope goes on, which nothing was held against.
     """
-    ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
-    ratio, nu = broadcast_together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
-    values_of_each = _coefficients_of_each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
+    axis_ratio = quantity("ratio", axis_ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
+    axis_ratio, nu = broadcast_together(
+        ratio=axis_ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5)
+    )
+    values_of_each = _coefficients_of_each(axis_ratio.flatten(), nu.flatten()).reshape(4, *axis_ratio.shape)
     return Coefficients(*(values[()] for values in values_of_each))
 
 
@@ -121,30 +123,30 @@ def _axes(a: Any, b: Any) -> tuple[Array, ...]:
 
 
 @njit(cache=True)
-def _coefficients_of_each(ratio: Array, nu: Array) -> Array:
-    answer = np.empty((4, ratio.size))
-    for i in range(ratio.size):
+def _coefficients_of_each(axis_ratio: Array, nu: Array) -> Array:
+    answer = np.empty((4, axis_ratio.size))
+    for i in range(axis_ratio.size):
         for kind in range(4):
-            answer[kind, i] = coefficient_at(kind, ratio[i], nu[i])
+            answer[kind, i] = coefficient_at(kind, axis_ratio[i], nu[i])
     return answer
 
 
 @njit(cache=True)
-def _flexibilities_of_each(a: Array, b: Array, modulus: float, nu: float) -> Array:
+def _flexibilities_of_each(a: Array, b: Array, shear_modulus: float, nu: float) -> Array:
     answer = np.empty((3, a.size))
     for i in range(a.size):
-        answer[0, i], answer[1, i], answer[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
+        answer[0, i], answer[1, i], answer[2, i] = flexibilities_at(a[i], b[i], shear_modulus, nu)
     return answer
 
 
 @njit(cache=True)
-def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[float, float, float]:
-    """Flexibilities L1, L2, L3 (m^3/N) of one patch, ``modulus`` : shear modulus G (Pa); for compiled callers, nothing
+def flexibilities_at(a: float, b: float, shear_modulus: float, nu: float) -> tuple[float, float, float]:
+    """Flexibilities L1, L2, L3 (m^3/N) of one patch, ``shear_modulus`` : shear modulus G (Pa); for compiled callers, nothing
     is checked.
     """
     if a <= 0.0 or b <= 0.0:
         return 0.0, 0.0, 0.0
-    unit = a / modulus
+    unit = a / shear_modulus
     along = across = turning = 0.0
     for kind in range(3):  # a loop, as numba compiles one function for each number that is written out
         c = coefficient_at(kind, a / b, nu)
@@ -158,36 +160,36 @@ def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[flo
 
 
 @njit(cache=True)
-def coefficient_at(kind: int, ratio: float, nu: float) -> float:
+def coefficient_at(coefficient_index: int, axis_ratio: float, nu: float) -> float:
     """Kalker's coefficient C11, C22, C23 or C33 (kind 0 to 3) of one patch; for compiled callers, nothing is
     checked.
     """
-    inner = min(max(ratio, RATIOS[0]), RATIOS[-1])
-    coefficient = _tabulated(kind, inner, nu)
-    if inner == ratio:
+    inner = min(max(axis_ratio, RATIOS[0]), RATIOS[-1])
+    coefficient = _tabulated(coefficient_index, inner, nu)
+    if inner == axis_ratio:
         return coefficient
-    if ratio < 1.0:
-        excess = coefficient / _narrow_limit(kind, inner, nu) - 1.0
-        return _narrow_limit(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
-    excess = coefficient / _long_limit(kind, inner, nu) - 1.0
-    return _long_limit(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
+    if axis_ratio < 1.0:
+        excess = coefficient / _narrow_limit(coefficient_index, inner, nu) - 1.0
+        return _narrow_limit(coefficient_index, axis_ratio, nu) * (1.0 + excess * (axis_ratio / inner) ** NARROW_FADING)
+    excess = coefficient / _long_limit(coefficient_index, inner, nu) - 1.0
+    return _long_limit(coefficient_index, axis_ratio, nu) * (1.0 + excess * (inner / axis_ratio) ** LONG_FADING)
 
 
 @njit(cache=True)
-def _tabulated(kind: int, ratio: float, nu: float) -> float:
+def _tabulated(coefficient_index: int, axis_ratio: float, nu: float) -> float:
     """Kalker's coefficient from the table: cubic Hermite interpolation of ln C in ln(a/b), then the parabola of a power
     of C through nu = 0, 1/4, 1/2.
     """
     i = 0
-    while i < RATIOS.size - 2 and RATIOS[i + 1] <= ratio:
+    while i < RATIOS.size - 2 and RATIOS[i + 1] <= axis_ratio:
         i += 1
     width = math.log(RATIOS[i + 1] / RATIOS[i])
-    t = math.log(ratio / RATIOS[i]) / width
+    t = math.log(axis_ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    power, power_mean = POWERS[kind], 0.0
+    power, power_mean = POWERS[coefficient_index], 0.0
     for k, weight in enumerate(_parabola(nu)):
-        logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
-        logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
+        logarithm = (1.0 - rise) * LOGARITHMS[i, coefficient_index, k] + rise * LOGARITHMS[i + 1, coefficient_index, k]
+        logarithm += low * SLOPES[i, coefficient_index, k] + high * SLOPES[i + 1, coefficient_index, k]
         power_mean += weight * math.exp(power * logarithm)
     return power_mean ** (1.0 / power)
 
@@ -200,32 +202,32 @@ def _parabola(nu: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True)
-def _narrow_limit(kind: int, ratio: float, nu: float) -> float:
+def _narrow_limit(coefficient_index: int, axis_ratio: float, nu: float) -> float:
     """Asymptote of a coefficient for patches much shorter than wide, a/b = g to 0 (Kalker 1990, table E.3, first
     row).
     """
-    if kind == 0:
+    if coefficient_index == 0:
         return math.pi**2 / (4.0 * (1.0 - nu))
-    if kind == 1:
+    if coefficient_index == 1:
         return math.pi**2 / 4.0
-    if kind == 2:
-        return math.pi * math.sqrt(ratio) / (3.0 * (1.0 - nu)) * (1.0 + nu * (math.log(16.0 / ratio) - 5.0))
-    return math.pi**2 / (16.0 * (1.0 - nu) * ratio)
+    if coefficient_index == 2:
+        return math.pi * math.sqrt(axis_ratio) / (3.0 * (1.0 - nu)) * (1.0 + nu * (math.log(16.0 / axis_ratio) - 5.0))
+    return math.pi**2 / (16.0 * (1.0 - nu) * axis_ratio)
 
 
 @njit(cache=True)
-def _long_limit(kind: int, ratio: float, nu: float) -> float:
+def _long_limit(coefficient_index: int, axis_ratio: float, nu: float) -> float:
     """Asymptote of a coefficient for patches much longer than wide, b/a = g to 0 (the same table, last row)."""
-    wide = 2.0 * math.log(4.0 * ratio)
+    wide = 2.0 * math.log(4.0 * axis_ratio)
     divisor, two, three = wide - 2.0 * nu, (1.0 - nu) * wide + 2.0 * nu, (1.0 - nu) * wide - 2.0 + 4.0 * nu
-    if kind == 0:
-        return 2.0 * math.pi * ratio / divisor * (1.0 + (3.0 - math.log(4.0)) / divisor)
-    if kind == 1:
-        return 2.0 * math.pi * ratio / two * (1.0 + (1.0 - nu) * (3.0 - math.log(4.0)) / two)
-    if kind == 2:
-        return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
-    i = min(max(int(np.searchsorted(LONG_RATIOS, ratio)) - 1, 0), LONG_RATIOS.size - 2)
-    t = math.log(ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
+    if coefficient_index == 0:
+        return 2.0 * math.pi * axis_ratio / divisor * (1.0 + (3.0 - math.log(4.0)) / divisor)
+    if coefficient_index == 1:
+        return 2.0 * math.pi * axis_ratio / two * (1.0 + (1.0 - nu) * (3.0 - math.log(4.0)) / two)
+    if coefficient_index == 2:
+        return 2.0 * math.pi * axis_ratio**1.5 / (3.0 * three)
+    i = min(max(int(np.searchsorted(LONG_RATIOS, axis_ratio)) - 1, 0), LONG_RATIOS.size - 2)
+    t = math.log(axis_ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
     power, power_mean = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
     for k, weight in enumerate(_parabola(nu)):
         power_mean += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power

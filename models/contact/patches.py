@@ -115,33 +115,33 @@ def no_bottom() -> InputError:
     )
 
 
-def separate(distance: Distance) -> list[Patch]:
+def separate(undeformed_distance: Distance) -> list[Patch]:
     """The valleys of an undeformed distance as patches, in order of ascending y (then x). Every ridge higher than
     ``RIDGE`` separates two of them.
     """
     return [
         Patch(part, (*along_x, *along_y))
-        for row, along_y in _parts_between_ridges(distance, 1)
+        for row, along_y in _parts_between_ridges(undeformed_distance, 1)
         for part, along_x in _parts_between_ridges(row, 0)
     ]
 
 
-def single_patch_of(distance: Distance) -> list[Patch]:
+def single_patch_of(undeformed_distance: Distance) -> list[Patch]:
     """The undeformed distance treated as a single patch, even if it has several minima."""
-    return [Patch(distance)]
+    return [Patch(undeformed_distance)]
 
 
-def _parts_between_ridges(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
+def _parts_between_ridges(undeformed_distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
     """Parts of the distance, split at ridges along an axis (0: x, 1: y), each with flags on whether its two ends are
     cuts.
     """
-    lines, least, _ = distance.valley_y if axis else distance.valley_x
-    nodes, parts, everything = distance.y if axis else distance.x, [], slice(None)
+    lines, least, _ = undeformed_distance.valley_y if axis else undeformed_distance.valley_x
+    nodes, parts, everything = undeformed_distance.y if axis else undeformed_distance.x, [], slice(None)
     inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least)]
     for a, b in pairwise([0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]):
         if b - a >= 3:
             some = slice(a, b + 1)
-            part = distance.part(everything, some) if axis else distance.part(some, everything)
+            part = undeformed_distance.part(everything, some) if axis else undeformed_distance.part(some, everything)
             parts.append((part, (a > 0, b < nodes.size - 1)))
     return parts
 
@@ -165,14 +165,20 @@ def ridges(heights: Array) -> list[int]:
     return maxima
 
 
-def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:
+def _vertex(undeformed_distance: Distance, x: float, y: float, axis: int) -> float:
     """Position (m) of the minimum, along an axis, of the parabola through three nearby points; the given position if
     there is none.
     """
-    nodes, here, step = (distance.y, y, distance.dy) if axis else (distance.x, x, distance.dx)
+    nodes, here, step = (
+        (undeformed_distance.y, y, undeformed_distance.dy)
+        if axis
+        else (undeformed_distance.x, x, undeformed_distance.dx)
+    )
     middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
     points = middle + np.array([-0.25, 0.0, 0.25]) * step
-    left, centre, right = distance.at(points if not axis else np.full(3, x), np.full(3, y) if not axis else points)
+    left, centre, right = undeformed_distance.at(
+        points if not axis else np.full(3, x), np.full(3, y) if not axis else points
+    )
     curvature = left - 2.0 * centre + right
     if curvature <= 0.0:
         return here

@@ -33,19 +33,19 @@ class SlipOperator:
 
     def __init__(
         self,
-        columns: int,
-        rows: int,
+        column_count: int,
+        row_count: int,
         dx: float,
         dy: float,
         material_pair: MaterialPair,
-        weights: tuple[float, ...] = UPSTREAM,
+        difference_weights: tuple[float, ...] = UPSTREAM,
     ) -> None:
-        x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
-        ahead = np.append(x, x[-1] + dx * np.arange(1, len(weights)))
+        x, y = offsets(column_count, dx), offsets(row_count, dy)[:, None]
+        ahead = np.append(x, x[-1] + dx * np.arange(1, len(difference_weights)))
         displacement = influence(ahead, y, dx, dy, material_pair)[..., : Y + 1, : Y + 1] * (material_pair.G / dx)
-        parts = [weight * displacement[:, i : i + len(x)] for i, weight in enumerate(weights)]
+        parts = [weight * displacement[:, i : i + len(x)] for i, weight in enumerate(difference_weights)]
         self.kernel = np.sum(parts, axis=0)
-        self.rows, self.columns = rows, columns
+        self.rows, self.columns = row_count, column_count
         self._convolution = Convolution(self.kernel)
 
     def __call__(self, traction: Array) -> Array:
@@ -75,10 +75,12 @@ class SlipOperator:
 Map = Callable[[Array], Array]
 
 
-def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: float, maximum_iterations: int) -> Array:
+def gmres(
+    apply_matrix: Map, apply_preconditioner: Map, right_hand_side: Array, tolerance: float, product_limit: int
+) -> Array:
     """Solution x with |apply(x) - b| <= tolerance |b| by preconditioned GMRES; b is the right-hand side (n,).
 
-    Raises RunFailed after ``maximum_iterations`` products.
+    Raises RunFailed after ``product_limit`` products.
 
     GMRES (Saad and Schultz, 1986), preconditioned from the right. Its own loops instead of a library's, whose calls of
     threaded linear algebra on short vectors stall on busy cores.
@@ -87,21 +89,24 @@ def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: floa
     if size == 0.0:
         return np.zeros_like(right_hand_side)
     basis, triangle, turns = (
-        np.empty((maximum_iterations + 1, right_hand_side.size)),
-        np.zeros((maximum_iterations, maximum_iterations)),
-        np.empty((maximum_iterations, 2)),
+        np.empty((product_limit + 1, right_hand_side.size)),
+        np.zeros((product_limit, product_limit)),
+        np.empty((product_limit, 2)),
     )
-    residual_components = np.append(size, np.zeros(maximum_iterations))
+    residual_components = np.append(size, np.zeros(product_limit))
     basis[0] = right_hand_side / size
-    for count in range(1, maximum_iterations + 1):
+    for count in range(1, product_limit + 1):
         triangle[:count, count - 1] = rotate_column(
-            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, residual_components
+            orthogonalise(basis, count, apply_matrix(apply_preconditioner(basis[count - 1]))),
+            turns,
+            residual_components,
         )
         if abs(residual_components[count]) <= tolerance * size:
-            return precondition(np.linalg.solve(triangle[:count, :count], residual_components[:count]) @ basis[:count])
+            return apply_preconditioner(
+                np.linalg.solve(triangle[:count, :count], residual_components[:count]) @ basis[:count]
+            )
     raise RunFailed(
-        "linear solver",
-        f"residual {abs(residual_components[maximum_iterations]) / size:.2g} after {maximum_iterations} products",
+        "linear solver", f"residual {abs(residual_components[product_limit]) / size:.2g} after {product_limit} products"
     )
 
 
@@ -111,13 +116,13 @@ class FreeSystem:
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
 
-    def __init__(self, operator: SlipOperator, free_directions: Array, stiff: Array) -> None:
-        """free_directions : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny,
+    def __init__(self, slip_operator: SlipOperator, free_directions: Array, added_stiffness: Array) -> None:
+        """free_directions : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. added_stiffness : (ny,
         nx).
         """
-        self.operator, self.free, self.stiff = operator, free_directions, stiff[..., None]
+        self.operator, self.free, self.stiff = slip_operator, free_directions, added_stiffness[..., None]
         self.scale = 1.0 / (
-            operator.own_slip.max() + self.stiff
+            slip_operator.own_slip.max() + self.stiff
         )  # a cell near the edge is many times stiffer than others
         self.factors = self._strips()
         inside = np.any(free_directions, axis=(2, 3))
@@ -144,12 +149,12 @@ class FreeSystem:
         right = (self.scale * _times(self.free, _times(self.free, right_hand_side))).ravel()
         return gmres(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(right_hand_side.shape)
 
-    def _apply(self, flat: Array) -> Array:
-        change = flat.reshape(*self.scale.shape[:2], 2)
+    def _apply(self, flat_traction: Array) -> Array:
+        change = flat_traction.reshape(*self.scale.shape[:2], 2)
         return (self.scale * _times(self.free, self.operator(change) + self.stiff * change)).ravel()
 
-    def _precondition(self, flat: Array) -> Array:
-        scaled = flat.reshape(*self.scale.shape[:2], 2) / self.scale
+    def _precondition(self, flat_traction: Array) -> Array:
+        scaled = flat_traction.reshape(*self.scale.shape[:2], 2) / self.scale
         return substitute(self.factors, self.spans, scaled.reshape(len(scaled), -1)).ravel()
 
 

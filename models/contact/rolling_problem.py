@@ -121,7 +121,11 @@ def solve_shift(
 
 
 def _stick_slip_solution(
-    normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
+    normal_solution: PressureGrid,
+    mu: float,
+    rigid_slip_of_grid: RigidSlip,
+    material_pair: MaterialPair,
+    difference_weights: tuple[float, ...],
 ) -> RollingSolution:
     """Solution of stick and slip for the given rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
@@ -136,7 +140,7 @@ def _stick_slip_solution(
     rows, columns = box = tuple(slice(span[0], span[-1] + 1) for span in spans)
     bound = mu * normal_solution.pressure[box] / material_pair.G
     cells = _Cells(normal_solution.x[columns], normal_solution.y[rows], normal_solution.dx, normal_solution.dy, bound)
-    state, rounds = _solve(cells, rigid, material_pair, weights)
+    state, rounds = _solve(cells, rigid_slip_of_grid, material_pair, difference_weights)
     slips = ~state.stick & (state.bound > 0)
     traction[box], stick[box], slip[box] = material_pair.G * state.traction, state.stick, state.slip * slips[..., None]
     cell = normal_solution.dx * normal_solution.dy
@@ -159,14 +163,16 @@ class _State:
     slip conditions.
     """
 
-    def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
-        self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
-        self.slip = rigid + operator(traction)
-        self.trial = traction - self.slip / operator.own_slip.max()
+    def __init__(
+        self, slip_operator: SlipOperator, rigid_slips: Array, traction_bounds: Array, traction: Array
+    ) -> None:
+        self.operator, self.rigid, self.bound, self.traction = slip_operator, rigid_slips, traction_bounds, traction
+        self.slip = rigid_slips + slip_operator(traction)
+        self.trial = traction - self.slip / slip_operator.own_slip.max()
         self.size = np.linalg.norm(self.trial, axis=-1)
-        cut = np.where(self.size > bound, bound / np.where(self.size > 0, self.size, 1.0), 1.0)
+        cut = np.where(self.size > traction_bounds, traction_bounds / np.where(self.size > 0, self.size, 1.0), 1.0)
         needed = self.trial * cut[..., None] - traction
-        self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
+        self.residual = float(np.linalg.norm(needed, axis=-1)[traction_bounds > 0].max() / traction_bounds.max())
 
     def with_tractions(self, traction: Array) -> "_State":
         """A new state of the cells with other tractions."""
@@ -206,18 +212,20 @@ class _Cells:
 
 
 def _solve(
-    cells: _Cells, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
+    cell_grid: _Cells, rigid_slip_of_grid: RigidSlip, material_pair: MaterialPair, difference_weights: tuple[float, ...]
 ) -> tuple[_State, int]:
     """State in which all stick and slip conditions hold, and the number of rounds on this grid; a coarser grid gives
     its start.
     """
-    bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
-    operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
+    bound, motion = cell_grid.bound, rigid_slip_of_grid(cell_grid.x, cell_grid.y, cell_grid.dx)
+    operator = SlipOperator(
+        bound.shape[1], bound.shape[0], cell_grid.dx, cell_grid.dy, material_pair, difference_weights
+    )
     zero_state = _State(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST_CELLS:
         return _solve_tractions(zero_state)
-    coarse = cells.coarser()
-    coarse_tractions = _solve(coarse, rigid, material_pair, weights)[0].traction
+    coarse = cell_grid.coarser()
+    coarse_tractions = _solve(coarse, rigid_slip_of_grid, material_pair, difference_weights)[0].traction
     relative = _at_quarter_cells(coarse_tractions / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
     state = zero_state.with_tractions(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
     for step in range(MOST_STEPS):
@@ -227,65 +235,67 @@ def _solve(
     return _solve_tractions(_nearest(state, zero_state))
 
 
-def _nearest(*states: _State) -> _State:
+def _nearest(*cell_states: _State) -> _State:
     """The state with the smallest residual."""
-    return min(states, key=lambda state: state.residual)
+    return min(cell_states, key=lambda state: state.residual)
 
 
-def _at_quarter_cells(values: Array) -> Array:
+def _at_quarter_cells(cell_values: Array) -> Array:
     """Values (2 ny, 2 nx, 2) in the quarters of cells, linear between the cells' centres, from values (ny, nx, 2)."""
     for axis in (0, 1):
-        ends = np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
+        ends = np.pad(cell_values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
         before, here, after = (np.delete(ends, outer, axis) for outer in ([-1, -2], [0, -1], [0, 1]))
         pairs = np.stack([0.75 * here + 0.25 * before, 0.75 * here + 0.25 * after], axis=axis + 1)
-        values = pairs.reshape([2 * n if k == axis else n for k, n in enumerate(values.shape)])
-    return values
+        cell_values = pairs.reshape([2 * n if k == axis else n for k, n in enumerate(cell_values.shape)])
+    return cell_values
 
 
-def _solve_tractions(state: _State) -> tuple[_State, int]:
+def _solve_tractions(cell_state: _State) -> tuple[_State, int]:
     """State that satisfies all stick and slip conditions, by alternating sweeps and Newton steps, and the number of
     rounds."""
     relaxation, round_count = RELAXATION, 0
-    while state.residual > TOLERANCE:
+    while cell_state.residual > TOLERANCE:
         if round_count == MOST_ROUNDS:
             raise RunFailed(
                 "rolling problem",
-                f"conditions of stick and slip met to {state.residual:.2g} only after {MOST_ROUNDS} rounds",
+                f"conditions of stick and slip met to {cell_state.residual:.2g} only after {MOST_ROUNDS} rounds",
             )
-        traction, motion = (np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (state.traction, state.rigid))
+        traction, motion = (
+            np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (cell_state.traction, cell_state.rigid)
+        )
         for _ in range(SWEEPS):
-            sweep(traction, motion, state.operator.reversed_kernel, state.bound, relaxation)
-        swept = state.with_tractions(np.moveaxis(traction, 0, -1))
+            sweep(traction, motion, cell_state.operator.reversed_kernel, cell_state.bound, relaxation)
+        swept = cell_state.with_tractions(np.moveaxis(traction, 0, -1))
         nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _after_newton_step(swept))
-        relaxation *= 1.0 if nearest.residual < state.residual else RELAXATION_FACTOR
-        state, round_count = nearest, round_count + 1
-    return state, round_count
+        relaxation *= 1.0 if nearest.residual < cell_state.residual else RELAXATION_FACTOR
+        cell_state, round_count = nearest, round_count + 1
+    return cell_state, round_count
 
 
-def _after_newton_step(state: _State) -> _State:
+def _after_newton_step(cell_state: _State) -> _State:
     """The state after one Newton step, or the unchanged state if the linear solver fails for rounding."""
     try:
-        return state.with_tractions(_newton(state))
+        return cell_state.with_tractions(_newton(cell_state))
     except RunFailed:
-        return state
+        return cell_state
 
 
-def _newton(state: _State) -> Array:
-    """Tractions after a Newton step in which the sets of sticking and slipping cells are those of ``state``.
+def _newton(cell_state: _State) -> Array:
+    """Tractions after a Newton step in which the sets of sticking and slipping cells are those of ``cell_state``.
 
     A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is
     opposite to its slip: t.C d + (|s| / g) d = -t.s along the tangent t.
     """
-    bound, slips = state.bound, (state.size > state.bound) & (state.bound > 0)
-    opposite = state.trial / np.where(state.size > 0, state.size, 1.0)[..., None]
-    traction = np.where(slips[..., None], bound[..., None] * opposite, state.traction)
-    slip = state.rigid + state.operator(traction)
+    bound, slips = cell_state.bound, (cell_state.size > cell_state.bound) & (cell_state.bound > 0)
+    opposite = cell_state.trial / np.where(cell_state.size > 0, cell_state.size, 1.0)[..., None]
+    traction = np.where(slips[..., None], bound[..., None] * opposite, cell_state.traction)
+    slip = cell_state.rigid + cell_state.operator(traction)
     tangent = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
     free = np.where(slips[..., None, None], tangent[..., :, None] * tangent[..., None, :], np.eye(2))
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    new_tractions = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
+    new_tractions = traction + FreeSystem(cell_state.operator, free, stiff).solve(-slip)
     size = np.linalg.norm(new_tractions, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
     return new_tractions * onto[..., None]

@@ -159,7 +159,7 @@ def press(
     *,
     load: float | None = None,
     approach: float | None = None,
-    options: SimplifiedOptions = PLAIN,
+    simplified_options: SimplifiedOptions = PLAIN,
 ) -> NormalContact:
     """Normal contact of two bodies under a load (N), or at a rigid approach (m): area, pressure and approach.
 
@@ -171,7 +171,7 @@ def press(
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load in N or the approach in m")
     if isinstance(bodies, Distance):
-        bodies = separate(bodies) if options.separate else single_patch_of(bodies)
+        bodies = separate(bodies) if simplified_options.separate else single_patch_of(bodies)
     patches = list(bodies)
     if not patches:
         raise InputError("", "bodies", bodies, "must be an undeformed distance, or one patch at least")
@@ -179,29 +179,33 @@ def press(
     if load is not None:
         wanted = number("load", load, "a load in N, up to 1e9", -1e9, 1e9)
         if wanted <= 0.0:
-            return _sum_of_patches(lowest, (), material_pair, options)
-        return _by_load(patches, lowest, wanted, material_pair, options)
+            return _sum_of_patches(lowest, (), material_pair, simplified_options)
+        return _by_load(patches, lowest, wanted, material_pair, simplified_options)
     reached = number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
     if reached <= lowest:
-        return _sum_of_patches(reached, (), material_pair, options)
-    return _patches_at_common_approach(patches, reached, None, material_pair, options)
+        return _sum_of_patches(reached, (), material_pair, simplified_options)
+    return _patches_at_common_approach(patches, reached, None, material_pair, simplified_options)
 
 
 def load_at_depth(
-    patch: Patch, depth: float, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN
+    patch: Patch, depth: float, material_pair: MaterialPair, simplified_options: SimplifiedOptions = PLAIN
 ) -> PatchPressure:
     """Load and approach of one patch at a depth d = -a_3 (m), the paper's N(a_3); W_3 is fitted on the coarse grid."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
-    stiffness, approach, volume = coarse_fit(patch.surface(depth), *options.numbers, material_pair.modulus)
+    stiffness, approach, volume = coarse_fit(patch.surface(depth), *simplified_options.numbers, material_pair.modulus)
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
 
 
 def _by_load(
-    patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
+    patches: list[Patch],
+    lowest_depth: float,
+    load: float,
+    material_pair: MaterialPair,
+    simplified_options: SimplifiedOptions,
 ) -> NormalContact:
     """Normal contact that carries a load (N): the depth of a single patch, or the depths and common approach of
     several.
@@ -209,43 +213,48 @@ def _by_load(
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
-            lambda d: along * load_at_depth(patch, d, material_pair, options).load, load, patch.low, patch.edge
+            lambda d: along * load_at_depth(patch, d, material_pair, simplified_options).load,
+            load,
+            patch.low,
+            patch.edge,
         )
-        alone = load_at_depth(patch, depth, material_pair, options)
-        return _sum_of_patches(alone.approach / along, (alone,), material_pair, options)
+        alone = load_at_depth(patch, depth, material_pair, simplified_options)
+        return _sum_of_patches(alone.approach / along, (alone,), material_pair, simplified_options)
 
-    def alone_at(reached: float) -> float:
-        depths = zip(patches, _rough_depths(patches, reached), strict=True)
-        return _total_load([load_at_depth(patch, depth, material_pair, options) for patch, depth in depths])
+    def alone_at(load_depth: float) -> float:
+        depths = zip(patches, _rough_depths(patches, load_depth), strict=True)
+        return _total_load([load_at_depth(patch, depth, material_pair, simplified_options) for patch, depth in depths])
 
     return _patches_at_common_approach(
-        patches, _depth_for_load(alone_at, load, lowest, np.inf), load, material_pair, options
+        patches, _depth_for_load(alone_at, load, lowest_depth, np.inf), load, material_pair, simplified_options
     )
 
 
-def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
-    """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until the load is exceeded, then
+def _depth_for_load(load_at: Callable[[float], float], load: float, lowest_depth: float, largest_depth: float) -> float:
+    """Depth or approach (m) above ``lowest_depth`` at which the load is carried: doubled until the load is exceeded, then
     refined by Brent's method.
     """
-    if limit - lowest <= NO_DEPTH:
+    if largest_depth - lowest_depth <= NO_DEPTH:
         raise no_bottom()
-    low, high = 0.0, min(1e-6, limit - lowest)
-    while load_at(lowest + high) < load:
-        if lowest + high >= limit:
+    low, high = 0.0, min(1e-6, largest_depth - lowest_depth)
+    while load_at(lowest_depth + high) < load:
+        if lowest_depth + high >= largest_depth:
             raise InputError(
                 "",
                 "load",
                 load,
                 "makes contact reach the edge of the area over which the distance is "
-                f"known (there it carries {load_at(limit):.4g} N): give a larger area",
+                f"known (there it carries {load_at(largest_depth):.4g} N): give a larger area",
             )
-        low, high = high, min(2.0 * high, limit - lowest)
-    return lowest + float(brentq(lambda over: load_at(lowest + over) - load, low, high, xtol=1e-20, rtol=1e-14))
+        low, high = high, min(2.0 * high, largest_depth - lowest_depth)
+    return lowest_depth + float(
+        brentq(lambda over: load_at(lowest_depth + over) - load, low, high, xtol=1e-20, rtol=1e-14)
+    )
 
 
-def _total_load(parts: Sequence[PatchPressure]) -> float:
+def _total_load(patch_pressures: Sequence[PatchPressure]) -> float:
     """Sum of the patches' loads (N) along the common direction."""
-    return float(sum(part.load * np.cos(part.patch.lean) for part in parts))
+    return float(sum(part.load * np.cos(part.patch.lean) for part in patch_pressures))
 
 
 def _rough_depths(patches: list[Patch], approach: float) -> list[float]:
@@ -257,40 +266,57 @@ def _rough_depths(patches: list[Patch], approach: float) -> list[float]:
 
 
 def _patches_at_common_approach(
-    patches: list[Patch], approach: float, load: float | None, material_pair: MaterialPair, options: SimplifiedOptions
+    patches: list[Patch],
+    approach: float,
+    load: float | None,
+    material_pair: MaterialPair,
+    simplified_options: SimplifiedOptions,
 ) -> NormalContact:
     """Patches at their common approach (m); if a load (N) is given, the approach that carries it is found from here."""
     start = np.array([*_rough_depths(patches, approach), approach])
-    (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, material_pair, options.numbers)
+    (*depths, reached), stiffnesses, loads = solve_depths(
+        patches, start, load, material_pair, simplified_options.numbers
+    )
     parts = []
     for patch, depth, stiffness, carried in zip(patches, map(float, depths), stiffnesses, loads, strict=True):
         if carried > 0.0:
             along = float(reached * np.cos(patch.lean))
             parts.append(PatchPressure(patch, depth, float(stiffness), along, float(carried), patch.box(depth)))
-    return _sum_of_patches(float(reached), tuple(parts), material_pair, options)
+    return _sum_of_patches(float(reached), tuple(parts), material_pair, simplified_options)
 
 
 def _sum_of_patches(
-    approach: float, parts: tuple[PatchPressure, ...], material_pair: MaterialPair, options: SimplifiedOptions
+    approach: float,
+    patch_pressures: tuple[PatchPressure, ...],
+    material_pair: MaterialPair,
+    simplified_options: SimplifiedOptions,
 ) -> NormalContact:
     """Normal contact summed over the patches; area and peak pressure come from strips with exact ends."""
-    area = sum(_area(part) for part in parts)
-    peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
-    return NormalContact(approach, _total_load(parts), area, peak, parts, material_pair, options)
+    area = sum(_area(part) for part in patch_pressures)
+    peak = max((part.stiffness * (part.depth - part.patch.low) for part in patch_pressures), default=0.0)
+    return NormalContact(
+        approach, _total_load(patch_pressures), area, peak, patch_pressures, material_pair, simplified_options
+    )
 
 
-def _area(patch: PatchPressure, rows: int = 100) -> float:
+def _area(patch: PatchPressure, line_count: int = 100) -> float:
     """Area (m^2) of one contact patch."""
-    net = strips(patch.patch.surface(patch.depth), rows, 1, PARABOLIC)
-    return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / rows) if net.y.size else 0.0
+    net = strips(patch.patch.surface(patch.depth), line_count, 1, PARABOLIC)
+    return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / line_count) if net.y.size else 0.0
 
 
 def roll(
-    normal_contact: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = FINE_CELLS
+    normal_contact: NormalContact,
+    friction: float,
+    xi_x: float,
+    xi_y: float,
+    spin: float,
+    *,
+    cell_count: int = FINE_CELLS,
 ) -> Rolling:
     """Forces of steady rolling: FASTSIM twice on the fine grid of each patch, W_1 = W_2 refitted in between.
 
-    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
+    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cell_count : strips, and cells in each, 3 or more. Spin and
     moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
     creepages differ. Raises InputError for what is not one finite number, a friction below zero, too few cells, or
     bodies too unlike for the slip that their pressure makes to be left out.
@@ -298,8 +324,8 @@ def roll(
     normal_contact.pair.require_likeness()
     friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     motion = tuple(creepages(xi_x, xi_y, spin, number).values())
-    cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
-    fine = [_fine_strips(part, normal_contact.options, cells) for part in normal_contact.patches]
+    cell_count = whole_number("cells", cell_count, LEAST_CELLS, MOST_CELLS)
+    fine = [_fine_strips(part, normal_contact.options, cell_count) for part in normal_contact.patches]
     tractions = [np.zeros((*net.pressure.shape, 2)) for net in fine]
     tractions_on_coarse_cells = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
@@ -318,10 +344,10 @@ def roll(
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
+def _fine_strips(patch: PatchPressure, simplified_options: SimplifiedOptions, cell_count: int) -> FineNet:
     """``FineNet`` of a patch whose pressure carries its load, as ``march`` expects it."""
-    net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
-    carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
+    net = strips(patch.patch.surface(patch.depth), cell_count, cell_count, SHAPES[simplified_options.shape])
+    carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cell_count
     net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
     return net
 
@@ -344,9 +370,9 @@ def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[flo
     return flexibilities
 
 
-def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
+def _fields(fine_net: FineNet, traction: Array, friction: float) -> Fields:
     """Pressure, tractions and slip in each cell of each strip of a patch."""
-    y, low, high, width, pressure = net
+    y, low, high, width, pressure = fine_net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]
     x = high[:, None] - (np.arange(shape[1]) + 0.5) * length

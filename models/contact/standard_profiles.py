@@ -114,9 +114,9 @@ WHEELS = {"S1002": s1002}
 RAILS = {"UIC60": uic60}
 
 
-def built_in(name: str) -> ContactProfile:
+def built_in(profile_name: str) -> ContactProfile:
     """The built-in wheel or rail profile of this name; raises InputError that lists the names."""
     known = WHEELS | RAILS
-    if name not in known:
-        raise InputError("", "profile", name, "is not built in", tuple(known))
-    return known[name]()
+    if profile_name not in known:
+        raise InputError("", "profile", profile_name, "is not built in", tuple(known))
+    return known[profile_name]()

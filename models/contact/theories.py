@@ -63,8 +63,8 @@ class RollingContact(ABC):
 
     order = 1.0
 
-    def __init__(self, pressing: Pressing, friction: float, material_pair: MaterialPair) -> None:
-        self.pressing, self.friction, self.pair = pressing, friction, material_pair
+    def __init__(self, normal_result: Pressing, friction: float, material_pair: MaterialPair) -> None:
+        self.pressing, self.friction, self.pair = normal_result, friction, material_pair
 
     @property
     @abstractmethod
@@ -72,8 +72,8 @@ class RollingContact(ABC):
         """Largest distance (m), along an axis, between the reference point of moments and the edge of the contact."""
 
     @abstractmethod
-    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Contact forces at the given creepages and spin; with ``fields``, also pressure, traction and slip in every
+    def roll(self, creepages: Motion, cell_count: int, *, with_fields: bool = False) -> Rolled:
+        """Contact forces at the given creepages and spin; with ``with_fields``, also pressure, traction and slip in every
         cell of each patch.
         """
 
@@ -81,9 +81,14 @@ class RollingContact(ABC):
 class OnEllipse(RollingContact):
     """Rolling contact on the ellipse of Hertz' contact, with semi-axes a and b (m)."""
 
-    def __init__(self, hertz: Hertz, friction: float, material_pair: MaterialPair) -> None:
-        self.hertz, self.a, self.b = hertz, float(hertz.a), float(hertz.b)
-        pressing = Pressing(float(hertz.load), float(np.pi * self.a * self.b), float(hertz.p0), float(hertz.approach))
+    def __init__(self, hertz_contact: Hertz, friction: float, material_pair: MaterialPair) -> None:
+        self.hertz, self.a, self.b = hertz_contact, float(hertz_contact.a), float(hertz_contact.b)
+        pressing = Pressing(
+            float(hertz_contact.load),
+            float(np.pi * self.a * self.b),
+            float(hertz_contact.p0),
+            float(hertz_contact.approach),
+        )
         super().__init__(pressing, friction, material_pair)
 
     @property
@@ -97,20 +102,20 @@ class LinearTheory(OnEllipse):
     friction.
     """
 
-    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
+    def roll(self, creepages: Motion, cell_count: int, *, with_fields: bool = False) -> Rolled:
         """Forces of the linear theory, which has no cells and no fields."""
-        fx, fy, mz = (float(f) for f in linear_theory.forces(self.a, self.b, *motion, self.pair))
-        return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), motion)))
+        fx, fy, mz = (float(f) for f in linear_theory.forces(self.a, self.b, *creepages, self.pair))
+        return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), creepages)))
 
 
-def beyond_friction(used: np.ndarray) -> str:
-    """Warning that the linear theory's force ratios ``used`` (n,), force to mu N, exceed the friction limit; "" if none
+def beyond_friction(force_ratios: np.ndarray) -> str:
+    """Warning that the linear theory's force ratios ``force_ratios`` (n,), force to mu N, exceed the friction limit; "" if none
     does."""
-    beyond = used[used > 1.0]
+    beyond = force_ratios[force_ratios > 1.0]
     if not beyond.size:
         return ""
     return (
-        f"the linear theory's force is more than friction can carry at {beyond.size} of {used.size} creepages, up "
+        f"the linear theory's force is more than friction can carry at {beyond.size} of {force_ratios.size} creepages, up "
         f"to {beyond.max():.3g} mu N: it knows no slip"
     )
 
@@ -118,16 +123,16 @@ def beyond_friction(used: np.ndarray) -> str:
 class Fastsim(OnEllipse):
     """Rolling contact by the simplified theory of 1982, FASTSIM; ``choices`` : options of ``fastsim``."""
 
-    def __init__(self, hertz: Hertz, friction: float, material_pair: MaterialPair, **choices: Any) -> None:
-        super().__init__(hertz, friction, material_pair)
+    def __init__(self, hertz_contact: Hertz, friction: float, material_pair: MaterialPair, **choices: Any) -> None:
+        super().__init__(hertz_contact, friction, material_pair)
         self.choices = choices
         self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] != "elliptic" else 1.0
 
-    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Creep forces, computed with ``cells`` cells in each strip."""
-        ellipse = RollingEllipse(self.a, self.b, self.pressing.load, self.friction, *motion)
-        creep = fastsim(ellipse, self.pair, cells=cells, **self.choices)
-        inside = (fastsim_fields(ellipse, self.pair, cells=cells, **self.choices),) if fields else ()
+    def roll(self, creepages: Motion, cell_count: int, *, with_fields: bool = False) -> Rolled:
+        """Creep forces, computed with ``cell_count`` cells in each strip."""
+        ellipse = RollingEllipse(self.a, self.b, self.pressing.load, self.friction, *creepages)
+        creep = fastsim(ellipse, self.pair, cells=cell_count, **self.choices)
+        inside = (fastsim_fields(ellipse, self.pair, cells=cell_count, **self.choices),) if with_fields else ()
         values = creep.fx, creep.fy, creep.mz, creep.stick, creep.dissipation
         fx, fy, mz, stick, lost = (float(value) for value in values)
         return Rolled(fx, fy, mz, stick, lost, inside)
@@ -136,9 +141,11 @@ class Fastsim(OnEllipse):
 class ExactOnEllipse(OnEllipse):
     """Rolling contact by the half-space theory with Coulomb friction under Hertzian pressure."""
 
-    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Creep forces, computed with ``cells`` x ``cells`` cells around the ellipse."""
-        return _exact_sum([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
+    def roll(self, creepages: Motion, cell_count: int, *, with_fields: bool = False) -> Rolled:
+        """Creep forces, computed with ``cell_count`` x ``cell_count`` cells around the ellipse."""
+        return _exact_sum(
+            [hertzian(self.a, self.b, self.pressing.load, cell_count)], creepages, self.friction, self.pair
+        )
 
 
 class OnPatches(RollingContact):
@@ -158,11 +165,11 @@ class OnPatches(RollingContact):
         """Lever of the moment (m) for the patch with the largest extent."""
         return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
 
-    def along_contour(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
+    def along_contour(self, patch_fields: Sequence[Fields]) -> tuple[Fields, ...]:
         """Fields whose y is the position (m) along the rail's contour, so that several patches can be shown in one
         picture.
         """
-        pairs = zip(fields, self.pressed.patches, strict=True)
+        pairs = zip(patch_fields, self.pressed.patches, strict=True)
         return tuple(replace(cells, y=cells.y + part.patch.contour_position) for cells, part in pairs)
 
 
@@ -172,10 +179,10 @@ class Simplified(OnPatches):
     def __init__(self, normal_contact: NormalContact, friction: float) -> None:
         super().__init__(normal_contact, friction, normal_contact.area, normal_contact.peak, normal_contact.approach)
 
-    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Creep forces, with ``cells`` strips and as many cells per strip in each patch; fields are placed along the
+    def roll(self, creepages: Motion, cell_count: int, *, with_fields: bool = False) -> Rolled:
+        """Creep forces, with ``cell_count`` strips and as many cells per strip in each patch; fields are placed along the
         rail's contour."""
-        forces = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
+        forces = roll_simplified(self.pressed, self.friction, *creepages, cells=cell_count)
         inside = self.along_contour(forces.fields)
         return Rolled(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 
@@ -185,34 +192,36 @@ class Exact(OnPatches):
     comes from the theory of 1983.
     """
 
-    def __init__(self, normal_contact: NormalContact, friction: float, cells: int) -> None:
+    def __init__(self, normal_contact: NormalContact, friction: float, cell_count: int) -> None:
         parts = normal_contact.patches
-        grids = [_exact_pressure(part, cells, normal_contact.pair) for part in parts]
+        grids = [_exact_pressure(part, cell_count, normal_contact.pair) for part in parts]
         alone = grids[0].approach / float(np.cos(parts[0].patch.lean))
         approach = alone if len(grids) == 1 else normal_contact.approach
         peak = max(float(grid.pressure.max()) for grid in grids)
         super().__init__(normal_contact, friction, sum(grid.area for grid in grids), peak, approach)
 
-    def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Creep forces, computed with ``cells`` x ``cells`` cells around each patch."""
-        grids = [_exact_pressure(part, cells, self.pair) for part in self.pressed.patches]
-        forces = _exact_sum(grids, motion, self.friction, self.pair)
+    def roll(self, creepages: Motion, cell_count: int, *, with_fields: bool = False) -> Rolled:
+        """Creep forces, computed with ``cell_count`` x ``cell_count`` cells around each patch."""
+        grids = [_exact_pressure(part, cell_count, self.pair) for part in self.pressed.patches]
+        forces = _exact_sum(grids, creepages, self.friction, self.pair)
         return replace(forces, fields=self.along_contour(forces.fields))
 
 
-def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, material_pair: MaterialPair) -> Rolled:
+def _exact_sum(
+    pressure_grids: Sequence[PressureGrid], creepages: Motion, friction: float, material_pair: MaterialPair
+) -> Rolled:
     """Sum of the exact theory's forces over the patches, none of which is affected by the tractions of another one."""
     forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
-    for grid in grids:
-        patch, (x, y) = solve_rolling(grid, friction, *motion, material_pair), np.meshgrid(grid.x, grid.y)
+    for grid in pressure_grids:
+        patch, (x, y) = solve_rolling(grid, friction, *creepages, material_pair), np.meshgrid(grid.x, grid.y)
         forces += patch.fx, patch.fy, patch.mz
         stuck += np.count_nonzero(patch.stick & grid.contact) * grid.dx * grid.dy
         px, py = np.moveaxis(patch.traction, -1, 0)
         sizes = np.full_like(x, grid.dx), np.full_like(x, grid.dy)
         fields.append(Fields(x, y, *sizes, grid.pressure, px, py, ~patch.stick, grid.contact))
-    share = float(stuck / sum(grid.area for grid in grids))
+    share = float(stuck / sum(grid.area for grid in pressure_grids))
     fx, fy, mz = forces.tolist()
-    return Rolled(fx, fy, mz, share, -float(np.dot((fx, fy, mz), motion)), tuple(fields))
+    return Rolled(fx, fy, mz, share, -float(np.dot((fx, fy, mz), creepages)), tuple(fields))
 
 
 MARGINS = (1.2, 1.6, 2.2)
@@ -221,12 +230,15 @@ contact fits.
 """
 
 
-def _exact_pressure(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
+def _exact_pressure(patch: PatchPressure, cell_count: int, material_pair: MaterialPair) -> NormalSolution:
     """Exact pressure of one patch at the load from the simplified theory, in the patch's own coordinates."""
     (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:
-        dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free
-        x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
+        dx, dy = (
+            margin * (x1 - x0) / (cell_count - 2),
+            margin * (y1 - y0) / (cell_count - 2),
+        )  # a frame of cells stays free
+        x, y = (x0 + x1) / 2 + centres(cell_count, dx), (y0 + y1) / 2 + centres(cell_count, dy)
         inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
         try:
             return replace(solve_normal(known.at(*inside), dx, dy, material_pair, load=patch.load), x=x, y=y)

@@ -87,32 +87,41 @@ class Distance:
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod
-    def _valley(padded: Array, along: Array, across: Array, step: float) -> tuple[Array, Array, Array]:
+    def _valley(
+        padded_heights: Array, valley_coordinates: Array, other_coordinates: Array, node_spacing: float
+    ) -> tuple[Array, Array, Array]:
         """Lines along one axis (m), the least height on each (m), and its position (m) on the other axis."""
         finer = 2
-        least, where = valley(padded, finer)
-        return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
+        least, where = valley(padded_heights, finer)
+        return (
+            np.linspace(valley_coordinates[0], valley_coordinates[-1], least.size),
+            least,
+            other_coordinates[0] + where * node_spacing,
+        )
 
-    def part(self, x: slice, y: slice) -> "Distance":
+    def part(self, x_nodes: slice, y_nodes: slice) -> "Distance":
         """The undeformed distance restricted to some of its nodes."""
-        return Distance(self.x[x], self.y[y], self.height[y, x])
+        return Distance(self.x[x_nodes], self.y[y_nodes], self.height[y_nodes, x_nodes])
 
 
 def from_function(
-    height: Callable[[Array, Array], Array], x: tuple[float, float], y: tuple[float, float], nodes: int = NODES
+    height_formula: Callable[[Array, Array], Array],
+    x_range: tuple[float, float],
+    y_range: tuple[float, float],
+    node_count: int = NODES,
 ) -> Distance:
     """Undeformed distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1],
     y[0]..y[1].
 
     Raises InputError for an empty rectangle and for a formula without a finite answer of the right shape.
     """
-    for name, (first, last) in (("x", x), ("y", y)):
+    for name, (first, last) in (("x", x_range), ("y", y_range)):
         if not (np.isfinite([first, last]).all() and first < last):
             raise InputError("", name, [first, last], "must be two finite bounds in m, the lower first")
-    nodes_x, nodes_y = np.linspace(*x, nodes), np.linspace(*y, nodes)
-    heights = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
+    nodes_x, nodes_y = np.linspace(*x_range, node_count), np.linspace(*y_range, node_count)
+    heights = quantity("height", height_formula(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
     try:
-        heights = np.broadcast_to(heights, (nodes, nodes))
+        heights = np.broadcast_to(heights, (node_count, node_count))
     except ValueError:
         raise InputError("", "height", list(heights.shape), "must give one distance per point") from None
     return from_arrays(nodes_x, nodes_y, heights)
@@ -142,13 +151,15 @@ def from_arrays(x: Array, y: Array, height: Array) -> Distance:
     return Distance(nodes["x"], nodes["y"], height.copy())
 
 
-def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Distance:
+def quadratic(A: float, B: float, x_half_length: float, y_half_length: float, node_count: int = NODES) -> Distance:
     """Undeformed distance of Hertz' theory, A x^2 + B y^2 (A and B in 1/m), over -x..x and -y..y (m)."""
-    return from_function(lambda u, v: A * u**2 + B * v**2, (-x, x), (-y, y), nodes)
+    return from_function(
+        lambda u, v: A * u**2 + B * v**2, (-x_half_length, x_half_length), (-y_half_length, y_half_length), node_count
+    )
 
 
-def _extrapolated(rows: Array) -> Array:
+def _extrapolated(table_rows: Array) -> Array:
     """The rows of a table with one more at each end, extrapolated by the parabola through the three nearest rows."""
-    first = 3.0 * (rows[0] - rows[1]) + rows[2]
-    last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]
-    return np.vstack([first, rows, last])
+    first = 3.0 * (table_rows[0] - table_rows[1]) + table_rows[2]
+    last = 3.0 * (table_rows[-1] - table_rows[-2]) + table_rows[-3]
+    return np.vstack([first, table_rows, last])

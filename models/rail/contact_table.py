@@ -275,7 +275,7 @@ class WheelsetContact:
                 forces.append((0.0, 0.0, 0.0))
                 continue
             single_patch = replace(wheel.normal_contact, patches=(replace(patch_pressure, load=load),))
-            creep = roll(single_patch, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
+            creep = roll(single_patch, self.friction, *creepage, cell_count=round(CELLS_PER_STRIP / self.cell_factor))
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.rotation[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)

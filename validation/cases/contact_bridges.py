@@ -248,7 +248,7 @@ def library_law(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
             slip = rate["x"] / speed, rate["y"] / speed - position["yaw"], rate["yaw"] / speed
             if bodies is not None:
                 pressed = press(bodies, wheels.pair, approach=approach)
-                creep = roll(pressed, mu, *slip, cells=wheels.cells)
+                creep = roll(pressed, mu, *slip, cell_count=wheels.cells)
             else:
                 pressed = by_approach(*wheels.curvatures, approach, wheels.pair)
                 ellipse = RollingEllipse(pressed.a, pressed.b, pressed.load, mu, *slip)

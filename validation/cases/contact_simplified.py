@@ -82,7 +82,10 @@ def _hertz_errors(curvature_ratio: float, options: SimplifiedOptions) -> dict[st
     exact = by_load(CURVATURE, CURVATURE * curvature_ratio, 1e5, MATERIAL_PAIR)
     a, b = float(exact.a), float(exact.b)
     contact = press(
-        quadratic(CURVATURE, CURVATURE * curvature_ratio, 2.5 * a, 2.5 * b), MATERIAL_PAIR, load=1e5, options=options
+        quadratic(CURVATURE, CURVATURE * curvature_ratio, 2.5 * a, 2.5 * b),
+        MATERIAL_PAIR,
+        load=1e5,
+        simplified_options=options,
     )
     return _relative_errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
@@ -119,7 +122,7 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
     """Errors of every variant of the theory for one contact shape, and the exact values. Errors of approach, area and
     peak pressure are relative; those of forces are in % of mu N."""
     contacts = {
-        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
+        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, simplified_options=fitting_options)
         for name, fitting_options in FITTING_OPTIONS.items()
     }
     normal = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or _box_around(contacts["elliptic"]))
@@ -142,7 +145,9 @@ def _approach_errors(contact_shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a separate grid for each patch, and with one grid for all patches."""
     exact = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
-        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options).approach
+        name: press(
+            contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, simplified_options=fitting_options
+        ).approach
         / exact
         - 1.0
         for name, fitting_options in (("each", PLAIN), ("one", FITTING_OPTIONS["elliptic, one net"]))

@@ -133,7 +133,7 @@ def run(
         return _table_result(scene, answers, progress, error)
     motions, cells = creepages(scene), scene.method.cells
     progress("loading", 0.0)
-    shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
+    shown = rolled(solved_contact(scene), motions[-1], cells, with_fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
     contact = solved_contact(scene)
     steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
@@ -293,7 +293,7 @@ def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: Simplif
     """
     A, B = float(hertz.A), float(hertz.B)
     x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
-    return press(quadratic(A, B, x, y), material_pair, load=float(hertz.load), options=options)
+    return press(quadratic(A, B, x, y), material_pair, load=float(hertz.load), simplified_options=options)
 
 
 def touching_places(scene: ContactScene, built: Built) -> list[TouchingPlace]:
