@@ -13,8 +13,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def interpolation_weights(position_in_segment):
-    """Weights of four neighbouring nodes for the interpolated value at the position ``position_in_segment`` (0 to 1) in a segment, and
-    for its slope per spacing.
+    """Weights of four neighbouring nodes for the interpolated value at the position ``position_in_segment`` (0 to 1) in
+    a segment, and for its slope per spacing.
     """
     value = (
         0.5 * position_in_segment * (-1.0 + position_in_segment * (2.0 - position_in_segment)),
@@ -62,7 +62,7 @@ def value_and_slopes(padded_heights, u, v):
 
 
 @njit(cache=True)
-def values(padded_heights, u, v):
+def interpolated_values(padded_heights, u, v):
     """Interpolated values at the points (u[k], v[k]), in spacings."""
     heights = np.empty(u.size)
     for k in range(u.size):
@@ -92,7 +92,7 @@ def value_along_row(height_row, u):
 
 
 @njit(cache=True)
-def least_of_row(height_row):
+def least_value_of_row(height_row):
     """Least value along a padded row, also between its nodes, and its position in spacings."""
     least, where = np.inf, 0.0
     for i in range(height_row.size - 3):
@@ -124,24 +124,24 @@ def minimum_in_segment(cubic_coefficient, quadratic_coefficient, linear_coeffici
 
 
 @njit(cache=True)
-def valley(padded_heights, lines_per_spacing):
-    """Least value along x, and its position along x in spacings, on each of ``lines_per_spacing`` lines per spacing across y: two
-    arrays (lines,).
+def valley_course(padded_heights, lines_per_spacing):
+    """Least value along x, and its position along x in spacings, on each of ``lines_per_spacing`` lines per spacing
+    across y: two arrays (lines,).
     """
     lines = (padded_heights.shape[0] - 3) * lines_per_spacing + 1
     least, where = np.empty(lines), np.empty(lines)
     for k in range(lines):
-        least[k], where[k] = least_of_row(row_at(padded_heights, k / lines_per_spacing))
+        least[k], where[k] = least_value_of_row(row_at(padded_heights, k / lines_per_spacing))
     return least, where
 
 
 @njit(cache=True)
 def valley_ends(line_positions, height_roots, bottom_position, level_root):
-    """Ends (m) of the valley below the level whose root is ``level_root``: on either side of the bottom, the total length of
-    all parts below the level.
+    """Ends (m) of the valley below the level whose root is ``level_root``: on either side of the bottom, the total
+    length of all parts below the level.
 
-    line_positions : positions, one of them the bottom; height_roots : square root of the height above the bottom at these, linear
-    between.
+    line_positions : positions, one of them the bottom; height_roots : square root of the height above the bottom at
+    these, linear between.
     """
     low_length = high_length = 0.0
     for k in range(line_positions.size - 1):

@@ -14,17 +14,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
-from models.contact.fastsim_grid import Bound, nets
-from models.contact.fastsim_kernels import LARGEST_EXPONENT, NEGLIGIBLE_SLIP, advance, cut_to_bound, lateness
+from models.contact.fastsim import (
+    FLEXIBILITY_KINDS,
+    FlexibilityChoice,
+    RollingEllipse,
+    check_fastsim_choices,
+    contact_records,
+)
+from models.contact.fastsim_grid import BoundShape, grids_of_ratios
+from models.contact.fastsim_kernels import (
+    LARGEST_EXPONENT,
+    NEGLIGIBLE_SLIP,
+    advance_traction,
+    cut_to_bound,
+    turning_slip_point,
+)
 from models.contact.fastsim_many import (
     ONE_FLEXIBILITY,
     add_strip,
-    blend,
+    blend_weight,
     mean_flexibility,
     rigid_slip,
-    stiffness,
-    touches,
+    traction_stiffnesses,
+    transmits_force,
 )
 from models.contact.fastsim_records import FORCES
 from models.contact.inputs import Array
@@ -33,7 +45,7 @@ from models.machine.compiled import compiled
 
 
 @dataclass(frozen=True)
-class Derivatives:
+class CreepForceDerivatives:
     """Creep forces with their derivatives.
 
     forces : (..., 3) of fx, fy (N), mz (N m). slopes : (..., 3, 4), of each to xi_x, xi_y, spin (1/m) and load (N).
@@ -43,29 +55,30 @@ class Derivatives:
     slopes: Array
 
 
-def derivatives(
+def creep_force_derivatives(
     ellipse: RollingEllipse,
     material_pair: MaterialPair,
     *,
     cells: int = 21,
-    bound: Bound = "intermediate",
-    flexibilities: Flexibilities = "blended",
+    bound: BoundShape = "intermediate",
+    flexibilities: FlexibilityChoice = "blended",
     axes_grow_with_load: bool = True,
-) -> Derivatives:
+) -> CreepForceDerivatives:
     """Creep forces of FASTSIM with the second-order march, and their derivatives; the same parameters and errors as
     ``fastsim``.
 
-    axes_grow_with_load : whether the semi-axes grow with the load, as its cube root (Hertz, bodies of given shape), or stay
+    axes_grow_with_load : whether the semi-axes grow with the load, as its cube root (Hertz, bodies of given shape), or
+    stay
 
     They are those of the march itself but for the size of its jumps, where a cell begins to stick or slip. Without
     load or friction all are zero.
     """
-    check_choices(cells, bound, flexibilities, "second-order")
-    contacts, shape = contacts_of(ellipse, material_pair)
+    check_fastsim_choices(cells, bound, flexibilities, "second-order")
+    contacts, shape = contact_records(ellipse, material_pair)
     forces, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
-    for rows, net in nets(contacts["a"] / contacts["b"], cells, bound):
+    for rows, net in grids_of_ratios(contacts["a"] / contacts["b"], cells, bound):
         net_forces, net_slopes = np.zeros(rows.size, FORCES), np.zeros((rows.size, 3, 3))
-        _slopes(contacts[rows], *net.records, KINDS[flexibilities], net_forces, net_slopes)
+        _fill_force_derivatives(contacts[rows], *net.records, FLEXIBILITY_KINDS[flexibilities], net_forces, net_slopes)
         forces[rows] = np.column_stack([net_forces[name] for name in ("fx", "fy", "mz")])
         slopes[rows, :, :3] = net_slopes
     touching = (contacts["load"] > 0.0) & (contacts["mu"] > 0.0)
@@ -76,22 +89,22 @@ def derivatives(
     else:
         change = forces[touching] - moving.sum(axis=2)
     slopes[touching, :, 3] = change / contacts["load"][touching, None]
-    return Derivatives(forces.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
+    return CreepForceDerivatives(forces.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
 
 
 @compiled
-def _slopes(contacts, grid_strips, strip_cells, flexibility_kind, forces_out, force_derivatives):
+def _fill_force_derivatives(contacts, grid_strips, strip_cells, flexibility_kind, forces_out, force_derivatives):
     """Fill FORCES (n,), without the sticking share, and their derivatives (n, 3, 3) with respect to the creepages."""
     sums, moved, total, scale = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for c in range(len(contacts)):
         contact = contacts[c]
-        if not touches(contact):
+        if not transmits_force(contact):
             continue
         slip = rigid_slip(contact, strip_cells, flexibility_kind)
-        _scale_slopes(contact, strip_cells, flexibility_kind, scale)
+        _rigid_slip_derivatives(contact, strip_cells, flexibility_kind, scale)
         total[:] = 0.0
         for s in range(grid_strips.y.size):
-            _strip(contact, grid_strips, s, strip_cells, slip, sums, moved)
+            _fill_strip_sums(contact, grid_strips, s, strip_cells, slip, sums, moved)
             add_strip(contact, grid_strips, s, (sums[0], sums[1], sums[2]), forces_out[c])
             part = contact.mu * contact.load * grid_strips.part[s]
             arm, off = contact.a * grid_strips.half[s], contact.b * grid_strips.y[s]
@@ -107,13 +120,13 @@ def _slopes(contacts, grid_strips, strip_cells, flexibility_kind, forces_out, fo
 
 
 @compiled
-def _scale_slopes(contact, strip_cells, flexibility_kind, slip_scales):
+def _rigid_slip_derivatives(contact, strip_cells, flexibility_kind, slip_scales):
     """Derivatives (3, 3) of the three results of ``rigid_slip`` with respect to xi_x, xi_y and spin."""
     a, c, flexible = contact.a, math.sqrt(contact.a * contact.b), (contact.l1, contact.l2, contact.l3)
     bound = contact.mu * strip_cells.peak * contact.load / (a * contact.b)
     step, creep = 2.0 * a / (strip_cells.centre.size * bound), (contact.xi_x, contact.xi_y, contact.spin * c)
-    k, change = stiffness(contact, bound, flexibility_kind), np.zeros(3)
-    blended = blend(contact, bound, flexibility_kind)
+    k, change = traction_stiffnesses(contact, bound, flexibility_kind), np.zeros(3)
+    blended = blend_weight(contact, bound, flexibility_kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
     mean = mean_flexibility(contact, creep[2], flexibility_kind)
     for j in range(3):
@@ -132,7 +145,7 @@ def _scale_slopes(contact, strip_cells, flexibility_kind, slip_scales):
 
 
 @compiled
-def _strip(contact, grid_strips, strip_index, strip_cells, contact_slip, strip_sums, sum_derivatives):
+def _fill_strip_sums(contact, grid_strips, strip_index, strip_cells, contact_slip, strip_sums, sum_derivatives):
     """Fill the sums of q_x, q_y and t q_y over the cells of strip s, and their derivatives (3, 3) with respect to the
     rigid slip (x, y, spin).
     """
@@ -159,13 +172,13 @@ def _strip(contact, grid_strips, strip_index, strip_cells, contact_slip, strip_s
         if i == 0:
             x, y, now = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
-            x, y, now = advance((px, py, slips), (u, v, v1 * change), bound)
+            x, y, now = advance_traction((px, py, slips), (u, v, v1 * change), bound)
         turns = slips * (u * u + v * v) > NEGLIGIBLE_SLIP
         reach = (abs(u) + abs(v)) * strip_cells.rate[i] if turns else 0.0
-        late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
+        late, steep = turning_slip_point(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
         if turns and now > 0.0:
-            kept, pull, size = _turning(px, py, u, w, strip_cells.start_bound[i], strip_cells.rate[i])
+            kept, pull, size = _rotation_derivatives(px, py, u, w, strip_cells.start_bound[i], strip_cells.rate[i])
         for k in range(3):
             dv = dv0[k] + dv1[k] * mid
             if now == 0.0:
@@ -191,9 +204,9 @@ def _strip(contact, grid_strips, strip_index, strip_cells, contact_slip, strip_s
 
 
 @compiled
-def _turning(traction_x, traction_y, slip_x, slip_y, before, rate):
-    """Derivatives of the rotation of a slipping traction in ``advance``: sin psi' / sin psi, the derivative of psi'
-    with respect to |w|, and |w|.
+def _rotation_derivatives(traction_x, traction_y, slip_x, slip_y, before, rate):
+    """Derivatives of the rotation of a slipping traction in ``advance_traction``: sin psi' / sin psi, the derivative of
+    psi' with respect to |w|, and |w|.
     """
     size = math.sqrt(slip_x * slip_x + slip_y * slip_y)
     h = min(size * rate, LARGEST_EXPONENT)

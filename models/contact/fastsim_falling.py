@@ -10,15 +10,15 @@ import math
 import numpy as np
 
 from models.contact.fastsim_kernels import SECOND_ORDER
-from models.contact.fastsim_many import add_strip, rigid_slip, strip_slip, strip_tractions, touches
+from models.contact.fastsim_many import add_strip, rigid_slip, strip_slip, strip_tractions, transmits_force
 from models.contact.fastsim_records import SLIP
 from models.machine.compiled import compiled
 
 
 @compiled
-def forces_falling(contacts, grid_strips, strip_cells, flexibility_kind, friction_law, forces_out):
-    """Fill FASTSIM's forces of many contacts, FORCES (n,), by the second-order march with falling friction; friction_law : of
-    ``Falling``.
+def fill_forces_with_falling_friction(contacts, grid_strips, strip_cells, flexibility_kind, friction_law, forces_out):
+    """Fill FASTSIM's forces of many contacts, FORCES (n,), by the second-order march with falling friction;
+    friction_law : of ``Falling``.
     """
     n, area, slip = strip_cells.centre.size, 0.0, np.empty(1, SLIP)[0]
     friction_shares, tractions = np.empty((2, n)), np.empty((3, n))
@@ -27,7 +27,7 @@ def forces_falling(contacts, grid_strips, strip_cells, flexibility_kind, frictio
     for c in range(len(contacts)):
         contact, answer = contacts[c], forces_out[c]
         answer.fx = answer.fy = answer.mz = answer.stick = 0.0
-        if not touches(contact):
+        if not transmits_force(contact):
             continue
         slip.x, slip.y, slip.spin = rigid_slip(contact, strip_cells, flexibility_kind)
         for s in range(grid_strips.y.size):

@@ -12,7 +12,7 @@ and only strips side by side keep the processor busy meanwhile.
 
 import math
 
-from models.contact.fastsim_records import LANES
+from models.contact.fastsim_records import LANE_COUNT
 from models.machine.compiled import compiled, njit
 
 PLAIN, SECOND_ORDER = 0, 1
@@ -24,7 +24,7 @@ NEGLIGIBLE_SLIP = 1e-60
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def lateness(step_exponent):
+def turning_slip_point(step_exponent):
     """Point in a step at which a turning rigid slip is evaluated, in steps after the step's middle: a piecewise linear
     approximation, within 0.04, of coth(4 z)/2 - 1/(8 z).
 
@@ -35,12 +35,12 @@ def lateness(step_exponent):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def advance(traction, slip, traction_bound):
+def advance_traction(traction, slip, traction_bound):
     """Traction in the next cell by the second-order march, and 1 if the cell slips, else 0.
 
     traction : along x and y before, and whether it slips (1), being on the bound, or not (0); slip : rigid slip along x
-    and y in the middle of the step, as traction, and the change of the second over it; traction_bound : in the next cell, where
-    the step starts, and 1 / 8 of 1 / bound in its middle
+    and y in the middle of the step, as traction, and the change of the second over it; traction_bound : in the next
+    cell, where the step starts, and 1 / 8 of 1 / bound in its middle
 
     While a strip slips, with rigid slip w and bound g constant over the step, the angle psi between traction and -w
     obeys psi' = -(|w| / g) sin psi, so tan(psi / 2) shrinks by exp(-|w| step / g). The half angle is kept as the sides
@@ -52,7 +52,7 @@ def advance(traction, slip, traction_bound):
     u, v, turn = slip
     g, before, rate = traction_bound
     x, y = px - u, py - v
-    v += turn * lateness((abs(u) + abs(v)) * rate)  # |w| well enough, without its root
+    v += turn * turning_slip_point((abs(u) + abs(v)) * rate)  # |w| well enough, without its root
     square, speed = x * x + y * y, u * u + v * v
     turns = slips * speed > NEGLIGIBLE_SLIP
     size = math.sqrt(speed if turns else square)
@@ -86,7 +86,7 @@ def march_second_order(strip_block, strip_cells):
     and states.
     """
     _clear_block(strip_block)
-    for j in range(LANES):
+    for j in range(LANE_COUNT):
         u, v = strip_block.u[j], strip_block.v0[j] + strip_block.v1[j] * strip_cells.middle[0]
         x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, strip_cells.bound[0])
         _store_traction(strip_block, j, strip_cells.centre[0], x, y, slips)
@@ -94,11 +94,11 @@ def march_second_order(strip_block, strip_cells):
     for i in range(1, strip_cells.centre.size):
         t, g, middle = strip_cells.centre[i], strip_cells.bound[i], strip_cells.middle[i]
         bound = g, strip_cells.start_bound[i], strip_cells.rate[i]
-        for j in range(LANES):
+        for j in range(LANE_COUNT):
             u, v1 = strip_block.u[j], strip_block.v1[j]
             v = strip_block.v0[j] + v1 * middle
             traction = strip_block.qx[j], strip_block.qy[j], strip_block.slips[j]
-            x, y, slips = advance(traction, (u, v, v1 * change), bound)
+            x, y, slips = advance_traction(traction, (u, v, v1 * change), bound)
             _store_traction(strip_block, j, t, x, y, slips)
 
 
@@ -110,7 +110,7 @@ def march_plain(strip_block, strip_cells):
     _clear_block(strip_block)
     for i in range(strip_cells.centre.size):
         t, g = strip_cells.centre[i], strip_cells.bound[i]
-        for j in range(LANES):
+        for j in range(LANE_COUNT):
             x = strip_block.qx[j] - strip_block.u[j]
             y = strip_block.qy[j] - (strip_block.v0[j] + strip_block.v1[j] * t)
             x, y, slips = cut_to_bound(x, y, g)
@@ -132,6 +132,6 @@ def _store_traction(strip_block, lane, cell_position, traction_x, traction_y, sl
 @compiled
 def _clear_block(strip_block):
     """Set sums and states of all lanes of a BLOCK to zero."""
-    for j in range(LANES):
+    for j in range(LANE_COUNT):
         strip_block.sum_x[j] = strip_block.sum_y[j] = strip_block.sum_t[j] = strip_block.slid[j] = 0.0
         strip_block.qx[j] = strip_block.qy[j] = strip_block.slips[j] = 0.0

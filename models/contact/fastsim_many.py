@@ -8,8 +8,15 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut_to_bound, march_plain, march_second_order
-from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, LANES, SLIP, Workspace, cells_in, strips_in
+from models.contact.fastsim_kernels import (
+    PLAIN,
+    SECOND_ORDER,
+    advance_traction,
+    cut_to_bound,
+    march_plain,
+    march_second_order,
+)
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, LANE_COUNT, SLIP, MarchWorkspace, cells_in, strips_in
 from models.contact.inputs import NEGLIGIBLE_BOUND
 from models.machine.compiled import compiled, lean
 
@@ -31,26 +38,32 @@ slide, and exponent beyond which nothing changes.
 
 
 @compiled
-def forces(contacts, grid_strips, strip_cells, flexibility_kind, march_kind, forces_out):
+def fill_contact_forces(contacts, grid_strips, strip_cells, flexibility_kind, march_kind, forces_out):
     """Fill ``forces_out`` with the creep forces of many contacts, FORCES (n,).
 
-    contacts : CONTACT (n,); grid_strips, strip_cells : a net from ``fastsim_grid``; flexibility_kind : of flexibility; march_kind : PLAIN or
-    SECOND_ORDER. A contact without load or friction has zeros all over.
+    contacts : CONTACT (n,); grid_strips, strip_cells : a net from ``fastsim_grid``; flexibility_kind : of flexibility;
+    march_kind : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
     """
-    workspace = Workspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
-    forces_within(contacts, grid_strips, strip_cells, flexibility_kind, march_kind, workspace, forces_out)
+    workspace = MarchWorkspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
+    fill_contact_forces_in_place(
+        contacts, grid_strips, strip_cells, flexibility_kind, march_kind, workspace, forces_out
+    )
 
 
 @lean
-def forces_within(contacts, grid_strips, strip_cells, flexibility_kind, march_kind, workspace, forces_out):
-    """Creep forces as by ``forces``, without allocating arrays; workspace : ``Workspace`` for intermediate values."""
+def fill_contact_forces_in_place(
+    contacts, grid_strips, strip_cells, flexibility_kind, march_kind, workspace, forces_out
+):
+    """Creep forces as by ``fill_contact_forces``, without allocating arrays; workspace : ``MarchWorkspace`` for
+    intermediate values.
+    """
     slips, block, m = workspace.slips, workspace.blocks[0], grid_strips.y.size
     for c in range(len(contacts)):
         slip, answer = slips[c], forces_out[c]
         slip.x, slip.y, slip.spin = rigid_slip(contacts[c], strip_cells, flexibility_kind)
         answer.fx = answer.fy = answer.mz = answer.stick = 0.0
-    for first in range(0, len(contacts) * m, LANES):
-        count = min(LANES, len(contacts) * m - first)
+    for first in range(0, len(contacts) * m, LANE_COUNT):
+        count = min(LANE_COUNT, len(contacts) * m - first)
         _fill_block(block, first, count, contacts, grid_strips, slips)
         if march_kind == SECOND_ORDER:
             march_second_order(block, strip_cells)
@@ -61,12 +74,12 @@ def forces_within(contacts, grid_strips, strip_cells, flexibility_kind, march_ki
     for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
         area += grid_strips.half[s] * strip_cells.centre.size
     for c in range(len(contacts)):
-        if touches(contacts[c]):
+        if transmits_force(contacts[c]):
             forces_out[c].stick = 1.0 - forces_out[c].stick / area
 
 
 @lean
-def touches(contact):
+def transmits_force(contact):
     """Whether the contact has load and friction, so that tangential forces can be transmitted."""
     return contact.mu * contact.load > NEGLIGIBLE_BOUND
 
@@ -78,19 +91,19 @@ def rigid_slip(contact, strip_cells, flexibility_kind):
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
     """
-    if not touches(contact):
+    if not transmits_force(contact):
         return 0.0, 0.0, 0.0
     bound = contact.mu * strip_cells.peak * contact.load / (contact.a * contact.b)
-    k1, k2, k3 = stiffness(contact, bound, flexibility_kind)
+    k1, k2, k3 = traction_stiffnesses(contact, bound, flexibility_kind)
     step = 2.0 * contact.a / (strip_cells.centre.size * bound)
     return k1 * contact.xi_x * step, k2 * contact.xi_y * step, k3 * contact.spin * step
 
 
 @lean
-def stiffness(contact, traction_bound, flexibility_kind):
+def traction_stiffnesses(contact, traction_bound, flexibility_kind):
     """Inverses (N/m^3) of the flexibilities along x, along y and in spin."""
     k1, k2, k3 = 1.0 / contact.l1, 1.0 / contact.l2, 1.0 / contact.l3
-    part = blend(contact, traction_bound, flexibility_kind)[0]
+    part = blend_weight(contact, traction_bound, flexibility_kind)[0]
     if part == 0.0:
         return k1, k2, k3
     mean = 1.0 / mean_flexibility(contact, contact.spin * math.sqrt(contact.a * contact.b), flexibility_kind)
@@ -98,7 +111,7 @@ def stiffness(contact, traction_bound, flexibility_kind):
 
 
 @lean
-def blend(contact, traction_bound, flexibility_kind):
+def blend_weight(contact, traction_bound, flexibility_kind):
     """Weight, 0 to 1, of the common mean flexibility against three separate ones, and the weight's derivatives with
     respect to xi_x, xi_y and spin sqrt(a b).
 
@@ -165,11 +178,11 @@ def strip_slip(contact, grid_strips, strip_index, contact_slip):
 
 @lean
 def _fill_block(strip_block, first_strip, strip_count, contacts, grid_strips, contact_slips):
-    """Put the rigid slips of ``strip_count`` strips, from strip ``first_strip`` on, into the lanes of a BLOCK; further lanes get
-    zero slip.
+    """Put the rigid slips of ``strip_count`` strips, from strip ``first_strip`` on, into the lanes of a BLOCK; further
+    lanes get zero slip.
     """
     c, s = first_strip // grid_strips.y.size, first_strip % grid_strips.y.size
-    for j in range(LANES):
+    for j in range(LANE_COUNT):
         if j >= strip_count:
             strip_block.u[j] = strip_block.v0[j] = strip_block.v1[j] = 0.0
             continue
@@ -183,13 +196,13 @@ def _fill_block(strip_block, first_strip, strip_count, contacts, grid_strips, co
 
 @lean
 def _collect_forces(strip_block, first_strip, strip_count, contacts, grid_strips, forces_out):
-    """Add what ``strip_count`` strips carry to the forces of their contact ellipses, and their slipping cells, each with its
-    length, to the slip areas.
+    """Add what ``strip_count`` strips carry to the forces of their contact ellipses, and their slipping cells, each
+    with its length, to the slip areas.
     """
     c, s = first_strip // grid_strips.y.size, first_strip % grid_strips.y.size
     for j in range(strip_count):
         contact, answer = contacts[c], forces_out[c]
-        if touches(contact):
+        if transmits_force(contact):
             sums = strip_block.sum_x[j], strip_block.sum_y[j], strip_block.sum_t[j]
             add_strip(contact, grid_strips, s, sums, answer)
             answer.stick += grid_strips.half[s] * strip_block.slid[j]
@@ -214,8 +227,8 @@ def strip_tractions(strip_rigid_slip, strip_cells, march_kind, friction_shares, 
     """Fill ``tractions`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1
     where it slips.
 
-    strip_rigid_slip : of the strip, see ``strip_slip``; friction_shares : (2, cells), share of the friction that is left in the
-    cells' centres and in the middles of the steps there.
+    strip_rigid_slip : of the strip, see ``strip_slip``; friction_shares : (2, cells), share of the friction that is
+    left in the cells' centres and in the middles of the steps there.
     """
     (u, v0, v1), change, share_before = strip_rigid_slip, -2.0 / strip_cells.centre.size, 0.0
     x = y = slips = 0.0
@@ -227,18 +240,20 @@ def strip_tractions(strip_rigid_slip, strip_cells, march_kind, friction_shares, 
             x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
             bound = g, share_before * strip_cells.start_bound[i], strip_cells.rate[i] / friction_shares[1, i]
-            x, y, slips = advance((x, y, slips), (u, v, v1 * change), bound)
+            x, y, slips = advance_traction((x, y, slips), (u, v, v1 * change), bound)
         share_before = friction_shares[0, i]
         tractions[0, i], tractions[1, i], tractions[2, i] = x, y, slips
 
 
 @compiled
 def ellipse_forces(load_and_creepages, unit_ellipse, strip_table, cell_table, coded_choices):
-    """Creep forces fx, fy (N) and moment mz (N m) of one ellipse with the shape of ``unit_ellipse``; NaN for invalid input.
+    """Creep forces fx, fy (N) and moment mz (N m) of one ellipse with the shape of ``unit_ellipse``; NaN for invalid
+    input.
 
-    load_and_creepages : a (m), load, mu, xi_x, xi_y, spin; unit_ellipse : b, l1, l2, l3 at a = 1 m; strip_table, cell_table : a net's tables;
-    coded_choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of
-    the time of records.
+    load_and_creepages : a (m), load, mu, xi_x, xi_y, spin; unit_ellipse : b, l1, l2, l3 at a = 1 m; strip_table,
+    cell_table : a net's tables;
+    coded_choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction
+    of the time of records.
     """
     (a, load, mu, xi_x, xi_y, spin), (peak, kind, march) = load_and_creepages, coded_choices
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
@@ -248,6 +263,6 @@ def ellipse_forces(load_and_creepages, unit_ellipse, strip_table, cell_table, co
     contact.a, contact.b, contact.load, contact.mu = a, a * unit_ellipse[0], load, mu
     contact.xi_x, contact.xi_y, contact.spin = xi_x, xi_y, spin
     contact.l1, contact.l2, contact.l3 = a * unit_ellipse[1], a * unit_ellipse[2], a * unit_ellipse[3]
-    forces(contacts, strips_in(strip_table), cells_in(cell_table, peak), kind, march, answers)
+    fill_contact_forces(contacts, strips_in(strip_table), cells_in(cell_table, peak), kind, march, answers)
     bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
     return answer.fx + bad, answer.fy + bad, answer.mz + bad

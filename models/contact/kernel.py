@@ -5,7 +5,8 @@ Hertz' contact (``hertz``), Kalker's coefficients (``linear_theory``) and the se
 blended flexibilities and the intermediate bound (``fastsim``), to the last digits the numbers of these modules. What
 they refuse by an exception is refused here by a status, and every result is then not a number.
 
-The net of cells is a table of doubles that ``net`` makes for a number of cells, good for ellipses of every shape. That
+The net of cells is a table of doubles that ``grid_table`` makes for a number of cells, good for ellipses of every
+shape. That
 of zero cells stands for the linear theory: forces of small creepages, which no friction limits. In the place of a net
 stands the ``table`` of an undeformed distance (``kernel_simplified``) where the contact is no ellipse: Kalker's theory
 of 1983, by the approach alone; A and B are not read, a and b come out as half the lengths of the patch. That table
@@ -18,11 +19,11 @@ from functools import lru_cache
 import numpy as np
 
 from models.contact.fastsim import LEAST_CELLS, MOST_CELLS
-from models.contact.fastsim_grid import MOST_STRIPS, grid, strips_of
+from models.contact.fastsim_grid import STRIPS_PER_CELL_LIMIT, count_of_strips, ellipse_grid
 from models.contact.fastsim_kernels import SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, forces_within
-from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
-from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
+from models.contact.fastsim_many import BLENDED, fill_contact_forces_in_place
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, MarchWorkspace, cells_in, strips_in
+from models.contact.hertz import LARGEST_AXIS, LEAST_AXIS, LEAST_CURVATURE, axis_ratio_and_integrals, elliptic_integrals
 from models.contact.inputs import (
     LARGEST_APPROACH,
     LARGEST_CREEPAGE,
@@ -37,13 +38,13 @@ from models.machine.compiled import compiled
 from models.machine.records import record, records, size_of, stacked
 from models.machine.stack import array, ask, beyond, doubles
 
-INPUT = record("shape_x", "shape_y", "pressing", "mu", "xi_x", "xi_y", "spin", "G", "nu")
+INPUT_RECORD = record("shape_x", "shape_y", "pressing", "mu", "xi_x", "xi_y", "spin", "G", "nu")
 """Record of the inputs, as in ``kernel.h``: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin
 (1/m); G (Pa), nu.
 """
-OUTPUT = record("fx", "fy", "mz", "a", "b", "approach", "load", "stick")
+OUTPUT_RECORD = record("fx", "fy", "mz", "a", "b", "approach", "load", "stick")
 """Record of the outputs: fx, fy (N), mz (N m), a, b, approach (m), load (N), share of the area that sticks."""
-INPUTS, OUTPUTS = size_of(INPUT), size_of(OUTPUT)
+INPUT_COUNT, OUTPUT_COUNT = size_of(INPUT_RECORD), size_of(OUTPUT_RECORD)
 BY_LOAD, BY_APPROACH, AXES_BY_LOAD, AXES_BY_APPROACH = range(4)
 """Meaning of the first three inputs: A, B, load; A, B, approach; a, b, load; a, b, approach."""
 FINE, NOT_FINITE, NOT_PLAUSIBLE, NOT_KNOWN = range(4)
@@ -53,7 +54,7 @@ GRID_HEAD = record("cells", "first", "count")
 """Record at the head of the grid's table: cells per strip, strips of the first grid, number of grids. Then the rows of
 the cells, and the middle and the rows of the strips of one grid after another.
 """
-HEADER = size_of(GRID_HEAD)
+GRID_HEAD_SIZE = size_of(GRID_HEAD)
 DISTANCE_HEAD = record("cells", "law")
 """Record at the head of a distance's table: a number below zero in place of the cells, and the address of the
 callback.
@@ -61,9 +62,9 @@ callback.
 
 
 @lru_cache(maxsize=64)
-def net(cell_count: int) -> Array:
-    """Table of the grids for ``cell_count`` cells per strip, from 3 to 2000, or 0 for the linear theory; raises InputError.
-    Must not be modified.
+def grid_table(cell_count: int) -> Array:
+    """Table of the grids for ``cell_count`` cells per strip, from 3 to 2000, or 0 for the linear theory; raises
+    InputError. Must not be modified.
 
     Narrow ellipses have more strips: there is one net for every number of strips that may be asked for.
     """
@@ -80,8 +81,10 @@ def net(cell_count: int) -> Array:
         )
     parts, counts = [], range(0)
     if cell_count:
-        counts = range(int(strips_of(np.array(1.0), cell_count)), int(strips_of(np.array(1e-9), cell_count)) + 2, 2)
-        nets = [grid(cell_count, count, "intermediate") for count in counts]
+        counts = range(
+            int(count_of_strips(np.array(1.0), cell_count)), int(count_of_strips(np.array(1e-9), cell_count)) + 2, 2
+        )
+        nets = [ellipse_grid(cell_count, count, "intermediate") for count in counts]
         parts = [nets[0].cells.ravel(), *(np.append(row.middle, row.strips) for row in nets)]
     table = np.concatenate(([cell_count, counts.start, len(counts)], *parts), dtype=float)
     table.setflags(write=False)
@@ -89,36 +92,37 @@ def net(cell_count: int) -> Array:
 
 
 @compiled
-def contact(input_kind, input_pointer, table_pointer, output_pointer):
+def solve_contact(input_kind, input_pointer, table_pointer, output_pointer):
     """Solve one contact and fill ``output_pointer``; returns its status, FINE or another.
 
-    input_kind : BY_LOAD or another; input_pointer : pointer to an INPUT; table_pointer : pointer to a ``net`` or to the table of a
-    distance; output_pointer : pointer to an OUTPUT. A load or an approach of zero or less has zeros all over.
+    input_kind : BY_LOAD or another; input_pointer : pointer to an INPUT; table_pointer : pointer to a ``grid_table`` or
+    to the table of a distance; output_pointer : pointer to an OUTPUT. A load or an approach of zero or less has zeros
+    all over.
     """
     values, out, head = (
-        records(input_pointer, 1, INPUT)[0],
-        records(output_pointer, 1, OUTPUT)[0],
+        records(input_pointer, 1, INPUT_RECORD)[0],
+        records(output_pointer, 1, OUTPUT_RECORD)[0],
         records(table_pointer, 1, DISTANCE_HEAD)[0],
     )
-    any_shape, answers = head.cells < 0.0, array(output_pointer, (OUTPUTS,))
-    status = _status(input_kind, values, array(input_pointer, (INPUTS,)), any_shape)
+    any_shape, answers = head.cells < 0.0, array(output_pointer, (OUTPUT_COUNT,))
+    status = _input_status(input_kind, values, array(input_pointer, (INPUT_COUNT,)), any_shape)
     answers[:] = 0.0 if status == FINE else math.nan
     if status != FINE or (values.pressing <= 0.0 and not any_shape):
         return status
     if any_shape:
         return ask(int(head.law), input_pointer, table_pointer, output_pointer)
-    if not _press(input_kind, values, out):
+    if not _fill_normal_contact(input_kind, values, out):
         answers[:] = math.nan
         return NOT_PLAUSIBLE
     if head.cells == 0.0:
-        _linear(values, out)
+        _fill_linear_forces(values, out)
     elif values.mu * out.load > NEGLIGIBLE_BOUND:
-        _creep(values, table_pointer, out)
+        _fill_fastsim_forces(values, table_pointer, out)
     return FINE
 
 
 @compiled
-def _status(input_kind, input_record, input_values, has_any_shape):
+def _input_status(input_kind, input_record, input_values, has_any_shape):
     """Status code of the inputs: whether all are finite, and plausible in SI units."""
     if not BY_LOAD <= input_kind <= AXES_BY_APPROACH or (has_any_shape and input_kind != BY_APPROACH):
         return NOT_KNOWN
@@ -130,7 +134,7 @@ def _status(input_kind, input_record, input_values, has_any_shape):
     if has_any_shape:
         shaped = True
     elif input_kind in (BY_LOAD, BY_APPROACH):
-        shaped = small > 0.0 and FLATTEST <= large <= LARGEST_CURVATURE
+        shaped = small > 0.0 and LEAST_CURVATURE <= large <= LARGEST_CURVATURE
     else:  # without a load the axes may be none
         shaped = (small >= LEAST_AXIS or input_record.pressing <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
     plausible = (
@@ -147,14 +151,14 @@ def _status(input_kind, input_record, input_values, has_any_shape):
 
 
 @compiled
-def _press(input_kind, input_record, output_record):
+def _fill_normal_contact(input_kind, input_record, output_record):
     """Fill semi-axes, approach and load by Hertz' theory. Returns whether rolling theories can handle this ellipse."""
     x, y, elastic = input_record.shape_x, input_record.shape_y, input_record.G / (1.0 - input_record.nu)
     small, large = min(x, y), max(x, y)
     if input_kind in (BY_LOAD, BY_APPROACH):
         if large > SLENDEREST**1.6 * small:  # beyond it a/b, about the power 2/3 of this, is so in any case
             return False
-        ratio, cosine, sine = aspect(small / large)
+        ratio, cosine, sine = axis_ratio_and_integrals(small / large)
         integral_sum = cosine + sine
         if input_kind == BY_LOAD:
             load = input_record.pressing
@@ -165,7 +169,7 @@ def _press(input_kind, input_record, output_record):
         long = short / ratio
         output_record.a, output_record.b = (long, short) if x <= y else (short, long)
     else:
-        cosine, sine = integrals(small / large) if small * SLENDEREST >= large else (1.0, 1.0)
+        cosine, sine = elliptic_integrals(small / large) if small * SLENDEREST >= large else (1.0, 1.0)
         integral_sum, short, long = cosine + sine, small, large
         by_load = input_kind == AXES_BY_LOAD
         load = (
@@ -181,7 +185,7 @@ def _press(input_kind, input_record, output_record):
 
 
 @compiled
-def _linear(input_record, output_record):
+def _fill_linear_forces(input_record, output_record):
     """Fill the forces of the linear theory, in which nothing slips."""
     a, b, shear = output_record.a, output_record.b, input_record.G
     area, ratio, nu = a * b, a / b, input_record.nu
@@ -195,16 +199,16 @@ def _linear(input_record, output_record):
 
 
 @compiled
-def _creep(input_record, table_pointer, output_record):
+def _fill_fastsim_forces(input_record, table_pointer, output_record):
     """Fill the forces of FASTSIM on one ellipse, as by ``fastsim_many.forces``, with all arrays on the stack."""
     head = records(table_pointer, 1, GRID_HEAD)[0]
     n, first = int(head.cells), int(head.first)
-    wide = n * min(max((0.5 / (output_record.a / output_record.b)) ** 0.6, 1.0), 1.0 * MOST_STRIPS)
+    wide = n * min(max((0.5 / (output_record.a / output_record.b)) ** 0.6, 1.0), 1.0 * STRIPS_PER_CELL_LIMIT)
     m = 2 * math.ceil(wide / 2.0 - 1e-9)
     k = (m - first) // 2
-    at = HEADER + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
+    at = GRID_HEAD_SIZE + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
     strips = strips_in(array(beyond(table_pointer, at + 1), (4, m)))
-    cells = cells_in(array(beyond(table_pointer, HEADER), (5, n)), array(beyond(table_pointer, at), (1,))[0])
+    cells = cells_in(array(beyond(table_pointer, GRID_HEAD_SIZE), (5, n)), array(beyond(table_pointer, at), (1,))[0])
     contacts, answers = stacked(1, CONTACT), stacked(1, FORCES)
     contact, answer = contacts[0], answers[0]
     contact.a, contact.b, contact.load, contact.mu = (
@@ -217,8 +221,8 @@ def _creep(input_record, table_pointer, output_record):
     contact.l1, contact.l2, contact.l3 = flexibilities_at(
         output_record.a, output_record.b, input_record.G, input_record.nu
     )
-    workspace = Workspace(stacked(1, SLIP), stacked(1, BLOCK))
-    forces_within(contacts, strips, cells, BLENDED, SECOND_ORDER, workspace, answers)
+    workspace = MarchWorkspace(stacked(1, SLIP), stacked(1, BLOCK))
+    fill_contact_forces_in_place(contacts, strips, cells, BLENDED, SECOND_ORDER, workspace, answers)
     output_record.fx, output_record.fy, output_record.mz, output_record.stick = (
         answer.fx,
         answer.fy,

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 from models.contact.inputs import Array
 from models.core.errors import InputError
 
-SPACING = 1e-4
+POINT_SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
 SPIKE_DISTANCE = 2e-4
 """Distance (m) from both neighbours above which a point that turns back counts as a measurement error."""
@@ -53,11 +53,11 @@ class ContactProfile:
         """
         y = self.y * np.cos(angle) + self.z * np.sin(angle)
         z = self.z * np.cos(angle) - self.y * np.sin(angle)
-        keep = _ascending(y)
+        keep = _longest_ascending_run(y)
         return ContactProfile(y[keep], z[keep] - z[keep].min(), self.smoothing)
 
 
-def profile(y: Array, z: Array, smoothing: float = 0.0, profile_path: object = "") -> ContactProfile:
+def profile_of_points(y: Array, z: Array, smoothing: float = 0.0, profile_path: object = "") -> ContactProfile:
     """Profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
 
     smoothing : wavelength (m) of which half is left (see ``ContactProfile``). Raises InputError for wrong shapes,
@@ -70,10 +70,10 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, profile_path: object = "
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     apart = np.concatenate([[True], np.diff(length) > 0.0])
     length, y, z = length[apart], y[apart], z[apart]
-    even = np.linspace(0.0, length[-1], max(round(length[-1] / SPACING), 10) + 1)
-    y, z = (_smoothed(length, values, even, smoothing) for values in (y, z))
-    keep = _ascending(y)
-    _check_rough(y, keep, profile_path)
+    even = np.linspace(0.0, length[-1], max(round(length[-1] / POINT_SPACING), 10) + 1)
+    y, z = (_smoothed_coordinate(length, values, even, smoothing) for values in (y, z))
+    keep = _longest_ascending_run(y)
+    _check_backward_steps(y, keep, profile_path)
     return ContactProfile(y[keep], z[keep], smoothing)
 
 
@@ -122,7 +122,7 @@ def _check_spikes(points: Array, profile_path: object) -> None:
         )
 
 
-def _check_rough(y: Array, kept_points: slice, profile_path: object) -> None:
+def _check_backward_steps(y: Array, kept_points: slice, profile_path: object) -> None:
     """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data, since the points beyond would
     be lost.
     """
@@ -144,7 +144,7 @@ def _check_rough(y: Array, kept_points: slice, profile_path: object) -> None:
             )
 
 
-def _smoothed(contour_lengths: Array, coordinate: Array, even_lengths: Array, smoothing: float) -> Array:
+def _smoothed_coordinate(contour_lengths: Array, coordinate: Array, even_lengths: Array, smoothing: float) -> Array:
     """Smoothed coordinate at evenly spaced lengths along the contour: the curve that minimises error^2 + (L / 2 pi)^4
     curvature^2.
     """
@@ -155,7 +155,7 @@ def _smoothed(contour_lengths: Array, coordinate: Array, even_lengths: Array, sm
     return make_smoothing_spline(even_lengths, interpolated, lam=penalty)(even_lengths)
 
 
-def _ascending(y: Array) -> slice:
+def _longest_ascending_run(y: Array) -> slice:
     """Longest run of consecutive profile points with ascending y."""
     breaks = np.flatnonzero(np.diff(y) <= 0.0)
     starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])

@@ -8,12 +8,14 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def sweep(traction, rigid_slip, reversed_kernel, bound, relaxation_factor):
+def gauss_seidel_sweep(traction, rigid_slip, reversed_kernel, bound, relaxation_factor):
     """Relax the tractions of all cells once, in place, by Gauss-Seidel, strip by strip, each from its leading edge
     back.
 
-    traction, rigid_slip : (2, ny, nx) traction in units of G and rigid slip; bound : (ny, nx), zero outside the contact;
-    reversed_kernel : (3, 2 ny - 1, 2 nx - 1), xx, xy and yy, reversed in both axes so that its rows run beside the traction's.
+    traction, rigid_slip : (2, ny, nx) traction in units of G and rigid slip; bound : (ny, nx), zero outside the
+    contact;
+    reversed_kernel : (3, 2 ny - 1, 2 nx - 1), xx, xy and yy, reversed in both axes so that its rows run beside the
+    traction's.
     """
     rows, columns = bound.shape
     own_x, own_y = reversed_kernel[0, rows - 1, columns - 1], reversed_kernel[2, rows - 1, columns - 1]
@@ -38,8 +40,8 @@ def sweep(traction, rigid_slip, reversed_kernel, bound, relaxation_factor):
 
 @njit(cache=True, nogil=True)
 def cell_traction(slip_x, slip_y, self_slip_x, self_slip_y, bound):
-    """Traction of one cell whose slip is (slip_x + self_slip_x p_x, slip_y + self_slip_y p_y): it sticks, or slides with the
-    traction opposite to the slip.
+    """Traction of one cell whose slip is (slip_x + self_slip_x p_x, slip_y + self_slip_y p_y): it sticks, or slides
+    with the traction opposite to the slip.
 
     In slip p = -slip / (own + l) with l > 0 such that |p| = bound: Newton's iteration on 1/|p|, monotone from l = 0.
     """
@@ -58,11 +60,11 @@ def cell_traction(slip_x, slip_y, self_slip_x, self_slip_y, bound):
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def factorise(matrices, row_spans):
+def factorise_matrices(matrices, row_spans):
     """Replace each matrix (many, n, n) by its LU factors, in place: L with unit diagonal, and U.
 
-    row_spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting, which
-    a matrix with a positive definite symmetric part does not need.
+    row_spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting,
+    which a matrix with a positive definite symmetric part does not need.
     """
     for which in range(len(matrices)):
         start, stop = row_spans[which]
@@ -76,7 +78,7 @@ def factorise(matrices, row_spans):
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def substitute(factors, row_spans, right_sides):
+def solve_factorised(factors, row_spans, right_sides):
     """Solutions (many, n) of the linear systems in ``factors`` for right-hand sides (many, n)."""
     solution = right_sides.copy()
     for which in range(len(factors)):
@@ -99,8 +101,8 @@ def rotate_column(column, rotations, residual_components):
     """Apply Givens' rotations to a new column (count + 1,) of GMRES, so that the system stays triangular; returns the
     column (count,).
 
-    rotations (most, 2) : cosine and sine of the rotations, of which the last is added; residual_components (most + 1,) : what the
-    residual was turned to, its last component the residual's size.
+    rotations (most, 2) : cosine and sine of the rotations, of which the last is added; residual_components (most + 1,)
+    : what the residual was turned to, its last component the residual's size.
     """
     count = len(column) - 1
     for i in range(count - 1):

@@ -24,12 +24,12 @@ from models.contact.simplified_kernels import (
     GRADIENT,
     LEAST_STIFFNESS_SHARE,
     POINTS_PER_MESH,
-    coarse_net,
+    cell_sizes,
+    coarse_cells,
     covariances,
-    displacement,
-    mesh_of,
+    normal_displacement,
     normal_displacement_sums,
-    resultant,
+    pressure_resultant,
     slope_products,
     tangential_displacement_sums,
 )
@@ -37,7 +37,7 @@ from models.core.errors import RunFailed
 
 PATCHES_TOLERANCE = 1e-11
 """Relative error of approach and load at which the iteration of several patches ends."""
-ROOT_SEARCHES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
+ROOT_SEARCH_SETTINGS = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
 """Root finder, first step and ratio of the start to the given one, tried in turn: where a patch only just touches
 beside a large one the fit has kinks, at which a single search may stop.
 """
@@ -75,11 +75,11 @@ def coarse_grid(patch: Patch, depth: float, cell_count: int, pressure_shape: int
     if depth <= low:
         return empty
     surface, box = patch.surface(depth), patch.box(depth)
-    height, pressure, cover = coarse_net(surface, cell_count, pressure_shape)
-    volume = float(resultant(surface, POINTS_PER_MESH * cell_count, pressure_shape))
+    height, pressure, cover = coarse_cells(surface, cell_count, pressure_shape)
+    volume = float(pressure_resultant(surface, POINTS_PER_MESH * cell_count, pressure_shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
-    dx, dy = mesh_of(box, cell_count)
+    dx, dy = cell_sizes(box, cell_count)
     middles = np.arange(cell_count) + 0.5
     y, x = np.meshgrid(box[2] + middles * dy + patch.contour_position, box[0] + middles * dx, indexing="ij")
     return CoarseGrid(x, y, height, pressure, cover, (dx, dy), volume)
@@ -104,8 +104,8 @@ def solve_common_approach(
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
     for i, k in enumerate(loaded):
         total = np.sum([displacements[k, m] for m in loaded], axis=0)
-        products[i] = [_product(coarse_grids[k], total, displacements[k, m], fit_kind) for m in loaded]
-        right[i] = -_product(coarse_grids[k], total, coarse_grids[k].height, fit_kind)
+        products[i] = [_fit_product(coarse_grids[k], total, displacements[k, m], fit_kind) for m in loaded]
+        right[i] = -_fit_product(coarse_grids[k], total, coarse_grids[k].height, fit_kind)
     stiffness = np.zeros(len(coarse_grids))
     if loaded:
         least = (
@@ -128,14 +128,14 @@ def _displacement_by(loaded_grid: CoarseGrid, target_grid: CoarseGrid, material_
     itself.
     """
     if loaded_grid is target_grid:
-        return displacement(loaded_grid.pressure, *loaded_grid.step, material_pair.modulus)
+        return normal_displacement(loaded_grid.pressure, *loaded_grid.step, material_pair.modulus)
     sums = normal_displacement_sums(
         loaded_grid.x.ravel(), loaded_grid.y.ravel(), loaded_grid.forces, target_grid.x.ravel(), target_grid.y.ravel()
     )
     return sums.reshape(target_grid.x.shape) / (np.pi * material_pair.modulus)
 
 
-def _product(grid: CoarseGrid, first_field: Array, second_field: Array, fit_kind: int) -> float:
+def _fit_product(grid: CoarseGrid, first_field: Array, second_field: Array, fit_kind: int) -> float:
     """Scalar product of two displacement fields for the least-squares fit: of their slopes, or of their deviations from
     the mean.
     """
@@ -153,8 +153,8 @@ def solve_depths(
 ) -> tuple[Array, Array, Array]:
     """Depths (m) of patches followed by the common rigid approach (m), their stiffnesses (Pa/m) and loads (N).
 
-    start_values : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
-    common direction. coded_options : cells of a net, shape and kind of fit.
+    start_values : depths and approach near the answer, the approach the answer itself if there is no load. load : N
+    along the common direction. coded_options : cells of a net, shape and kind of fit.
     """
     lows, along = np.array([patch.low for patch in patches]), np.cos([patch.lean for patch in patches])
     zero, (cells, shape, kind) = np.append(lows, lows.min()), coded_options
@@ -168,7 +168,7 @@ def solve_depths(
         last = (approach - start_values[-1]) / unit if load is None else loads @ along / load - 1.0
         return np.append((reached - approach * along) / unit, last), answer, stiffness, loads
 
-    for method, factor, share in ROOT_SEARCHES:
+    for method, factor, share in ROOT_SEARCH_SETTINGS:
         solved = root(
             lambda over: state(over)[0],
             share * (start_values - zero) / unit,

@@ -18,22 +18,22 @@ POINTS_PER_MESH = 3
 LEAST_STIFFNESS_SHARE = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
 bottom leaves the fit undefined, and this bound keeps it positive."""
-Pair = tuple[float, float]
+PairOfNumbers = tuple[float, float]
 
 
-class Surface(NamedTuple):
+class PatchSurface(NamedTuple):
     """A patch at a depth: padded heights, first node and spacing along x and y, rectangle x0, x1, y0, y1 about it,
     depth and least distance (m)."""
 
     padded: Array
-    origin: Pair
-    step: Pair
+    origin: PairOfNumbers
+    step: PairOfNumbers
     box: tuple[float, float, float, float]
     depth: float
     low: float
 
 
-class FineNet(NamedTuple):
+class FineGrid(NamedTuple):
     """Strips of a patch: y, low and high end in x (s,) and width (m); pressure (s, n) in the cells from the leading
     edge back (Pa)."""
 
@@ -55,13 +55,13 @@ def overlap_pressure(surface, height, pressure_shape):
 
 
 @compiled
-def mesh_of(rectangle, cell_count):
+def cell_sizes(rectangle, cell_count):
     """Cell sizes dx, dy (m) of a grid of cells x cells over a rectangle."""
     return (rectangle[1] - rectangle[0]) / cell_count, (rectangle[3] - rectangle[2]) / cell_count
 
 
 @compiled
-def coarse_net(surface, cell_count, pressure_shape):
+def coarse_cells(surface, cell_count, pressure_shape):
     """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y.
 
     The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
@@ -72,7 +72,7 @@ def coarse_net(surface, cell_count, pressure_shape):
         np.empty((cell_count, cell_count)),
     )
     padded, origin, step, box, depth, _ = surface
-    dx, dy = mesh_of(box, cell_count)
+    dx, dy = cell_sizes(box, cell_count)
     for j in range(cell_count):
         v = (box[2] + (j + 0.5) * dy - origin[1]) / step[1]
         for i in range(cell_count):
@@ -86,10 +86,10 @@ def coarse_net(surface, cell_count, pressure_shape):
 
 
 @compiled
-def resultant(surface, point_count, pressure_shape):
+def pressure_resultant(surface, point_count, pressure_shape):
     """Integral of W p over the rectangle (m^3), by the midpoint rule with points x points points."""
     total, (padded, origin, step, box, _, _) = 0.0, surface
-    dx, dy = mesh_of(box, point_count)
+    dx, dy = cell_sizes(box, point_count)
     for j in range(point_count):
         row = row_at(padded, (box[2] + (j + 0.5) * dy - origin[1]) / step[1])
         for i in range(point_count):
@@ -107,7 +107,7 @@ def corner_integral(x, y):
 
 
 @compiled
-def displacement(pressure, dx, dy, contact_modulus):
+def normal_displacement(pressure, dx, dy, contact_modulus):
     """Normal displacement (m) of both bodies together at the centres of the grid cells, by a pressure (Pa) on each
     cell."""
     cells = pressure.shape[0]
@@ -147,7 +147,9 @@ def covariances(displacements, heights, covered_shares):
 
 @compiled
 def weighted_mean(cell_values, cell_weights):
-    """Weighted mean of ``cell_values``; weights of the same shape. Loops compile ten times as fast as array expressions."""
+    """Weighted mean of ``cell_values``; weights of the same shape. Loops compile ten times as fast as array
+    expressions.
+    """
     total = weight = 0.0
     for k in range(cell_values.size):
         total += cell_weights.flat[k] * cell_values.flat[k]
@@ -179,21 +181,21 @@ def coarse_fit(surface, cell_count, pressure_shape, fit_kind, contact_modulus):
 
     The approach is the mean of u + h weighted by the pressure: the work of the pressure by the load.
     """
-    height, pressure, cover = coarse_net(surface, cell_count, pressure_shape)
-    dx, dy = mesh_of(surface.box, cell_count)
-    u = displacement(pressure, dx, dy, contact_modulus)
+    height, pressure, cover = coarse_cells(surface, cell_count, pressure_shape)
+    dx, dy = cell_sizes(surface.box, cell_count)
+    u = normal_displacement(pressure, dx, dy, contact_modulus)
     mean_u, both, square = covariances(u, height, cover)
     if fit_kind == GRADIENT:
         both, square = slope_products(u, height, cover, dx, dy, True)
     least = LEAST_STIFFNESS_SHARE * (surface.depth - surface.low) / mean_u
     stiffness = max(-both / square, least) if square > 0.0 else least
-    total = resultant(surface, POINTS_PER_MESH * cell_count, pressure_shape)
+    total = pressure_resultant(surface, POINTS_PER_MESH * cell_count, pressure_shape)
     approach = stiffness * weighted_mean(u, pressure) + weighted_mean(height, pressure)
     return stiffness, approach, total
 
 
 @compiled
-def tangential(traction, dx, dy, nu):
+def tangential_displacement(traction, dx, dy, nu):
     """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction of this shape (Cerruti)."""
     cells = traction.shape[1]
     corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
@@ -272,11 +274,11 @@ def tangential_displacement_sums(x, y, tangential_loads, at_x, at_y, nu):
 
 
 @compiled
-def strips(surface, line_count, cell_count, pressure_shape):
-    """``FineNet`` of a patch, with the product W p in place of the pressure.
+def fine_strips(surface, line_count, cell_count, pressure_shape):
+    """``FineGrid`` of a patch, with the product W p in place of the pressure.
 
-    Each of ``line_count`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
-    depth.
+    Each of ``line_count`` lines gives one strip per interval in which h < depth, its ends where the interpolation
+    passes the depth.
     """
     (padded, origin, step, box, depth, _), looks = surface, 2
     width = (box[3] - box[2]) / line_count
@@ -293,9 +295,9 @@ def strips(surface, line_count, cell_count, pressure_shape):
         for m in range(first + 1, last + 1):
             now = value_along_row(row, m / looks) < depth
             if now and not inside:
-                start = crossing(row, depth, m / looks, (m - 1) / looks)
+                start = depth_crossing(row, depth, m / looks, (m - 1) / looks)
             if inside and (not now or m == last):
-                end = crossing(row, depth, (m - 1) / looks, m / looks) if not now else m / looks
+                end = depth_crossing(row, depth, (m - 1) / looks, m / looks) if not now else m / looks
                 y[count], low_x[count], high_x[count] = centre, origin[0] + start * step[0], origin[0] + end * step[0]
                 count += 1
             inside = now
@@ -306,11 +308,11 @@ def strips(surface, line_count, cell_count, pressure_shape):
         for i in range(cell_count):
             h = value_along_row(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
             pressure[s, i] = overlap_pressure(surface, h, pressure_shape)
-    return FineNet(y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), width, pressure)
+    return FineGrid(y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), width, pressure)
 
 
 @compiled
-def crossing(height_row, depth, inner_position, outer_position):
+def depth_crossing(height_row, depth, inner_position, outer_position):
     """Position where the row's height equals the depth, between points below and not below it (false position, Illinois
     rule)."""
     at_inner, at_outer = (
@@ -335,8 +337,8 @@ def crossing(height_row, depth, inner_position, outer_position):
 
 
 @compiled
-def march(fine_net, mu, flexibility, creepages, traction):
-    """FASTSIM along the strips of a ``FineNet``, for creepages and spin ``creepages``; fills the tractions (s, n, 2).
+def march_strips(fine_net, mu, flexibility, creepages, traction):
+    """FASTSIM along the strips of a ``FineGrid``, for creepages and spin ``creepages``; fills the tractions (s, n, 2).
 
     Returns fx, fy (N), mz (N m, about x = y = 0), the area that sticks and the whole area (m^2). The march is the
     second-order one: half a first step, and the exact turning of a slipping traction.
@@ -396,7 +398,7 @@ def coarse_tractions(fine_net, traction, rectangle, cell_count):
     """Mean tractions (2, cells, cells) on the coarse grid; each strip cell counts by its overlap with the coarse
     cell."""
     (y, low_x, high_x, width, _), sums = fine_net, np.zeros((2, cell_count, cell_count))
-    dx, dy = mesh_of(rectangle, cell_count)
+    dx, dy = cell_sizes(rectangle, cell_count)
     steps = traction.shape[1]
     for s in range(y.size):
         length = (high_x[s] - low_x[s]) / steps

@@ -23,25 +23,25 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from models.contact.inputs import Array, quantity
-from models.contact.patches import Patch, ridges
+from models.contact.inputs import Array, checked_quantity
+from models.contact.patches import Patch, ridge_indices
 from models.contact.profiles import ContactProfile
-from models.contact.undeformed_distance import Distance
+from models.contact.undeformed_distance import UndeformedDistance
 from models.core.errors import InputError, RunFailed
 
 SURROUNDINGS_DISTANCE = 2e-4
 """Distance (m) between the surfaces up to which the surroundings of a touching place are included; steel yields long
 before.
 """
-NODES = 121
+NODE_COUNT = 121
 """Number of nodes of an undeformed distance along each axis."""
 LARGEST_ROLL = 0.06
 """Largest roll angle (rad) of the wheelset that is searched."""
-ITERATIONS = 12
+ITERATION_COUNT = 12
 
 
 @dataclass(frozen=True)
-class Track:
+class TrackGeometry:
     """Track geometry. gauge : between the rails (m), measured ``gauge_depth`` below their tops (m). inclination : of
     the rails (rad)."""
 
@@ -51,7 +51,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Wheelset:
+class WheelsetGeometry:
     """Wheelset geometry. radius : at the taping line (m). back_to_back : between the flanges' backs (m). taping :
     distance of the taping line from the back (m)."""
 
@@ -66,7 +66,7 @@ class Wheelset:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class WheelsetPose:
     """Position and attitude of the wheelset, seen from one side.
 
     shift : towards this side's rail (m). yaw, roll : rad. fall : of the axle (m) below the height at which the taping
@@ -111,13 +111,13 @@ class WheelAndRail:
 
     wheel: ContactProfile
     rail: ContactProfile
-    wheelset: Wheelset
+    wheelset: WheelsetGeometry
 
-    def axle_centre(self, wheelset_pose: Pose) -> Array:
+    def axle_centre(self, wheelset_pose: WheelsetPose) -> Array:
         """Position (3,) of the middle of the axle in the track's coordinates (m)."""
         return np.array([0.0, wheelset_pose.shift, wheelset_pose.fall - self.wheelset.radius])
 
-    def outline(self, wheelset_pose: Pose) -> Array:
+    def outline(self, wheelset_pose: WheelsetPose) -> Array:
         """Points (n, 3) of the wheel's surface nearest to straight rails, in the track's coordinates (m)."""
         y, radius = self.wheel.y, self.wheelset.radius + self.wheel.z
         lead = np.sin(wheelset_pose.roll) * np.tan(wheelset_pose.yaw)
@@ -126,7 +126,7 @@ class WheelAndRail:
         points = np.column_stack([radius * np.sin(angle), self.wheelset.arm + y, radius * np.cos(angle)])
         return points @ wheelset_pose.rotation.T + self.axle_centre(wheelset_pose)
 
-    def gaps(self, wheelset_pose: Pose) -> tuple[Array, Array]:
+    def gaps(self, wheelset_pose: WheelsetPose) -> tuple[Array, Array]:
         """Points of the wheel's outline (n, 3) above the rail, and the vertical gap (m) between each point and the
         rail."""
         points = self.outline(wheelset_pose)
@@ -142,15 +142,15 @@ class WheelAndRail:
             )
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
-    def clearance(self, wheelset_pose: Pose) -> float:
+    def clearance(self, wheelset_pose: WheelsetPose) -> float:
         """Least vertical gap (m) between wheel and rail, refined between the points by a parabola."""
         gap = self.gaps(wheelset_pose)[1]
         k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
-        rise, bend = _parabola(gap, k)
+        rise, bend = _parabola_derivatives(gap, k)
         return float(gap[k] - 0.5 * rise**2 / bend) if bend > abs(rise) else float(gap.min())
 
 
-def _parabola(gaps: Array, point_index: int) -> tuple[float, float]:
+def _parabola_derivatives(gaps: Array, point_index: int) -> tuple[float, float]:
     """First and second derivative, per step, of the parabola through the gaps at k - 1, k, k + 1."""
     return (gaps[point_index + 1] - gaps[point_index - 1]) / 2.0, gaps[point_index + 1] - 2.0 * gaps[
         point_index
@@ -163,8 +163,8 @@ def wheel_on_rail(
     *,
     lateral_shift: float = 0.0,
     yaw: float = 0.0,
-    track: Track | None = None,
-    wheelset: Wheelset | None = None,
+    track: TrackGeometry | None = None,
+    wheelset: WheelsetGeometry | None = None,
 ) -> list[TouchingPlace]:
     """Touching places of the right wheel: first the one in contact, then others with vertical gaps below 0.2 mm in
     ascending order.
@@ -174,17 +174,17 @@ def wheel_on_rail(
     The defaults of ``track`` and ``wheelset`` are those of the Manchester contact benchmark.
     Raises InputError for values out of range, or a wheelset so placed that both wheels cannot touch.
     """
-    track, wheelset = track or Track(), wheelset or Wheelset()
-    quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
-    quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
+    track, wheelset = track or TrackGeometry(), wheelset or WheelsetGeometry()
+    checked_quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
+    checked_quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
     side = WheelAndRail(wheel, rail_in_track(rail, track), wheelset)
-    touches = touches_of(side, touching_pose(side, lateral_shift, yaw))
+    touches = touching_places(side, touching_pose(side, lateral_shift, yaw))
     if not touches:
         raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
     return touches
 
 
-def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
+def rail_in_track(rail: ContactProfile, track: TrackGeometry) -> ContactProfile:
     """The rail profile as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the
     gauge.
     """
@@ -203,7 +203,7 @@ def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
     return ContactProfile(y - face + track.gauge / 2.0, z, inclined.smoothing)
 
 
-def lowest_point(wheel_and_rail: WheelAndRail, wheelset_pose: Pose) -> Array:
+def lowest_point(wheel_and_rail: WheelAndRail, wheelset_pose: WheelsetPose) -> Array:
     """Point (3,) of the wheel's outline nearest to the rail, refined between the points by a parabola, in the track's
     coordinates (m)."""
     points, gap = wheel_and_rail.gaps(wheelset_pose)
@@ -214,21 +214,21 @@ def lowest_point(wheel_and_rail: WheelAndRail, wheelset_pose: Pose) -> Array:
 
 def _parabola_minimum(gaps: Array, point_index: int) -> float:
     """Offset, in steps from point k, at which the parabola through three gaps has its minimum."""
-    rise, bend = _parabola(gaps, point_index)
+    rise, bend = _parabola_derivatives(gaps, point_index)
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
 
 
 def touching_pose(
     wheel_and_rail: WheelAndRail, lateral_shift: float, yaw: float, left_wheel_and_rail: WheelAndRail | None = None
-) -> Pose:
-    """Pose of the wheelset in which both wheels just touch. ``left_wheel_and_rail`` : the mirrored left side, if it differs from the
-    right one.
+) -> WheelsetPose:
+    """Pose of the wheelset in which both wheels just touch. ``left_wheel_and_rail`` : the mirrored left side, if it
+    differs from the right one.
     """
     left_side = left_wheel_and_rail or wheel_and_rail
 
     def right_over_left(roll: float) -> float:
-        return wheel_and_rail.clearance(Pose(lateral_shift, yaw, roll, 0.0)) - left_side.clearance(
-            Pose(-lateral_shift, -yaw, -roll, 0.0)
+        return wheel_and_rail.clearance(WheelsetPose(lateral_shift, yaw, roll, 0.0)) - left_side.clearance(
+            WheelsetPose(-lateral_shift, -yaw, -roll, 0.0)
         )
 
     if right_over_left(-LARGEST_ROLL) * right_over_left(LARGEST_ROLL) > 0.0:
@@ -236,14 +236,14 @@ def touching_pose(
             "", "lateral_shift", lateral_shift, "lets only one wheel touch: profiles, gauge and shift do not fit"
         )
     roll = float(brentq(right_over_left, -LARGEST_ROLL, LARGEST_ROLL, xtol=1e-13))
-    return Pose(lateral_shift, yaw, roll, wheel_and_rail.clearance(Pose(lateral_shift, yaw, roll, 0.0)))
+    return WheelsetPose(lateral_shift, yaw, roll, wheel_and_rail.clearance(WheelsetPose(lateral_shift, yaw, roll, 0.0)))
 
 
-def touches_of(wheel_and_rail: WheelAndRail, wheelset_pose: Pose) -> list[TouchingPlace]:
+def touching_places(wheel_and_rail: WheelAndRail, wheelset_pose: WheelsetPose) -> list[TouchingPlace]:
     """Places where a wheel touches the rail or nearly does: minima of the vertical gap, one between each two ridges."""
     points, gap = wheel_and_rail.gaps(wheelset_pose)
     touches = []
-    for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
+    for first, last in pairwise([0, *ridge_indices(gap), gap.size - 1]):
         k = first + int(np.argmin(gap[first : last + 1]))
         if gap[k] < SURROUNDINGS_DISTANCE and 0 < k < gap.size - 1:
             touches.append(_touching_place(wheel_and_rail, wheelset_pose, points, gap, (first, k, last)))
@@ -252,7 +252,7 @@ def touches_of(wheel_and_rail: WheelAndRail, wheelset_pose: Pose) -> list[Touchi
 
 def _touching_place(
     wheel_and_rail: WheelAndRail,
-    wheelset_pose: Pose,
+    wheelset_pose: WheelsetPose,
     outline_points: Array,
     gaps: Array,
     minimum_and_ridges: tuple[int, int, int],
@@ -284,22 +284,22 @@ def _touching_place(
 
 def distance_over(
     wheel_and_rail: WheelAndRail,
-    wheelset_pose: Pose,
+    wheelset_pose: WheelsetPose,
     contact_point: Array,
     plane_angle: float,
     contour_limits: tuple[float, float],
-) -> Distance:
+) -> UndeformedDistance:
     """Undeformed distance over the tangent plane at a contact point of the rail, between two ends along the rail's
     contour.
 
-    contact_point : x, y, z in the track (m); plane_angle : of the plane (rad); contour_limits : ends, from the contact point
-    (m).
+    contact_point : x, y, z in the track (m); plane_angle : of the plane (rad); contour_limits : ends, from the contact
+    point (m).
     """
     half = 1.2 * np.sqrt(2.0 * SURROUNDINGS_DISTANCE * wheel_and_rail.wheelset.radius / np.cos(plane_angle))
     rail_s, rail_n = _rail_heights(wheel_and_rail.rail, contact_point, plane_angle)
-    x = np.linspace(-half, half, NODES)
-    s = np.linspace(max(contour_limits[0], rail_s[0]), min(contour_limits[1], rail_s[-1]), NODES)
-    return Distance(
+    x = np.linspace(-half, half, NODE_COUNT)
+    s = np.linspace(max(contour_limits[0], rail_s[0]), min(contour_limits[1], rail_s[-1]), NODE_COUNT)
+    return UndeformedDistance(
         x,
         s,
         CubicSpline(rail_s, rail_n)(s)[:, None]
@@ -320,7 +320,7 @@ def _rail_heights(rail: ContactProfile, contact_point: Array, plane_angle: float
 
 def _wheel_heights(
     wheel_and_rail: WheelAndRail,
-    wheelset_pose: Pose,
+    wheelset_pose: WheelsetPose,
     contact_point: Array,
     plane_angle: float,
     x: Array,
@@ -342,7 +342,7 @@ def _wheel_heights(
     )
     curve, slope, arm = wheel_and_rail.wheel.curve, wheel_and_rail.wheel.curve.derivative(), wheel_and_rail.wheelset.arm
     height = np.zeros((contour_positions.size, x.size))
-    for _ in range(ITERATIONS):
+    for _ in range(ITERATION_COUNT):
         q = base + height[..., None] * into
         y, axle = (
             np.clip(q[..., 1] - arm, wheel_and_rail.wheel.y[0], wheel_and_rail.wheel.y[-1]),

@@ -22,10 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from models.contact.inputs import Array, quantity
+from models.contact.inputs import Array, checked_quantity
 from models.contact.material import MaterialPair
-from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.wheel_on_rail import Pose, TouchingPlace, WheelAndRail, touches_of, touching_pose
+from models.contact.simplified_theory import NormalContact, PatchPressure, solve_normal_contact, solve_rolling_contact
+from models.contact.wheel_on_rail import TouchingPlace, WheelAndRail, WheelsetPose, touching_places, touching_pose
 from models.core.errors import RunFailed
 from models.rail.joined_patches import PatchShare, exact_patch_shares
 
@@ -115,7 +115,7 @@ class WheelsetPlacement:
 
     shift: float
     yaw: float
-    roll: float
+    solve_rolling_contact: float
     spin_speed: float
     right: tuple[PatchReport, ...]
     left: tuple[PatchReport, ...]
@@ -130,7 +130,7 @@ class LoadedWheel:
     known. approach : vertical (m). creep_lift : vertical part of the creep forces, upwards on the rail (N).
     normal_force : that of the normal forces (N). moment : of the creep forces about the axle (N m)."""
 
-    pose: Pose
+    pose: WheelsetPose
     touches: list[TouchingPlace]
     creepages: list[ForceOrCreepage]
     normal_contact: NormalContact
@@ -178,8 +178,8 @@ class WheelsetContact:
         Raises InputError as wheel_on_rail, and RunFailed where the load presses the bodies into each other beyond all
         measure, where no normal force carries the load, or where a wheel has climbed its flange.
         """
-        quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
-        quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
+        checked_quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
+        checked_quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
         pose = touching_pose(self.side, lateral_shift, yaw)
         level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
         for _ in range(ROLL_ITERATIONS):
@@ -199,23 +199,23 @@ class WheelsetContact:
             WheelsetPlacement(lateral_shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels))
         )
 
-    def _both_wheels(self, pose: Pose, spin_speed: float) -> list[LoadedWheel]:
+    def _both_wheels(self, pose: WheelsetPose, spin_speed: float) -> list[LoadedWheel]:
         """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
         return [
-            self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin_speed)
+            self._wheel(WheelsetPose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin_speed)
             for sign in SIDE_SIGNS
         ]
 
-    def _wheel(self, wheel_pose: Pose, spin_speed: float) -> LoadedWheel:
+    def _wheel(self, wheel_pose: WheelsetPose, spin_speed: float) -> LoadedWheel:
         pose = replace(wheel_pose, fall=self.side.clearance(wheel_pose))
-        touches = touches_of(self.side, pose)
+        touches = touching_places(self.side, pose)
         creepages = [self._creepage(pose, touch, spin_speed) for touch in touches]
 
         def by_normal(normal: float) -> LoadedWheel:
-            pressed = press([touch.patch for touch in touches], self.material_pair, load=normal)
+            pressed = solve_normal_contact([touch.patch for touch in touches], self.material_pair, load=normal)
             return LoadedWheel(pose, touches, creepages, pressed, pressed.approach, normal)
 
         return self._in_vertical_equilibrium(by_normal, self.load)
@@ -275,14 +275,16 @@ class WheelsetContact:
                 forces.append((0.0, 0.0, 0.0))
                 continue
             single_patch = replace(wheel.normal_contact, patches=(replace(patch_pressure, load=load),))
-            creep = roll(single_patch, self.friction, *creepage, cell_count=round(CELLS_PER_STRIP / self.cell_factor))
+            creep = solve_rolling_contact(
+                single_patch, self.friction, *creepage, cell_count=round(CELLS_PER_STRIP / self.cell_factor)
+            )
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.rotation[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
         moment = sum(float(axle @ _patch_moment(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
         return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
 
-    def _creepage(self, pose: Pose, touch: TouchingPlace, spin_speed: float) -> ForceOrCreepage:
+    def _creepage(self, pose: WheelsetPose, touch: TouchingPlace, spin_speed: float) -> ForceOrCreepage:
         """Longitudinal and lateral creepage, and spin (1/m), at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
@@ -295,7 +297,7 @@ class WheelsetContact:
     def _radius(self, touch: TouchingPlace) -> float:
         return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
-    def _arm(self, pose: Pose, touch: TouchingPlace) -> Array:
+    def _arm(self, pose: WheelsetPose, touch: TouchingPlace) -> Array:
         """Vector from the wheelset's centre to a point of first touch, in the track's axes (m)."""
         height_below = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.rotation @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, height_below])

@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from scipy.optimize import brentq, root
 
-from models.contact.inputs import Array, number, quantity
+from models.contact.inputs import Array, checked_number, checked_quantity
 from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
 from models.core.steps import divides
@@ -240,8 +240,8 @@ class Equations:
     def __post_init__(self) -> None:
         if self.law not in LAW_NUMBERS:
             raise InputError("", "law", self.law, "is not known", tuple(LAW_NUMBERS))
-        number("speed", self.speed, "a speed in m/s from -200 to 200", -LARGEST_SPEED, LARGEST_SPEED)
-        number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
+        checked_number("speed", self.speed, "a speed in m/s from -200 to 200", -LARGEST_SPEED, LARGEST_SPEED)
+        checked_number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
     def body(self) -> Body:
@@ -392,9 +392,9 @@ class Equations:
 
     def _checked_step_count(self, state: Array, duration: float, step: float, stride: int) -> int:
         """Number of steps of a run, after checks of state, duration, step and stride."""
-        if quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
+        if checked_quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
             raise InputError("", "state", None, f"must be {STATE_COUNT} finite numbers")
-        if not 0.0 < number("step", step, "a step in s") * self._fastest_rate <= ALLOWED_STEP_RATE:
+        if not 0.0 < checked_number("step", step, "a step in s") * self._fastest_rate <= ALLOWED_STEP_RATE:
             raise InputError(
                 "",
                 "step",
@@ -402,7 +402,7 @@ class Equations:
                 f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest_rate:.3g} s: the "
                 f"fastest motion has a rate of {self._fastest_rate:.4g} 1/s",
             )
-        if not divides(step, number("duration", duration, "a time in s")):
+        if not divides(step, checked_number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
         count = round(duration / step)
         if isinstance(stride, bool) or not isinstance(stride, int) or not 1 <= stride <= count or count % stride:

@@ -28,7 +28,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.contact.inputs import Array, number, quantity
+from models.contact.inputs import Array, checked_number, checked_quantity
 from models.core.errors import InputError
 from models.rail.rolling_radius_table import RollingRadiusTable
 
@@ -92,7 +92,7 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: f
     is no wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the
     table; or where there are several and ``centre_guess`` is not given.
     """
-    amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
+    amplitude = checked_number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
     first_displacement, last_displacement = table.displacement_range
     if 0.0 <= 2.0 * amplitude - (last_displacement - first_displacement) <= AMPLITUDE_TOLERANCE * amplitude:
         amplitude = (last_displacement - first_displacement) / 2.0
@@ -252,7 +252,7 @@ def harmonic_linearised_conicity(
         displacements = np.concatenate([-displacements[:0:-1], displacements])
         differences = np.concatenate([-differences[:0:-1], differences])
     largest_amplitude = min(displacements[-1] - centre, centre - displacements[0])
-    quantity(
+    checked_quantity(
         "amplitude",
         amplitude,
         f"an amplitude above 0 and up to {largest_amplitude:g}, the table's",

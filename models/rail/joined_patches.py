@@ -13,8 +13,8 @@ from scipy.ndimage import label
 
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
-from models.contact.normal_problem import centres, solve_normal
-from models.contact.patches import Box, Patch
+from models.contact.normal_problem import cell_centres, solve_normal
+from models.contact.patches import Patch, Rectangle
 from models.contact.simplified_theory import PatchPressure
 from models.core.errors import InputError, RunFailed
 
@@ -41,7 +41,7 @@ class PatchShare:
     x: float
     y: float
     area: float
-    box: Box
+    box: Rectangle
     peak: float
     piece: int
 
@@ -116,8 +116,8 @@ def _grid_around(
     narrowest = min(patch.box[3] - patch.box[2] for patch in approximate_patches)
     rows = round(min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y) / cell_factor)
     columns = round(CELLS_X / cell_factor)
-    x_centres = (x0 + x1) / 2.0 + centres(columns, margin * (x1 - x0) / columns)
-    return x_centres, (y0 + y1) / 2.0 + centres(rows, high / rows)
+    x_centres = (x0 + x1) / 2.0 + cell_centres(columns, margin * (x1 - x0) / columns)
+    return x_centres, (y0 + y1) / 2.0 + cell_centres(rows, high / rows)
 
 
 def _heights_on_grid(patch: Patch, x: Array, y: Array) -> Array:

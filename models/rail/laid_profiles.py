@@ -9,16 +9,23 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.inputs import Array
-from models.contact.profile_files import Kind, read_profile
+from models.contact.profile_files import ProfileKind, read_profile
 from models.contact.profiles import ContactProfile
-from models.contact.standard_profiles import RAILS, WHEELS
-from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, rail_in_track, touching_pose
+from models.contact.standard_profiles import BUILT_IN_RAILS, BUILT_IN_WHEELS
+from models.contact.wheel_on_rail import (
+    TrackGeometry,
+    WheelAndRail,
+    WheelsetGeometry,
+    WheelsetPose,
+    rail_in_track,
+    touching_pose,
+)
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
 from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile
 
-BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
+BUILT_IN = {"wheel": BUILT_IN_WHEELS, "rail": BUILT_IN_RAILS}
 NODE_SPACING, KNOT_SPACING = 1e-4, 2.5e-4
 """Spacing (m) of the nodes along the wheel's contour and of the knots along the rail's."""
 LATERAL_SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
@@ -66,8 +73,8 @@ class Profiles(Strict):
         rail = _contact_profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _contact_profile(self.wheel, "wheel", self.smoothing),
-            rail_in_track(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
-            Wheelset(radius, self.back_to_back, self.taping),
+            rail_in_track(rail, TrackGeometry(self.gauge, self.gauge_depth, self.inclination)),
+            WheelsetGeometry(radius, self.back_to_back, self.taping),
         )
 
     def first_touch_pose(self, radius: float, lateral_shift: float) -> tuple[float, float]:
@@ -75,10 +82,10 @@ class Profiles(Strict):
         wheels just touch at a lateral displacement (m). Raises InputError if they cannot."""
         wheel_on_rail = self.wheel_on_rail(radius)
         pose = touching_pose(wheel_on_rail, lateral_shift, 0.0)
-        return pose.fall - wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
+        return pose.fall - wheel_on_rail.clearance(WheelsetPose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
-def _contact_profile(name: str, profile_kind: Kind, smoothing: float) -> ContactProfile:
+def _contact_profile(name: str, profile_kind: ProfileKind, smoothing: float) -> ContactProfile:
     known = BUILT_IN[profile_kind]
     if name in known:
         return known[name]()
@@ -106,7 +113,7 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
     knots = _evenly_spaced(wheel_on_rail.rail.y, wheel_on_rail.rail.z, KNOT_SPACING)
     cubic = CubicSpline(knots, wheel_on_rail.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
-    level = wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
+    level = wheel_on_rail.clearance(WheelsetPose(0.0, 0.0, 0.0, 0.0)) - radius
     head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, wheel_on_rail.wheelset.arm, level]]
     return LaidProfile(
         *(_read_only_records(*pair) for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE), (rail, RAIL_KNOT)))

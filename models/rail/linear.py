@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.inputs import Array
-from models.contact.linear_theory import coefficients
+from models.contact.linear_theory import kalker_coefficients
 from models.core.errors import InputError
 from models.rail.wheelset import Wheelset
 
@@ -79,7 +79,7 @@ def kalker_matrix(wheelset: Wheelset) -> Array:
     """Matrix (3, 3) of Kalker's linear theory, negative creep forces of one wheel per creepage: rows -fx, -fy, -mz,
     columns xi_x, xi_y, spin; N, N m, N m^2."""
     contact, pair = wheelset.ellipse, wheelset.material_pair
-    c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
+    c, area = kalker_coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
     turn = area**1.5 * c.c23
     return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
 

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.contact.hertz import aspect
+from models.contact.hertz import axis_ratio_and_integrals
 from models.contact.inputs import Array
 from models.machine.compiled import lean, njit
 from models.machine.records import record
@@ -241,7 +241,9 @@ def normal_force_and_axes(penetration, curvature_along, curvature_across, modulu
     zeros where there is a gap."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
-    g, cosine, sine = aspect(min(curvature_along, curvature_across) / max(curvature_along, curvature_across))
+    g, cosine, sine = axis_ratio_and_integrals(
+        min(curvature_along, curvature_across) / max(curvature_along, curvature_across)
+    )
     short = math.sqrt(penetration * cosine / (max(curvature_along, curvature_across) * (cosine + sine)))
     load = 2.0 / 3.0 * math.pi * modulus * penetration * short / (g * (cosine + sine))
     if curvature_along <= curvature_across:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import Array, quantity
-from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, touching_pose
+from models.contact.inputs import Array, checked_quantity
+from models.contact.wheel_on_rail import WheelAndRail, WheelsetPose, lowest_point, touching_pose
 from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
@@ -40,7 +40,9 @@ class RollingRadiusTable:
     source: str = ""
 
     def __post_init__(self) -> None:
-        y, dr = (quantity(name, getattr(self, name), "finite lengths") for name in ("displacements", "differences"))
+        y, dr = (
+            checked_quantity(name, getattr(self, name), "finite lengths") for name in ("displacements", "differences")
+        )
         if y.ndim != 1 or y.shape != dr.shape or y.size < FEWEST_ROWS:
             shapes = [list(y.shape), list(dr.shape)]
             raise InputError(
@@ -133,7 +135,9 @@ def rolling_radii_of(
     displacements : (n,) m, ascending. Displacements at the ends at which not both wheels touch are left out.
     report_progress : called with the completed share. Raises InputError where fewer than three are left.
     """
-    shifts = quantity("displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03)
+    shifts = checked_quantity(
+        "displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03
+    )
     rows = []
     for k, shift in enumerate(shifts.tolist()):
         report_progress(k / shifts.size)
@@ -152,10 +156,12 @@ def rolling_radii_of(
 def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
     pose = touching_pose(right_side, lateral_shift, 0.0, left_side)
-    return rolling_radius(right_side, pose), rolling_radius(left_side, Pose(-lateral_shift, 0.0, -pose.roll, pose.fall))
+    return rolling_radius(right_side, pose), rolling_radius(
+        left_side, WheelsetPose(-lateral_shift, 0.0, -pose.roll, pose.fall)
+    )
 
 
-def rolling_radius(wheel_and_rail: WheelAndRail, pose: Pose) -> float:
+def rolling_radius(wheel_and_rail: WheelAndRail, pose: WheelsetPose) -> float:
     """Rolling radius (m) of a wheel at the point nearest to its rail."""
     across = float((pose.rotation.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.axle_centre(pose)))[1])
     return float(wheel_and_rail.wheelset.radius + wheel_and_rail.wheel.curve(across - wheel_and_rail.wheelset.arm))

@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, MARCHES
-from models.contact.fastsim_grid import grid, strips_of
-from models.contact.fastsim_many import forces
+from models.contact.fastsim import FLEXIBILITY_KINDS, MARCH_KINDS
+from models.contact.fastsim_grid import count_of_strips, ellipse_grid
+from models.contact.fastsim_many import fill_contact_forces
 from models.contact.fastsim_records import CONTACT, FORCES, cells_in, strips_in
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficient_at, flexibilities_at
@@ -79,7 +79,7 @@ WHEELSET = np.dtype(
 )
 """Motion and resultant of a wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s);
 angular velocity, spin about the axle included (rad/s); force (N) and moment about the centre (N m) on it."""
-BLENDED_BRISTLES, SECOND_ORDER_MARCH = KINDS["blended"], MARCHES["second-order"]
+BLENDED_BRISTLES, SECOND_ORDER_MARCH = FLEXIBILITY_KINDS["blended"], MARCH_KINDS["second-order"]
 
 
 class Rails(NamedTuple):
@@ -107,7 +107,7 @@ class Workspace(NamedTuple):
     contacts: Array
     motion: Array
     directed: Array
-    forces: Array
+    fill_contact_forces: Array
 
 
 class PatchPlace(NamedTuple):
@@ -152,7 +152,7 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
     shape = w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu
     wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
     profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
-    net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
+    net = ellipse_grid(cells, int(count_of_strips(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
     laid = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
     return Rails(wheels, laid, net.strips, net.cells, net.middle, LAW_NUMBERS[law])
 
@@ -247,7 +247,7 @@ def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
         contact.xi_x, contact.xi_y = sign * slip[k].vx / reference_speed, slip[k].aside / reference_speed
         contact.spin = sign * slip[k].turn / reference_speed
     if rails.law == FASTSIM:
-        forces(
+        fill_contact_forces(
             contacts,
             strips_in(rails.strips),
             cells_in(rails.cells, rails.middle),

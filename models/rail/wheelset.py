@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field, ValidationError, model_validator
 from scipy.optimize import brentq
 
-from models.contact.hertz import Hertz, by_load
+from models.contact.hertz import HertzContact, by_load
 from models.contact.material import STEEL, Material, MaterialPair
 from models.core.strict import Strict, input_error_from_faults, quantity
 from models.rail.laid_profiles import Profiles
@@ -98,7 +98,7 @@ class Wheelset(Strict):
         return Wheelset(**{name: getattr(self, name) for name in type(self).model_fields} | values)
 
     @property
-    def ellipse(self) -> Hertz:
+    def ellipse(self) -> HertzContact:
         """Contact ellipse of one wheel in the middle of the track, under half the load."""
         cosine = self.cone_sine_and_cosine[1]
         load = self.load / (2.0 * cosine)

@@ -17,10 +17,10 @@ from functools import cache
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, MARCHES
-from models.contact.fastsim_grid import Grid, grid, strips_of
-from models.contact.fastsim_many import forces, forces_within
-from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
+from models.contact.fastsim import FLEXIBILITY_KINDS, MARCH_KINDS
+from models.contact.fastsim_grid import FastsimGrid, count_of_strips, ellipse_grid
+from models.contact.fastsim_many import fill_contact_forces, fill_contact_forces_in_place
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, MarchWorkspace, cells_in, strips_in
 from models.core.errors import InputError
 from models.machine.compiled import lean
 from models.machine.records import records, stacked
@@ -28,7 +28,7 @@ from models.machine.stack import start
 
 FADING_SPEED = 0.1
 """Speed (m/s) of the tread below which slip is taken relative to this speed instead."""
-THREE_BRISTLES, SECOND_ORDER_MARCH = KINDS["three"], MARCHES["second-order"]
+THREE_BRISTLES, SECOND_ORDER_MARCH = FLEXIBILITY_KINDS["three"], MARCH_KINDS["second-order"]
 FIRST_FLEXIBILITY = 7
 """Index of the first flexibility among the numbers of a contact."""
 UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
@@ -36,11 +36,11 @@ UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1
 
 
 @cache
-def net(cells: int) -> Grid:
+def net(cells: int) -> FastsimGrid:
     """Grid of a contact patch with ``cells`` cells per strip, from 3 to 200. Raises InputError otherwise."""
     if isinstance(cells, bool) or not isinstance(cells, int) or not 3 <= cells <= 200:
         raise InputError("", "cells", cells, "must be a whole number from 3 to 200")
-    return grid(cells, int(strips_of(np.array(1.0), cells)), "parabolic")
+    return ellipse_grid(cells, int(count_of_strips(np.array(1.0), cells)), "parabolic")
 
 
 def cornering_stiffness_factor(cells: int) -> float:
@@ -49,7 +49,7 @@ def cornering_stiffness_factor(cells: int) -> float:
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT_CONTACT.items():
         contacts[name] = value
-    forces(contacts, *net(cells).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
+    fill_contact_forces(contacts, *net(cells).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
     return -float(answers["fy"][0])
 
 
@@ -60,20 +60,20 @@ def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, force
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
     sliding_velocities (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the
-    tread (m/s); strips, cells, middle_cells : the patch's net as ``Grid`` holds it.
+    tread (m/s); strips, cells, middle_cells : the patch's net as ``FastsimGrid`` holds it.
     """
     w = len(contacts)
     patches, answers = records(start(contacts), w, CONTACT), records(start(forces_out), w, FORCES)
     lines, cell_table = strips_in(strips), cells_in(cells, middle_cells)
-    room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
+    room, slowest = MarchWorkspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, sliding_velocities[i, 3])
     _creepages(1.0, patches, sliding_velocities)
-    forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
+    fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
         backwards = stacked(w, FORCES)
         _creepages(-1.0, patches, sliding_velocities)
-        forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
+        fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
         _blend_directions(sliding_velocities, backwards, answers)
 
 

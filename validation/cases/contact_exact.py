@@ -10,7 +10,7 @@ import numpy as np
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.material import Material, MaterialPair
-from models.contact.normal_problem import NormalSolution, centres, hertzian, solve_normal
+from models.contact.normal_problem import NormalSolution, cell_centres, hertzian_pressure_grid, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
 from models.systems.contact.work_precision import ContactCase
@@ -84,7 +84,7 @@ def numerical_hertz(axis_ratio: float, cells: int) -> tuple[NormalSolution, Arra
     a, b = CONTACT_SIZE * axis_ratio**0.5, CONTACT_SIZE / axis_ratio**0.5
     truth = by_axes(a, b, MATERIAL_PAIR, load=LOAD)
     dx, dy = 2 * a / cells, 2 * b / cells
-    x, y = centres(cells + 5, dx), centres(cells + 5, dy)
+    x, y = cell_centres(cells + 5, dx), cell_centres(cells + 5, dy)
     solved = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, MATERIAL_PAIR, load=LOAD)
     values = np.array([solved.approach, solved.pressure.max(), solved.area])
     return solved, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
@@ -137,7 +137,7 @@ def _strip_traction(cells: int, share: float) -> tuple[list[float], list[float],
     by that of full sliding. share: creepage divided by the creepage of full sliding."""
     b = CONTACT_SIZE / STRIP_AXIS_RATIO**0.5
     a = STRIP_AXIS_RATIO * b
-    pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
+    pressed = hertzian_pressure_grid(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
     bound = MU * 1.5 * LOAD / (np.pi * a * b)
     solved = solve_rolling(pressed, MU, 2 * share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR)
     traction = -solved.traction[cells // 2, :, 0] / bound
@@ -165,7 +165,7 @@ def shifted_ball(share: float, nu: float, cells: int) -> RollingSolution:
     body = Material(E=2.1e11, nu=nu)
     pair = MaterialPair(body, body)
     shift_distance = 3 * FRICTION_LIMIT * (2 - nu) / (8 * CONTACT_SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
-    return solve_shift(hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, cells), MU, shift_distance, 0.0, pair)
+    return solve_shift(hertzian_pressure_grid(CONTACT_SIZE, CONTACT_SIZE, LOAD, cells), MU, shift_distance, 0.0, pair)
 
 
 def _cattaneo_rows() -> list[Row]:
@@ -187,7 +187,7 @@ def rolling_forces(case_name: str, cells: int, sign: float = 1.0, mirror_sign: f
     creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
     ratio, xi_x, xi_y, spin = CASES[case_name]
     creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * sign
-    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cells)
+    pressed = hertzian_pressure_grid(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cells)
     across = mirror_sign * creepage
     solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR)
     return np.array([solved.fx, solved.fy, solved.mz / CONTACT_SIZE]) / FRICTION_LIMIT
@@ -195,7 +195,7 @@ def rolling_forces(case_name: str, cells: int, sign: float = 1.0, mirror_sign: f
 
 def _sliding_rows() -> list[Row]:
     """Rows on creepages so large that the whole contact area slides."""
-    pressed = hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, 20)
+    pressed = hertzian_pressure_grid(CONTACT_SIZE, CONTACT_SIZE, LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
         solved = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, MATERIAL_PAIR)
@@ -300,7 +300,7 @@ def _converged_row() -> Row:
     rng, failed = np.random.default_rng(SEED), 0
     for case, cells in (random_contact(rng) for _ in range(RANDOM_CONTACT_COUNT)):
         try:
-            solve_rolling(hertzian(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
+            solve_rolling(hertzian_pressure_grid(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
         except RunFailed:
             failed += 1
     return _bound_row(
@@ -345,7 +345,7 @@ def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
     solved = solve_rolling(
-        hertzian(a, b, value["FN_N"], cells),
+        hertzian_pressure_grid(a, b, value["FN_N"], cells),
         value["mu"],
         value["xi_x"],
         value["xi_y"],

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.hertz import Hertz, by_approach, by_load
+from models.contact.hertz import HertzContact, by_approach, by_load
 from models.contact.material import STEEL, Material, MaterialPair
 from models.core.errors import InputError
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -114,9 +114,9 @@ def _largest_errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     }
 
 
-def _exchange_axes(touching: Hertz) -> Hertz:
+def _exchange_axes(touching: HertzContact) -> HertzContact:
     """The contact with the axes x and y exchanged."""
-    return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
+    return HertzContact(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
 
 
 def _published_rows() -> list[Row]:

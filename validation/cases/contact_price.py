@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import BEST_CHOICES, remaining_errors, rolled
-from models.contact.theories import Fastsim
+from models.contact.accuracy import BEST_FASTSIM_CHOICES, remaining_errors, rolled_with_errors
+from models.contact.theories import FastsimTheory
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
@@ -139,8 +139,8 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
     theory, for every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
-        contact = case.contact(Fastsim, **BEST_CHOICES)
-        answers, error = rolled(contact, case.motion, 21)
+        contact = case.contact(FastsimTheory, **BEST_FASTSIM_CHOICES)
+        answers, error = rolled_with_errors(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
         stated.append((error.total, error.moment + MOMENT_ROUNDING * limit))
@@ -213,7 +213,7 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
     """Shares of contacts whose discretisation errors of force and of moment exceed the stated ones."""
     answers = []
     for case in cases:
-        contact = case.contact(Fastsim, **{**BEST_CHOICES, **choices})
+        contact = case.contact(FastsimTheory, **{**BEST_FASTSIM_CHOICES, **choices})
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED_CELLS)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(

@@ -15,7 +15,7 @@ from models.contact.limits import (
     YIELD_PRESSURE,
     yield_is_known,
 )
-from models.contact.theories import Fastsim, LinearTheory, OnEllipse, OnPatches, RollingContact
+from models.contact.theories import FastsimTheory, LinearTheory, RollingContact, RollingOnEllipse, RollingOnPatches
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.core.tables import METRES, table_blocks
@@ -31,7 +31,7 @@ def assumptions(scene: ContactScene, contact: RollingContact) -> list[Assumption
     listed = [*pressing_assumptions(scene, contact), *_creepage_assumptions(contact)]
     if isinstance(contact, LinearTheory):
         listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, contact)}))
-    if isinstance(contact, LinearTheory | Fastsim):
+    if isinstance(contact, LinearTheory | FastsimTheory):
         listed.append(_slender_assumption(lambda run: {"contact": np.array([contact.a / contact.b])}))
     if contact.pair.mismatch != 0.0 and contact.friction > 0.0:
         listed.append(_like_bodies_assumption(contact))
@@ -44,7 +44,7 @@ def pressing_assumptions(scene: ContactScene, contact: RollingContact) -> list[A
     if yield_is_known(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * contact.pressing.peak])}))
     return listed + (
-        _profile_assumptions(contact) if scene.profiles is not None and isinstance(contact, OnPatches) else []
+        _profile_assumptions(contact) if scene.profiles is not None and isinstance(contact, RollingOnPatches) else []
     )
 
 
@@ -82,13 +82,13 @@ def _axes_divided_by_radii(scene: ContactScene, contact: RollingContact) -> Call
     The radii are those of both bodies, or else of the distance between the undeformed surfaces.
     """
     shares: dict[str, np.ndarray] = {}
-    if isinstance(contact, OnEllipse):
+    if isinstance(contact, RollingOnEllipse):
         axes = {"x": contact.a, "y": contact.b}
         if scene.radii is not None:
             shares = {f"radii.{name}": np.array([axes[name[-1]] / abs(r)]) for name, r in scene.radii if r is not None}
         else:
             shares = {"along": 2.0 * contact.a * contact.hertz.A, "across": 2.0 * contact.b * contact.hertz.B}
-    elif isinstance(contact, OnPatches):
+    elif isinstance(contact, RollingOnPatches):
         for k, patch_pressure in enumerate(contact.pressed.patches, 1):
             curvature_along, across = patch_pressure.patch.distance.curvatures
             x0, x1, y0, y1 = patch_pressure.box
@@ -116,7 +116,9 @@ def _creepage_assumptions(contact: RollingContact) -> list[Assumption]:
     def creepages(run: Result) -> Mapping[str, np.ndarray]:
         return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
 
-    if isinstance(contact, LinearTheory) or (isinstance(contact, Fastsim) and contact.choices["falling"] is not None):
+    if isinstance(contact, LinearTheory) or (
+        isinstance(contact, FastsimTheory) and contact.choices["falling"] is not None
+    ):
         return [_small_creepage_assumption(creepages)]
     return [
         _small_creepage_assumption(creepages),
@@ -186,7 +188,7 @@ def _like_bodies_assumption(contact: RollingContact) -> Assumption:
     )
 
 
-def _profile_assumptions(contact: OnPatches) -> list[Assumption]:
+def _profile_assumptions(contact: RollingOnPatches) -> list[Assumption]:
     """Assumptions that contact patches lie within the profiles, and do not overlap."""
     parts = sorted(contact.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
     free_distances = {}

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import (
-    band,
     cells_error,
     coarser_cells,
-    moment_band,
-    slenderness,
-    spin_share,
-    used_with_moment,
+    force_error_band,
+    friction_share_with_moment,
+    moment_error_band,
+    slenderness_factor,
+    spin_weight_of_motion,
 )
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
@@ -180,7 +180,7 @@ def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool =
         coarse = fastsim(ellipses, pair, cells=coarser_cells(method.cells), **choices)
         limit = friction * np.maximum(load, 0.0)
         a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
-        share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
+        share = spin_weight_of_motion(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
         forces += _force_errors(fine, coarse, limit, a, b, share, method)
     return np.column_stack(forces) + 0.0
 
@@ -202,9 +202,9 @@ def _force_errors(
         for creep in (fine_forces, coarse_forces)
     )
     left = cells_error(relative, relative_coarse, method.cells, method.order)
-    used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
-    theory = wider * friction_limit * band(method.band, used, share)
-    moment = wider * moment_limit * moment_band(method.band, used_with_moment(used, relative[2]), share)
+    used, wider = np.hypot(relative[0], relative[1]), slenderness_factor(a, b)
+    theory = wider * friction_limit * force_error_band(method.band, used, share)
+    moment = wider * moment_limit * moment_error_band(method.band, friction_share_with_moment(used, relative[2]), share)
     return [friction_limit * left, theory, moment_limit * left, moment]
 
 

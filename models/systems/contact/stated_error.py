@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.contact.accuracy import Error
+from models.contact.accuracy import ContactErrors
 from models.contact.theories import LinearTheory, RollingContact
 from models.core.discretisation import (
     Estimate,
@@ -22,7 +22,7 @@ HALVED_CELLS = "half the cells along each axis"
 BAND_TEXT = "which 95 % of such contacts keep to"
 
 
-def with_error(run: Result, scene: ContactScene, contact: RollingContact, errors: Sequence[Error]) -> Result:
+def with_error(run: Result, scene: ContactScene, contact: RollingContact, errors: Sequence[ContactErrors]) -> Result:
     """Returns the result with the stated errors of force and moment, each as the root mean square over all creepages.
 
     Relative errors of the force refer to its root mean square. Those of the moment, which may vanish, refer to that

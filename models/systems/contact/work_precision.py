@@ -13,12 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Ellipse
+from models.contact.fastsim import FastsimEllipse
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
-from models.contact.linear_theory import coefficients
+from models.contact.linear_theory import kalker_coefficients
 from models.contact.material import MaterialPair
-from models.contact.theories import ExactOnEllipse, LinearTheory, Motion, OnEllipse, Simplified
+from models.contact.theories import (
+    CreepagesAndSpin,
+    ExactTheoryOnEllipse,
+    LinearTheory,
+    RollingOnEllipse,
+    SimplifiedTheory,
+)
 from models.core.assumptions import with_assumptions
 from models.core.discretisation import finite_rms, grid_error, with_stated_errors
 from models.core.errors import RunFailed
@@ -45,7 +51,7 @@ CREEPAGE_KINDS: dict[str, CreepageParts] = {
 EXACT_GRID_CELLS, GRID_ERROR_LIMIT = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error. The finer grid is
 used where the error on the coarser grid, divided by mu N, is above GRID_ERROR_LIMIT."""
-ForcesOfMotion = Callable[[Motion], Any]
+ForcesOfMotion = Callable[[CreepagesAndSpin], Any]
 
 
 @dataclass(frozen=True)
@@ -76,11 +82,11 @@ class ContactCase:
         return self.friction * self.load
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> CreepagesAndSpin:
         """Creepages xi_x, xi_y and spin (1/m) of the case. At ``level`` 1 a single creepage reaches mu N by the linear
         theory.
         """
-        c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
+        c, size = kalker_coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
         parts = np.array(self.parts)
         unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
@@ -90,7 +96,7 @@ class ContactCase:
         """Exact tangential force (2,), fx and fy, divided by mu N."""
         return np.array([self.fx, self.fy])
 
-    def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
+    def contact(self, theory: Callable[..., RollingOnEllipse], **choices: Any) -> RollingOnEllipse:
         """Returns the case's contact as an object of ``theory``, a theory of elliptic contacts."""
         return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
@@ -100,7 +106,7 @@ def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = EXACT_GRID_CE
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
     """
-    contact = case.contact(ExactOnEllipse)
+    contact = case.contact(ExactTheoryOnEllipse)
     scale = case.limit * np.array([1.0, 1.0, np.sqrt(case.a * case.b)])
     best, error = np.full(3, np.nan), np.inf
     for fine in finest:
@@ -148,7 +154,7 @@ class TheorySettings:
 
 def _fastsim(**choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
     def rolled(case: ContactCase, cells: int) -> ForcesOfMotion:
-        ellipse = Ellipse(case.a / case.b, case.pair, cells=cells, **choices)
+        ellipse = FastsimEllipse(case.a / case.b, case.pair, cells=cells, **choices)
         return lambda motion: ellipse(case.a, case.load, case.friction, *motion)
 
     return rolled
@@ -156,11 +162,11 @@ def _fastsim(**choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
 
 def _simplified(case: ContactCase, cells: int) -> ForcesOfMotion:
     pressed = interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair)
-    contact = Simplified(pressed, case.friction)
+    contact = SimplifiedTheory(pressed, case.friction)
     return lambda motion: contact.roll(motion, cells)
 
 
-def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
+def _rolled_by_theory(theory: Callable[..., RollingOnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
     def rolled(case: ContactCase, cells: int) -> ForcesOfMotion:
         contact = case.contact(theory)
         return lambda motion: contact.roll(motion, cells)
@@ -185,7 +191,7 @@ THEORIES_COMPARED = (
     TheorySettings("FASTSIM, three flexibilities", SECOND_ORDER_CELLS, _fastsim(flexibilities="three")),
     TheorySettings("FASTSIM, parabolic", SECOND_ORDER_CELLS, _fastsim(bound="parabolic")),
     TheorySettings("theory of 1983", SIMPLIFIED_CELLS, _simplified),
-    TheorySettings("exact theory", EXACT_CELLS, _rolled_by_theory(ExactOnEllipse)),
+    TheorySettings("exact theory", EXACT_CELLS, _rolled_by_theory(ExactTheoryOnEllipse)),
 )
 
 
@@ -235,7 +241,7 @@ LEAST_TIMED_SECONDS = 2e-5
 """Least time (s) over which an evaluation is repeated to measure its time."""
 
 
-def _forces_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tuple[Any, float]:
+def _forces_and_seconds(roll: ForcesOfMotion, motion: CreepagesAndSpin, repeats: int) -> tuple[Any, float]:
     start = time.perf_counter()
     answer = roll(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))
@@ -301,7 +307,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], pro
         "uncertainty": Channel("contact", [case.error for case in known], "mu N", "of the exact force"),
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
-    with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactOnEllipse)))
+    with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactTheoryOnEllipse)))
     left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
     return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from models.contact.accuracy import LIKELY_SHARE, coarser_cells
+from models.contact.accuracy import LIKELY_ERROR_SHARE, coarser_cells
 from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
@@ -180,7 +180,7 @@ def with_error_of_cycles(
         estimates[name] = Estimate(error, unit, error / size, KINKED_ORDER, float(min(steps)))
         if coarse_orbits:
             gaps = [getattr(orbits[k], name) - getattr(coarse_orbit, name) for k, coarse_orbit in coarse_orbits.items()]
-            left = LIKELY_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
+            left = LIKELY_ERROR_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
             estimates[f"{name} of cells"] = grid_error(left, size, unit, cells, CELL_ERROR_ORDER, MOST_CELLS)
     cells_text = (
         f", and half the cells at {len(coarse_orbits)} of {len(orbits)} cycles"

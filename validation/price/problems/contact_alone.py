@@ -12,7 +12,7 @@ from functools import cache, partial
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.contact.theories import beyond_friction
+from models.contact.theories import friction_warning
 from models.systems.contact.work_precision import THEORIES_COMPARED, TheorySettings, force_of
 from validation.contact.contact_set import read_contacts
 
@@ -104,7 +104,7 @@ class ContactAlone:
         forces = np.array([force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
         linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
-        return ContactResult(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")
+        return ContactResult(forces, counts, friction_warning(np.linalg.norm(forces, axis=1)) if linear else "")
 
 
 @cache
