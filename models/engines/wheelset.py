@@ -67,19 +67,21 @@ class EngineWheelset(Equations):
         """The wheelset in its engine, with joint coordinates."""
         return free_model(self.ENGINE, driven_wheelset(self))
 
-    def rates(self, state: Array) -> Array:
+    def rates(self, wheelset_state: Array) -> Array:
         """Time derivatives (10,) of a state (10,), computed by the engine."""
-        joints = joints_from_states(np.asarray(state, float))
+        joints = joints_from_states(np.asarray(wheelset_state, float))
         return state_rates(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
-    def _states_and_contacts(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
-        """States (m, 10) by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
-        joints = joints_from_states(state)
-        states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
+    def _states_and_contacts(
+        self, wheelset_state: Array, count: int, time_step: float, storing_stride: int
+    ) -> tuple[Array, Array]:
+        """States (m, 10) by the engine's RK4, every ``storing_stride``-th of them, and the contacts in these states."""
+        joints = joints_from_states(wheelset_state)
+        states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, time_step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < DERAILED_LIMIT)
         if away.any():
-            raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
-        return states[::stride], self.at(states[::stride])[1]
+            raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * time_step)
+        return states[::storing_stride], self.at(states[::storing_stride])[1]
 
 
 class ExudynWheelset(EngineWheelset):

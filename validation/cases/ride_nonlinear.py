@@ -153,7 +153,7 @@ def _level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
     Carlo. The tolerance of each is the accuracy that the result states."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
-    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[not quick], copies=COPY_COUNTS[not quick], seed=SEED)
+    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[not quick], copy_count=COPY_COUNTS[not quick], seed=SEED)
     rows, cells = [], [f"{road_level:g}"]
     for i, name in enumerate(copies.names):
         error = float(linear.covariance.deviation[i] / copies.deviation[i] - 1.0)
@@ -200,7 +200,7 @@ def _linear_springs_row() -> Row:
     """Row: with linear springs, the variances of the Monte Carlo copies agree with the covariance."""
     vehicle, road = vehicle_and_road("quarter_car")
     exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
-    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1], seed=SEED)
+    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[1], copy_count=COPY_COUNTS[1], seed=SEED)
     return Observed(
         "ride_nonlinear.linear",
         SYSTEM,
@@ -227,7 +227,7 @@ def _single_law_rows() -> list[Row]:
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
-        copies = copies_in_time(alone, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1] // 2, seed=SEED)
+        copies = copies_in_time(alone, road, SPEED, COPY_SECONDS[1], copy_count=COPY_COUNTS[1] // 2, seed=SEED)
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
         curve_kept = [
             largest_error_seen(share) for share in linear.left_out

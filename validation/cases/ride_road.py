@@ -102,7 +102,7 @@ def _input_rows() -> list[Row]:
     delayed outputs of one filter."""
     worst = {"first": 0.0, "second": 0.0}
     for order, cutoff in (("first", None), ("second", 40.0)):
-        road = road_of_level(HALF_TRACK, cutoff=cutoff)
+        road = road_of_level(HALF_TRACK, cutoff_wavenumber=cutoff)
         for case in CORRELATION_CASES.values():
             by_noise = heights_covariance(road_excitation(road, WHEELS, *case))
             by_output = input_covariance(road, WHEELS, *case)

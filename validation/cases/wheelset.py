@@ -251,11 +251,11 @@ def _limit_cycles(
         if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
             continue
         setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", 11)
-        first = attained_cycle(Equations(*setup), step=_time_step(Equations(*setup)))
+        first = attained_cycle(Equations(*setup), time_step=_time_step(Equations(*setup)))
         if first is not None:
             guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engines}
             cycles[name] = {
-                engine: refined_orbit(solved_orbit(guess, "amplitude", precise=False), "amplitude")
+                engine: refined_orbit(solved_orbit(guess, "amplitude", is_precise=False), "amplitude")
                 for engine, guess in guesses.items()
             }
     return cycles

@@ -52,7 +52,7 @@ def long_wave_error(implementation: str, folder: Path) -> float:
 
 def _run_copies(corner: float) -> Any:
     vehicle, road = _vehicle_and_road(corner)
-    return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest_step=2e-3)
+    return copies_in_time(vehicle, road, 5.0, 1.0, copy_count=20, seed=1, longest_step=2e-3)
 
 
 def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
