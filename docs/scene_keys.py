@@ -236,7 +236,7 @@ def other_table_sections() -> list[str]:
 def controllers_section() -> list[str]:
     """Lines of the section on the parameters of brake controllers, which a scene sets in [controller.parameters]."""
     from models.brake.controllers import CONTROLLERS
-    from models.brake.controllers.per_wheel import Common
+    from models.brake.controllers.per_wheel import AntiLockController
 
     lines = [
         "",
@@ -244,10 +244,10 @@ def controllers_section() -> list[str]:
         "",
         "A scene of braking sets them in `[controller.parameters]`. All have:",
     ]
-    lines += ["", *_parameter_lines(Common, ("wheels",))]
+    lines += ["", *_parameter_lines(AntiLockController, ("wheels",))]
     for kind, controller in CONTROLLERS.items():
         if is_dataclass(controller) and isinstance(controller, type):
-            inherited = tuple(each.name for each in fields(Common))
+            inherited = tuple(each.name for each in fields(AntiLockController))
             lines += ["", f"### Controller `{kind}`", "", *_parameter_lines(controller, inherited)]
     return lines
 

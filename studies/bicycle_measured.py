@@ -128,7 +128,7 @@ def main(
 ) -> None:
     """Measure weave in recordings, and choose among the suspects."""
     try:
-        whipple = load_bicycle(bicycle, file="--bicycle", key_path="")
+        whipple = load_bicycle(bicycle, scene_path="--bicycle", key_path="")
         print("\n".join(observation_lines(observed_and_predicted(folder, choose or (), whipple), whipple)))
     except InputError as error:
         raise SystemExit(f"twinrig: {error}") from None

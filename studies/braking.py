@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.brake.figures_of_merit import NOT_CHECKED
+from models.brake.figures_of_merit import NOT_CHECKED_REMARK
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.strict import Strict, read
@@ -129,7 +129,7 @@ def figures_lines(name: str, stop: StopHistory, figures: dict[str, float], wheel
     rows += [
         f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}" for key, value in figures.items()
     ]
-    rows += [f"    ({NOT_CHECKED})"] if figures else []
+    rows += [f"    ({NOT_CHECKED_REMARK})"] if figures else []
     rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in figures else []
     names = wheel_names(stop.path.turning.shape[1])
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from models.brake.plane_chain import ChainPoint, chain_point_place
-from models.brake.plane_vehicle import Plane
+from models.brake.plane_chain import ChainPoint, chain_point_position
+from models.brake.plane_vehicle import PlaneVehicle
 from models.core.told import Results
 from models.drawing.figures import (
     BLUE,
@@ -169,10 +169,10 @@ def unit_outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
     return boxes
 
 
-def positions_on_road(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
+def positions_on_road(unit: int, corners: np.ndarray, positions: np.ndarray, plane: PlaneVehicle) -> np.ndarray:
     """Positions (m, 2) on the road, in m, of points (m, 2) fixed to a unit of a train. positions (2 + U,) : x, y (m) of
     the vehicle and the yaw angles (rad) of its U units."""
-    return np.array([chain_point_place(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
+    return np.array([chain_point_position(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
 def _box_outline(front: float, rear: float) -> np.ndarray:

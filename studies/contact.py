@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.contact.accuracy import Error
-from models.contact.theories import ExactOnEllipse, Fastsim, OnEllipse, RollingContact
+from models.contact.accuracy import ContactErrors
+from models.contact.theories import ExactTheoryOnEllipse, FastsimTheory, RollingContact, RollingOnEllipse
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
@@ -69,7 +69,7 @@ def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
     rolls: ContactResults = forces.detail
     body, p = rolls.contact, rolls.contact.pressing
     limit = body.friction * p.load
-    size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
+    size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, RollingOnEllipse) else ""
     lines = [
         f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
         f"largest pressure {1e-6 * p.peak:,.0f} MPa",
@@ -84,7 +84,7 @@ def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
         * bool(rolls.errors),
     ]
     step = max(1, (len(rolls.motions) - 1) // PRINTED_ROWS)
-    errors: Sequence[Error | None] = rolls.errors or [None] * len(rolls.motions)
+    errors: Sequence[ContactErrors | None] = rolls.errors or [None] * len(rolls.motions)
     for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
             f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(force.fx):>10,}"
@@ -95,7 +95,7 @@ def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors_text(error: Error, friction_limit: float) -> str:
+def _errors_text(error: ContactErrors, friction_limit: float) -> str:
     cells, theory = (_percent_text(error_part, friction_limit) for error_part in (error.cells, error.theory))
     return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
 
@@ -159,7 +159,7 @@ CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 def _pressure_name(body: RollingContact) -> str:
     """Name of the pressure distribution over a contact's cells, for a figure's title."""
-    if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
+    if isinstance(body, FastsimTheory) and body.choices["bound"] != "elliptic":
         return f"FASTSIM's pressure ({body.choices['bound']} bound)"
     return "pressure"
 
@@ -173,12 +173,12 @@ def _exact_checks(scene: ContactScene, contact_results: ContactResults) -> dict[
     no Hertzian ellipse, is exact already, or has falling friction."""
     body, points = contact_results.contact, read(Options, scene.options, scene.file, "options").exact
     if (
-        not isinstance(body, OnEllipse)
-        or isinstance(body, ExactOnEllipse)
+        not isinstance(body, RollingOnEllipse)
+        or isinstance(body, ExactTheoryOnEllipse)
         or inputs_of_scene_contact(scene).falling is not None
     ):
         return {}
-    exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
+    exact = ExactTheoryOnEllipse(body.hertz, body.friction, body.pair)
     chosen = np.unique(np.linspace(0, len(contact_results.motions) - 1, points).round().astype(int))
     return {int(i): exact.roll(contact_results.motions[i], EXACT_THEORY_CELLS) for i in chosen}
 

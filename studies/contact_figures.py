@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import NullLocator
 
-from models.contact.fields import Fields
+from models.contact.fields import ContactFields
 from models.contact.inputs import Array
-from models.contact.theories import Rolled
+from models.contact.theories import RollingResult
 from models.core.result import Result
 from models.drawing.figures import (
     BLUE,
@@ -38,7 +38,7 @@ ARROW_COUNT = 17
 
 
 def contact_figure(
-    patches: list[Fields], friction: float, title: str, pressure: str, forces: Result, path: Path
+    patches: list[ContactFields], friction: float, title: str, pressure: str, forces: Result, path: Path
 ) -> None:
     """Save a figure of pressure and tractions over the contact area, with all patches to scale; ``pressure`` names the
     pressure distribution.
@@ -62,7 +62,7 @@ def contact_figure(
     save(figure, path)
 
 
-def _cell_corners(fields_on_cells: Fields) -> list[Array]:
+def _cell_corners(fields_on_cells: ContactFields) -> list[Array]:
     """Corners (4, 2) in mm of every cell inside the contact area."""
     x, y, dx, dy = (
         MILLIMETRES_PER_METRE * getattr(fields_on_cells, name)[fields_on_cells.inside]
@@ -72,7 +72,7 @@ def _cell_corners(fields_on_cells: Fields) -> list[Array]:
     return list(np.array(corners).transpose(2, 0, 1))
 
 
-def _draw_pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
+def _draw_pressure(axis: Any, patches: list[ContactFields], quantity: str) -> None:
     greatest = MEGAPASCAL_PER_PASCAL * max(float(f.pressure.max()) for f in patches)
     for f in patches:
         cells = PolyCollection(
@@ -89,7 +89,7 @@ def _draw_pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
     axis.set_title(f"{quantity[0].upper()}{quantity[1:]},\nlargest {greatest:,.0f} MPa")
 
 
-def _draw_tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
+def _draw_tractions(axis: Any, patches: list[ContactFields], friction: float, spacing: float) -> None:
     """Draw the zones of stick and slip, and arrows of the traction on the wheel at a ``spacing`` (mm)."""
     largest = friction * max(float(f.pressure.max()) for f in patches)
     scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * spacing)}
@@ -109,7 +109,7 @@ def _draw_tractions(axis: Any, patches: list[Fields], friction: float, spacing: 
     axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 
-def _arrow_data(fields_on_cells: Fields, spacing: float) -> Array:
+def _arrow_data(fields_on_cells: ContactFields, spacing: float) -> Array:
     """Positions x, y (m) and tractions (Pa) of the arrows, (4, n), at evenly spaced points along some rows of cells,
     between which tractions are interpolated."""
     arrows, lines = list[Array](), fields_on_cells.y[:, 0]
@@ -133,7 +133,7 @@ FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
 def sweep_figure(
-    sweep: CreepageSweep, forces: Result, exact_results: dict[int, Rolled], title: str, path: Path
+    sweep: CreepageSweep, forces: Result, exact_results: dict[int, RollingResult], title: str, path: Path
 ) -> None:
     """Save a figure of creep forces and moment over a creepage, with error bands and some results of the exact theory.
 

@@ -55,7 +55,7 @@ def test_energy_and_contacts_are_kept():
 
 def test_a_start_beyond_upright_has_both_wheels_on_the_ground():
     model = IdealBicycle(BENCHMARK)
-    assert np.abs(heights(model, model.upright(4.6, lean=0.4, steer=0.5)[:9])).max() < 1e-14
+    assert np.abs(heights(model, model.upright(4.6, lean_angle=0.4, steer_angle=0.5)[:9])).max() < 1e-14
 
 
 def test_a_bicycle_at_standstill_falls_and_says_when():

@@ -305,7 +305,9 @@ def process(folder, faults, code):
 def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
     """``aspects`` calls a compiled function that calls ``aspect``; sound, spoiled, and sound again."""
     code = "import numpy as np; from models.contact.hertz import aspects; print(aspects(np.array([0.5]))[0][0])"
-    sound, wrong, again = (process(folder, {"models.contact.hertz:aspect": fault}, code) for fault in (0.0, 0.01, 0.0))
+    sound, wrong, again = (
+        process(folder, {"models.contact.hertz:axis_ratio_and_integrals": fault}, code) for fault in (0.0, 0.01, 0.0)
+    )
     assert wrong == pytest.approx(1.01 * sound, rel=1e-14) and again == sound
 
 
@@ -327,21 +329,21 @@ def audited_line(probes, name, **case):
 
 def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(probes):
     """Hertz' ellipse by Johnson's figures and a closed form; the sound run had no failed row."""
-    name = "models.contact.hertz:_contact"
+    name = "models.contact.hertz:_hertz_contact"
     noticed = audited_line(probes, name)
     assert (noticed.ended, noticed.calling, noticed.left) == ("whole", 1, 0)
     assert "contact_hertz.p0" in noticed.rows and "contact_hertz.p0" in noticed.independent
 
 
 def test_a_row_that_fails_without_a_fault_notices_nothing(probes):
-    name = "models.contact.hertz:_contact"
+    name = "models.contact.hertz:_hertz_contact"
     rows = [{"id": "contact_hertz.p0", "status": "failed", "independence": "closed form"}]
     noticed = audited_line(probes, name, rows=rows)
     assert noticed.rows and "contact_hertz.p0" not in noticed.rows.split("; ")
 
 
 def test_a_function_that_gives_no_number_has_a_line_that_says_so(probes):
-    name = "models.contact.hertz:_contact"
+    name = "models.contact.hertz:_hertz_contact"
     for case, ended in (({"numbers": set()}, "no numbers"), ({"numbers": set(), "ran": set()}, "not run")):
         line = audited_line(probes, name, **case)
         assert (line.ended, line.calling, line.left, line.rows) == (ended, 0, 0, "")

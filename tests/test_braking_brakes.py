@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from models.brake.brake import Brake, of_wheels, torque
-from models.brake.controller import APPLY, HOLD, RELEASE, SAMPLE
-from models.brake.pressure import Air, Chambers, by_pressures, by_valves, resting_chambers
+from models.brake.brake import Brake, brake_torque, brakes_of_wheels
+from models.brake.controller import APPLY, HOLD, RELEASE, SAMPLING_PERIOD
+from models.brake.pressure import AirState, BrakeChambers, advance_by_pressures, advance_by_valves, air_at_rest
 from models.core.errors import InputError
 
 BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
-BRAKES = of_wheels(BRAKE)
+BRAKES = brakes_of_wheels(BRAKE)
 
 
 def along(pressures, start=0.0):
     torques = [start]
     for p in pressures:
-        torques.append(torque(0, p, torques[-1], BRAKES))
+        torques.append(brake_torque(0, p, torques[-1], BRAKES))
     return np.array(torques[1:])
 
 
@@ -62,54 +62,54 @@ def test_sense_is_never_reversed():
 
 
 def chambers(**more):
-    return Chambers(np.array([0.15]), np.array([0.1]), 6.0, **more)
+    return BrakeChambers(np.array([0.15]), np.array([0.1]), 6.0, **more)
 
 
 def test_valves_are_exact_whatever_the_steps():
     for steps in (1, 7):
-        own, air = chambers(), resting_chambers(chambers(), SAMPLE)
+        own, air = chambers(), air_at_rest(chambers(), SAMPLING_PERIOD)
         torques = np.zeros((steps + 1, 1))
         for valve in (APPLY, APPLY, HOLD, RELEASE):
-            by_valves(np.array([valve]), SAMPLE, air, own, BRAKES, torques)
-        full = 6.0 * (1.0 - np.exp(-2.0 * SAMPLE / 0.15))
-        assert air.pressure[0] == pytest.approx(full * np.exp(-SAMPLE / 0.1), rel=1e-13)
+            advance_by_valves(np.array([valve]), SAMPLING_PERIOD, air, own, BRAKES, torques)
+        full = 6.0 * (1.0 - np.exp(-2.0 * SAMPLING_PERIOD / 0.15))
+        assert air.pressure[0] == pytest.approx(full * np.exp(-SAMPLING_PERIOD / 0.1), rel=1e-13)
 
 
 def test_delay_between_samples_turns_pressure_within_a_step():
     """Delay of 1.4 samples: the torque goes through the top of the pressure, not from end to end."""
-    own = chambers(delay=1.4 * SAMPLE)
-    air, torques = resting_chambers(own, SAMPLE), np.zeros((2, 1))
+    own = chambers(delay=1.4 * SAMPLING_PERIOD)
+    air, torques = air_at_rest(own, SAMPLING_PERIOD), np.zeros((2, 1))
     air.pressure[0] = 3.0
-    air.torque[0] = torque(0, 3.0, 0.0, BRAKES)
+    air.torque[0] = brake_torque(0, 3.0, 0.0, BRAKES)
     air.commands[:] = APPLY
-    by_valves(np.array([RELEASE]), SAMPLE, air, own, BRAKES, torques)
+    advance_by_valves(np.array([RELEASE]), SAMPLING_PERIOD, air, own, BRAKES, torques)
     before = air.pressure[0]
-    by_valves(np.array([RELEASE]), SAMPLE, air, own, BRAKES, torques)
-    top = 6.0 + (before - 6.0) * np.exp(-0.4 * SAMPLE / 0.15)
-    assert air.pressure[0] == pytest.approx(top * np.exp(-0.6 * SAMPLE / 0.1), rel=1e-12)
+    advance_by_valves(np.array([RELEASE]), SAMPLING_PERIOD, air, own, BRAKES, torques)
+    top = 6.0 + (before - 6.0) * np.exp(-0.4 * SAMPLING_PERIOD / 0.15)
+    assert air.pressure[0] == pytest.approx(top * np.exp(-0.6 * SAMPLING_PERIOD / 0.1), rel=1e-12)
     assert torques[1, 0] == pytest.approx(1500.0 * (top - 0.75), rel=1e-12)  # held on the way down from the top
 
 
 def test_strokes_from_a_reservoir():
     """A supply cut off: every full stroke leaves V / (V + v) of its pressure; all that is taken is in the chambers."""
     own = chambers(volumes=np.array([1.2]), reservoir=30.0)
-    air, torques = resting_chambers(own, SAMPLE), np.zeros((5, 1))
+    air, torques = air_at_rest(own, SAMPLING_PERIOD), np.zeros((5, 1))
     for stroke in range(1, 5):
         for _ in range(600):
-            by_valves(np.array([APPLY]), SAMPLE, air, own, BRAKES, torques)
+            advance_by_valves(np.array([APPLY]), SAMPLING_PERIOD, air, own, BRAKES, torques)
         assert air.supply[0] == pytest.approx(6.0 * (30.0 / 31.2) ** stroke, rel=1e-9)
         assert air.pressure[0] == pytest.approx(air.supply[0], rel=1e-9)
         for _ in range(600):
-            by_valves(np.array([RELEASE]), SAMPLE, air, own, BRAKES, torques)
+            advance_by_valves(np.array([RELEASE]), SAMPLING_PERIOD, air, own, BRAKES, torques)
 
 
 def test_reservoir_asks_for_volumes():
     with pytest.raises(InputError, match="volumes"):
-        resting_chambers(chambers(reservoir=30.0), SAMPLE)
+        air_at_rest(chambers(reservoir=30.0), SAMPLING_PERIOD)
 
 
 def test_commanded_pressures_are_there_at_once():
-    air = Air(np.zeros(1), np.zeros(1), np.array([6.0]), np.zeros((2, 1), dtype=np.int64))
+    air = AirState(np.zeros(1), np.zeros(1), np.array([6.0]), np.zeros((2, 1), dtype=np.int64))
     torques = np.full((4, 1), np.nan)
-    by_pressures(np.array([2.75]), air, BRAKES, torques)
+    advance_by_pressures(np.array([2.75]), air, BRAKES, torques)
     assert (torques == 3000.0).all() and air.pressure[0] == 2.75

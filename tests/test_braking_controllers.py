@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from models.brake.brake import Brake
-from models.brake.controller import SAMPLE, Sample
+from models.brake.controller import SAMPLING_PERIOD, Sample
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.acceleration_phases import AccelerationPhases
-from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate_of_phase
-from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle
+from models.brake.controllers.five_phase import FivePhase, phase_end_threshold, pressure_rate_of_phase
+from models.brake.controllers.five_phase_cycle import WheelAtConstantSpeed, limit_cycle
 from models.brake.controllers.per_wheel import SpeedEstimate
 from models.brake.controllers.slip import SlipBangBang, SlipPI
 from models.core.errors import InputError, RunFailed
@@ -20,7 +20,7 @@ LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 
 
 def given(wheels, speed=10.0, number=0, brake=True):
-    return Sample(number, round(number * SAMPLE * 1e9), np.asarray(wheels, dtype=float), brake, 6.0, speed)
+    return Sample(number, round(number * SAMPLING_PERIOD * 1e9), np.asarray(wheels, dtype=float), brake, 6.0, speed)
 
 
 def test_bang_bang_has_hysteresis():
@@ -73,16 +73,16 @@ def test_slip_pi_does_not_wind_up():
 
 def test_estimate_does_not_go_down_with_wheels_that_lock_at_once():
     """Nothing is learnt yet: it falls by 6 m/s^2, where no vehicle exceeds 10."""
-    estimate = SpeedEstimate(SAMPLE)
-    found = [estimate.after([speed] * 4) for speed in np.maximum(15.0 - 60.0 * SAMPLE * np.arange(101), 0.0)]
-    assert found[-1] == pytest.approx(15.0 - 6.0 * 100 * SAMPLE)
+    estimate = SpeedEstimate(SAMPLING_PERIOD)
+    found = [estimate.after([speed] * 4) for speed in np.maximum(15.0 - 60.0 * SAMPLING_PERIOD * np.arange(101), 0.0)]
+    assert found[-1] == pytest.approx(15.0 - 6.0 * 100 * SAMPLING_PERIOD)
 
 
 def test_estimate_is_the_fastest_rolling_wheel_and_learns_the_slope():
     """All wheels dip together every 0.3 s on a vehicle that slows by 2 m/s^2: within 2 % from the third dip on."""
-    estimate, worst = SpeedEstimate(SAMPLE), 0.0
+    estimate, worst = SpeedEstimate(SAMPLING_PERIOD), 0.0
     for n in range(600):
-        time = n * SAMPLE
+        time = n * SAMPLING_PERIOD
         speed = 15.0 - 2.0 * time
         dip = 1.0 - 0.3 * max(np.sin(2.0 * np.pi * time / 0.3), 0.0)
         found = estimate.after([speed * dip] * 4)
@@ -118,7 +118,7 @@ def test_parameters_that_cannot_be_used(name, parameters, word):
 
 
 def frozen(**changes):
-    return WheelAtSpeed(
+    return WheelAtConstantSpeed(
         **{
             "speed": 11.11,
             "load": 16.8e3,
@@ -132,7 +132,7 @@ def frozen(**changes):
 
 
 def exact(wheel, controller=PHASES):
-    phases = [(1500.0 * rate_of_phase(k, controller), *end_of_phase(k, controller)) for k in range(6)]
+    phases = [(1500.0 * pressure_rate_of_phase(k, controller), *phase_end_threshold(k, controller)) for k in range(6)]
     forces = wheel.load * wheel.tyre.mu_x[0, 0]
     return last_control_cycle(
         ExactWheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12

@@ -7,7 +7,7 @@ from models.brake import figures_of_merit as merit
 from models.core.errors import InputError
 from models.systems.braking.stops import SampleScatter, scatter_of, welch_test
 
-PAPER = merit.Axles(front=33_600.0, rear=21_800.0, wheelbase=3.61, height=1.2)
+PAPER = merit.AxleLoads(front=33_600.0, rear=21_800.0, wheelbase=3.61, height=1.2)
 
 
 def uniform(speed=20.0, deceleration=5.0, step=0.0055):
@@ -27,7 +27,7 @@ def test_the_constants_of_the_regulation_follow_from_its_speeds():
 
 def test_a_uniform_stop_has_its_deceleration_by_every_definition():
     times, way, speeds = uniform()
-    assert merit.mean_fully_developed(times, way, speeds) == pytest.approx(5.0, rel=1e-12)
+    assert merit.mean_fully_developed_deceleration(times, way, speeds) == pytest.approx(5.0, rel=1e-12)
     assert merit.equivalent_deceleration(20.0, way[-1]) == pytest.approx(5.0, rel=1e-12)
     assert merit.crossing_time(times, speeds, 10.0) == pytest.approx(2.0, rel=1e-12)
 
@@ -36,8 +36,8 @@ def test_mean_fully_developed_leaves_out_build_up_and_creep():
     # 1 s without brakes before a stop at 5 m/s^2: speeds from 0.8 to 0.1 v0 are braked alone
     times, way, speeds = uniform()
     late = np.concatenate(([0.0], times + 1.0)), np.concatenate(([0.0], way + 20.0)), np.concatenate(([20.0], speeds))
-    assert merit.mean_fully_developed(*late) == pytest.approx(5.0, rel=1e-12)
-    assert np.isnan(merit.mean_fully_developed(times[:100], way[:100], speeds[:100]))
+    assert merit.mean_fully_developed_deceleration(*late) == pytest.approx(5.0, rel=1e-12)
+    assert np.isnan(merit.mean_fully_developed_deceleration(times[:100], way[:100], speeds[:100]))
 
 
 def test_one_friction_on_both_axles_gives_itself_back_and_is_wholly_used():
@@ -51,24 +51,26 @@ def test_one_friction_on_both_axles_gives_itself_back_and_is_wholly_used():
 
 
 def test_split_friction_asks_for_the_larger_of_both():
-    assert merit.split_rate(0.2, 0.8) == pytest.approx(0.75 * 1.6 / 5.0)
-    assert merit.split_rate(0.3, 0.35) == 0.3
+    assert merit.least_braking_rate_on_split(0.2, 0.8) == pytest.approx(0.75 * 1.6 / 5.0)
+    assert merit.least_braking_rate_on_split(0.3, 0.35) == 0.3
 
 
 def test_the_mean_takes_at_most_three_runs_within_five_per_cent():
-    assert merit.mean_of_fastest(np.array([2.2, 2.0, 2.05, 2.09, 2.08])) == pytest.approx((2.0 + 2.05 + 2.08) / 3)
-    assert merit.mean_of_fastest(np.array([2.0, np.nan, 9.0])) == 2.0
+    assert merit.mean_of_shortest_times(np.array([2.2, 2.0, 2.05, 2.09, 2.08])) == pytest.approx(
+        (2.0 + 2.05 + 2.08) / 3
+    )
+    assert merit.mean_of_shortest_times(np.array([2.0, np.nan, 9.0])) == 2.0
     with pytest.raises(InputError):
-        merit.mean_of_fastest(np.array([np.nan]))
+        merit.mean_of_shortest_times(np.array([np.nan]))
 
 
 def test_a_circle_has_yaw_ratio_one():
-    assert merit.yaw_ratio(10.0 / 80.0, 10.0, 80.0) == 1.0
+    assert merit.yaw_rate_ratio(10.0 / 80.0, 10.0, 80.0) == 1.0
 
 
 def test_locks_are_told_by_wheel_above_a_speed_alone():
     locked = np.array([[1, 0], [1, 1], [0, 1], [1, 1], [1, 1]], bool)
-    table = merit.lock_table(np.full(5, 0.1), locked, np.array([9.0, 8.0, 7.0, 6.0, 1.0]))
+    table = merit.wheel_lock_times(np.full(5, 0.1), locked, np.array([9.0, 8.0, 7.0, 6.0, 1.0]))
     assert table.time == pytest.approx([0.3, 0.3]) and table.share == pytest.approx([0.75, 0.75])
     assert table.longest_lock == pytest.approx([0.2, 0.3])
 

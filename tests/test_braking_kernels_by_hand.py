@@ -7,8 +7,8 @@ import pytest
 
 from models.brake.advance import AT_REST
 from models.brake.brake import Brake
-from models.brake.controllers.five_phase_cycle import WheelAtSpeed, state_after
-from models.brake.plane_chain import factorise_mass, fill_headings, inertia, solve
+from models.brake.controllers.five_phase_cycle import WheelAtConstantSpeed, state_after
+from models.brake.plane_chain import factorise_mass, fill_headings, fill_mass_matrix, solve_accelerations
 from models.brake.plane_step import JUMP_WIDTH
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, plane_of_train
@@ -55,11 +55,11 @@ def test_forces_give_the_accelerations_of_the_mass_matrix_by_energy(plane):
     q, n = random.uniform(-0.5, 0.5, 2 + units), 2 + units
     mass, right, along, across, ways = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty((units, 2))
     fill_headings(q, ways)
-    inertia(ways, np.zeros(n), plane, mass, right, along, across)
+    fill_mass_matrix(ways, np.zeros(n), plane, mass, right, along, across)
     factorise_mass(mass, plane)
     forces = random.normal(0.0, 1e4, n)
     accelerations = forces.copy()
-    solve(mass, plane, accelerations)
+    solve_accelerations(mass, plane, accelerations)
     free = slice(2 if plane.has_prescribed_hook else 0, n)
     expected = np.linalg.solve(plain_mass(q, plane)[free, free], forces[free])
     assert not right.any() and accelerations[free] == pytest.approx(expected, rel=1e-7)
@@ -114,7 +114,7 @@ def test_locked_wheels_stop_in_the_time_of_coulomb_s_friction(speed):
 def test_a_wheel_at_a_frozen_speed_keeps_its_momentum():
     """J (w1 - w0) = r int F dt - int T dt, where pressure and torque rise on the brake's upward line."""
     brake = Brake(push_out=0.5, release=0.5, rising=1500.0, falling=1500.0)
-    frozen = WheelAtSpeed(20.0, 4e3, 0.3, 1.2, brake, table_of_surface("dry"))
+    frozen = WheelAtConstantSpeed(20.0, 4e3, 0.3, 1.2, brake, table_of_surface("dry"))
     start = frozen.rolling()._replace(pressure=0.6, torque=150.0)
     end = state_after(start, 40.0, 2e-3, frozen.driven)
     assert (end.time, end.pressure, end.torque) == pytest.approx((2e-3, 0.68, 1500.0 * (0.68 - 0.5)), rel=1e-12)

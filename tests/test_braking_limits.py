@@ -6,8 +6,8 @@ import pytest
 from models.brake.controller import SLOW, Command, Sample
 from models.brake.plane_step import redistribute_negative_loads
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, checked_answer
-from models.brake.quarter import Quarter
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, usable_command
+from models.brake.quarter import QuarterVehicle
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_train
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.procedures import vehicle_and_start_state
@@ -72,8 +72,8 @@ def test_rows_of_limits_hold():
 
 def test_valves_apply_slowly_only_where_the_scene_has_them():
     with pytest.raises(ControllerFailed, match=r"2 is none of -1, 0, 1$|2 is none of -1, 0, 1 "):
-        checked_answer(Command(valves=np.full(4, SLOW)), GIVEN)
-    assert (checked_answer(Command(valves=np.full(4, SLOW)), GIVEN, STATES_WITH_SLOW_APPLY).valves == SLOW).all()
+        usable_command(Command(valves=np.full(4, SLOW)), GIVEN)
+    assert (usable_command(Command(valves=np.full(4, SLOW)), GIVEN, STATES_WITH_SLOW_APPLY).valves == SLOW).all()
     phases = {"kind": "acceleration_phases", "parameters": {"slow": True}}
     with pytest.raises(InputError, match=r"controller.parameters.slow.*pressure.slow"):
         run(scene(controller=phases))
@@ -95,15 +95,15 @@ def test_valves_apply_slowly_only_where_the_scene_has_them():
 
 def test_what_cannot_be_is_refused_with_its_value():
     with pytest.raises(ControllerFailed, match="too high: a pressure of 299 bar, above the 6 bar"):
-        checked_answer(Command(pressures=np.full(4, 299.0)), GIVEN, maximum_pressure=6.0)
+        usable_command(Command(pressures=np.full(4, 299.0)), GIVEN, maximum_pressure=6.0)
     with pytest.raises(ControllerFailed, match="wrong frame: complex"):
-        checked_answer(Command(pressures=np.full(4, 1j)), GIVEN)
+        usable_command(Command(pressures=np.full(4, 1j)), GIVEN)
     with pytest.raises(InputError, match=r"mass = 0.1: must be above 322.8 kg"):
         vehicle_and_start_state(scene(vehicle={"override": {"mass": 0.1}}), "stop")
     with pytest.raises(InputError, match=r"mass = 200.0: must be above"):
         plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"mass": 100.0, "drawbar_mass": 100.0}))
     with pytest.raises(ValueError, match="J / r"):
-        Quarter(mass=50.0, radius=0.5, spin_inertia=13.35)
+        QuarterVehicle(mass=50.0, radius=0.5, spin_inertia=13.35)
     with pytest.raises(InputError, match=r"brakes.supply = 10000.0: must be at most 300 bar"):
         scene(brakes={"supply": 1e4})
     with pytest.raises(InputError, match=r"brakes.rear.gradient = 1000000000.0: must be at most"):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.brake.controller import SAMPLE, Sample
+from models.brake.controller import SAMPLING_PERIOD, Sample
 from models.core.errors import InputError
 from models.systems.braking.measured_pressures import read_pressures
 from models.systems.braking.of_scene import measured_pressures_of
@@ -74,7 +74,7 @@ def test_measured_pressures(tmp_path):
     file = tmp_path / "run.csv"
     file.write_text(HEAD + "\n0, 0, 0, 1, 1\n0.011, 2, 200, 1, 1\n")
     found = read_pressures(file, 4)
-    said = found.sample(Sample(1, round(SAMPLE * 1e9), np.zeros(4), True, 6.0, 1.0)).pressures
+    said = found.sample(Sample(1, round(SAMPLING_PERIOD * 1e9), np.zeros(4), True, 6.0, 1.0)).pressures
     np.testing.assert_allclose(said, [1.5, 1.5, 1.0, 1.0], rtol=1e-9)
     assert found.speeds is None
 

@@ -5,7 +5,7 @@ import pytest
 
 from models.brake.advance import AT_REST, advance
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
-from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
+from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, trailer_behind_hook
 from models.engines.braking import EngineChassis
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
@@ -113,7 +113,7 @@ def test_trailer_on_a_straight_pull():
     v, step, n = 0.2, 5e-4, 8000
     state = np.array([[0.0, 0.0, 0.5, 0.5], [v, 0.0, -v * np.sin(0.5) / CHOSEN_TRAILER.drawbar, 0.0]])
     hook = np.tile([v, 0.0], (n + 1, 1))
-    states, forces = follow_hook(
+    states, forces = trailer_behind_hook(
         plane_of_trailer(CHOSEN_TRAILER), rolling(100.0), state, hook, step, 100.0, np.zeros(4)
     )
     angle = 2.0 * np.arctan(np.tan(0.25) * np.exp(-v * n * step / CHOSEN_TRAILER.drawbar))

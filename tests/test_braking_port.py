@@ -15,22 +15,22 @@ import numpy as np
 import pytest
 
 import models.brake.port as port
-from models.brake.brake import PAPER_FRONT, PAPER_REAR, of_wheels
-from models.brake.controller import SAMPLE, Command, Sample
+from models.brake.brake import PAPER_FRONT_BRAKE, PAPER_REAR_BRAKE, brakes_of_wheels
+from models.brake.controller import SAMPLING_PERIOD, Command, Sample
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.port import frame, socket_port
-from models.brake.port.ask import ControllerFailed, ask
+from models.brake.port.ask import ControllerFailed, checked_command
 from models.brake.port.callable import named_controller
-from models.brake.port.client import serve
-from models.brake.port.example import Example
-from models.brake.port.faults import Fault, FaultyController
-from models.brake.port.pace import WallClock
-from models.brake.port.sensors import Conversion, controller_behind_sensors
-from models.brake.port.setup import ControllerRun, PortTable, controller_of_run
+from models.brake.port.client import serve_controller_at_port
+from models.brake.port.example import ExampleController
+from models.brake.port.faults import ControllerFault, FaultyController
+from models.brake.port.pace import WallClockController
+from models.brake.port.sensors import SensorConversion, controller_behind_sensors
+from models.brake.port.setup import ControllerRunData, PortTable, controller_of_run
 from models.brake.port.socket_port import controller_behind_socket
-from models.brake.port.teeth import Teeth, ToothCounter
-from models.brake.pressure import Chambers
-from models.brake.surfaces import Stretch, road
+from models.brake.port.teeth import ToothCounter, ToothedWheel
+from models.brake.pressure import BrakeChambers
+from models.brake.surfaces import RoadStretch, road_of_stretches
 from models.core.errors import InputError, RunFailed
 from models.core.strict import read
 from models.systems.braking.march import BrakedVehicle
@@ -64,15 +64,15 @@ def held(given):
 
 @pytest.fixture(scope="module")
 def vehicle():
-    chambers = Chambers(np.full(4, 0.05), np.full(4, 0.05), 6.0)
+    chambers = BrakeChambers(np.full(4, 0.05), np.full(4, 0.05), 6.0)
     ice = table_of_surface("ice")
-    brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
+    brakes = brakes_of_wheels(PAPER_FRONT_BRAKE, PAPER_FRONT_BRAKE, PAPER_REAR_BRAKE, PAPER_REAR_BRAKE)
     return BrakedVehicle(
         plane=plane_of_truck(PAPER_TRUCK),
         kind=np.zeros(4, dtype=np.int64),
         tables=stacked_tables([ice]),
         slope=ice.cornering,
-        road=road([Stretch(0.0, 0, 0)]),
+        road=road_of_stretches([RoadStretch(0.0, 0, 0)]),
         brakes=brakes,
         chambers=chambers,
         steer=np.zeros(4),
@@ -80,7 +80,7 @@ def vehicle():
 
 
 def of(number=0, wheels=(11.0, 10.0, 9.0, 8.0), speed=11.0):
-    return Sample(number, round(number * SAMPLE * 1e9), np.array(wheels), True, 6.0, speed)
+    return Sample(number, round(number * SAMPLING_PERIOD * 1e9), np.array(wheels), True, 6.0, speed)
 
 
 def time_out(name, silent):
@@ -134,13 +134,15 @@ def test_a_thread_at_the_socket_gives_the_same_bits(vehicle):
     answered = []
     with socket_port.listening_socket() as server:
         number = server.getsockname()[1]
-        thread = threading.Thread(target=lambda: answered.append(serve(Example(4), number)))
+        thread = threading.Thread(
+            target=lambda: answered.append(serve_controller_at_port(ExampleController(4), number))
+        )
         thread.start()
         link = server.accept()[0]
         with link:
             path = vehicle.run(socket_port.SocketPort(link, PATIENT), 11.0, SHORT)
         thread.join(PATIENT)
-    assert same(path, vehicle.run(Example(4), 11.0, SHORT)) and answered == [len(path.times) - 1]
+    assert same(path, vehicle.run(ExampleController(4), 11.0, SHORT)) and answered == [len(path.times) - 1]
     assert (path.pressures[1:] < path.pressures[:-1]).any()  # it did release
 
 
@@ -152,16 +154,18 @@ def test_the_client_in_c_gives_the_same_bits(vehicle, tmp_path):
     subprocess.run(words, check=True)
     with controller_behind_socket([str(program), "{port}"], 0, PATIENT, PATIENT) as other:
         path = vehicle.run(other, 11.0, SHORT)
-    assert same(path, vehicle.run(Example(4), 11.0, SHORT))
+    assert same(path, vehicle.run(ExampleController(4), 11.0, SHORT))
 
 
 def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     builder = pytest.importorskip("pythonfmu").FmuBuilder
     file = builder.build_FMU(HERE / "example_slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=PATIENT, start=PATIENT)
-    with controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)) as (other, _):
+    with controller_of_run(
+        table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)
+    ) as (other, _):
         path = vehicle.run(other, 11.0, SHORT)
-    assert same(path, vehicle.run(Example(4), 11.0, SHORT))
+    assert same(path, vehicle.run(ExampleController(4), 11.0, SHORT))
 
 
 @pytest.mark.parametrize(
@@ -182,18 +186,18 @@ def test_a_hostile_fmu_ends_by_name_and_in_time(does, name, tmp_path):
     (tmp_path / "slave.py").write_text(source)
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=time_out(name, 0.5), start=PATIENT)
-    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, Example(4)) as (other, _):
+    run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
+    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, ExampleController(4)) as (other, _):
         begun = time.perf_counter()
-        ask(other, of())
+        checked_command(other, of())
     assert time.perf_counter() - begun < PATIENT
 
 
 def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
     (tmp_path / "a.fmu").touch()
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    table, run = PortTable(fmu="a.fmu"), ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), controller_of_run(table, run, Example(4)):
+    table, run = PortTable(fmu="a.fmu"), ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
+    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), controller_of_run(table, run, ExampleController(4)):
         pass
 
 
@@ -202,7 +206,7 @@ def test_a_file_that_is_no_fmu(tmp_path):
     table = PortTable(fmu="a.fmu")
     with (
         pytest.raises(InputError, match="no FMU"),
-        controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)),
     ):
         pass
 
@@ -246,9 +250,13 @@ NONSENSE = {
 def test_nonsense_at_the_socket_is_named_in_time(name):
     begun = time.perf_counter()
     with client(NONSENSE[name], time_out(name, 0.1)) as other, pytest.raises(ControllerFailed, match=name) as told:
-        ask(other, of(2))
+        checked_command(other, of(2))
     assert time.perf_counter() - begun < PATIENT
-    assert told.value.number == 2 and told.value.time == pytest.approx(2 * SAMPLE) and "sample 2" in str(told.value)
+    assert (
+        told.value.number == 2
+        and told.value.time == pytest.approx(2 * SAMPLING_PERIOD)
+        and "sample 2" in str(told.value)
+    )
 
 
 def test_a_drip_of_bytes_is_no_answer():
@@ -262,7 +270,7 @@ def test_a_drip_of_bytes_is_no_answer():
                 return
 
     with client(drip, 0.05) as other, pytest.raises(ControllerFailed, match="of 80 bytes within"):
-        ask(other, of())
+        checked_command(other, of())
 
 
 def _raises(given):
@@ -291,7 +299,7 @@ def _exits(given):
 )
 def test_nonsense_of_a_callable_is_named(answer, name):
     with pytest.raises(ControllerFailed, match=name):
-        ask(Says(answer), of(), maximum_pressure=6.0)
+        checked_command(Says(answer), of(), maximum_pressure=6.0)
 
 
 HOSTILE = {
@@ -336,9 +344,12 @@ def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, c
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n        print('noise', flush=True)\n"
         "        return Command(valves=np.ones(4))\n"
     )
-    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with controller_of_run(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
-        ask(other, of())
+    run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
+    with controller_of_run(PortTable(callable="talks.py:Talks", start=PATIENT), run, ExampleController(4)) as (
+        other,
+        _,
+    ):
+        checked_command(other, of())
     said = capfd.readouterr()
     assert said.out == "" and "noise" in said.err
 
@@ -358,10 +369,10 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
         f"    def sample(self, given):\n        {does}\n"
     )
     table = PortTable(callable="hostile.py:Hostile", timeout=time_out(name, 0.3), start=PATIENT)
-    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, Example(4)) as (other, _):
+    run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
+    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, ExampleController(4)) as (other, _):
         begun = time.perf_counter()
-        ask(other, of())
+        checked_command(other, of())
     assert time.perf_counter() - begun < PATIENT
 
 
@@ -376,7 +387,7 @@ def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
         table = PortTable(callable="made.py:Made", start=start)
         with (
             pytest.raises(RunFailed, match=told),
-            controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+            controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)),
         ):
             pass
 
@@ -397,7 +408,7 @@ def test_making_a_controller_may_take_as_long_as_an_answer(kind, tmp_path):
     with (
         chdir(tmp_path),
         pytest.raises(RunFailed, match=r"not made within 0.4 s; .* give start"),
-        controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)),
     ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
@@ -408,12 +419,15 @@ def test_an_fmu_that_is_never_ready_ends_as_an_answer_does(tmp_path):
     lines = (HERE / "example_slave.py").read_text().replace("import", f"import os, time\n{WAITS}import", 1)
     (tmp_path / "slave.py").write_text(lines.replace("super().__init__(", "waits()\n        super().__init__("))
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
-    table, run = PortTable(fmu=Path(file).name, timeout=0.8), ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
+    table, run = (
+        PortTable(fmu=Path(file).name, timeout=0.8),
+        ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path),
+    )
     (tmp_path / "begun").touch()
     with (
         chdir(tmp_path),
         pytest.raises(RunFailed, match=r"not made within 0.8 s"),
-        controller_of_run(table, run, Example(4)),
+        controller_of_run(table, run, ExampleController(4)),
     ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
@@ -431,7 +445,9 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
     table = PortTable(command=["sleep", "30"], timeout=0.2)
     begun = time.perf_counter()
     with pytest.raises(RunFailed, match=r"nobody connected to .* within 0.2 s; .* give start"):
-        controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
+        controller_of_run(
+            table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)
+        ).__enter__()
     assert time.perf_counter() - begun < 2 * table.timeout
     assert PortTable(port=5000).patience > 10 and PortTable(port=5000, start=3.0).patience == 3.0
 
@@ -442,13 +458,13 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
     [(lambda given: None, "wrong frame"), (lambda given: Command(pressures=np.full(4, -1.0)), "below zero")],
 )
 def test_nonsense_is_named_before_sensors_faults_and_log_can_hide_it(table, answer, name, tmp_path):
-    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
+    run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
     failing = Says(answer)
     with (
         controller_of_run(read(PortTable, table, ""), run, failing) as (other, _),
         pytest.raises(ControllerFailed, match=name),
     ):
-        ask(other, of())
+        checked_command(other, of())
 
 
 def test_a_failed_run_keeps_what_it_recorded(vehicle):
@@ -459,11 +475,11 @@ def test_a_failed_run_keeps_what_it_recorded(vehicle):
         vehicle.run(Says(dies), 11.0, SHORT)
     partial = told.value.partial
     assert len(partial.times) == 6 and not partial.ended_at_rest and partial.reports.load.shape == (5, 4)
-    assert np.array_equal(partial.states, vehicle.run(Says(held), 11.0, 5 * SAMPLE).states)
+    assert np.array_equal(partial.states, vehicle.run(Says(held), 11.0, 5 * SAMPLING_PERIOD).states)
 
 
 def test_a_command_that_ends_at_once_and_one_that_never_connects(monkeypatch):
-    monkeypatch.setattr(socket_port, "GRACE_SECONDS", 0.01)
+    monkeypatch.setattr(socket_port, "PROCESS_END_SECONDS", 0.01)
     early = controller_behind_socket(["sh", "-c", "exit 3"], 0, 1.0, PATIENT)
     with pytest.raises(RunFailed, match="status 3 before it connected"), early:
         pass
@@ -477,7 +493,7 @@ def test_a_command_that_ends_at_once_and_one_that_never_connects(monkeypatch):
 
 
 def test_no_process_stays(monkeypatch, tmp_path):
-    monkeypatch.setattr(socket_port, "GRACE_SECONDS", 0.01)
+    monkeypatch.setattr(socket_port, "PROCESS_END_SECONDS", 0.01)
     code = (
         "import os, socket, subprocess, sys\n"
         "open('parent', 'w').write(str(os.getpid()))\n"
@@ -502,45 +518,52 @@ def test_the_socket_listens_on_this_machine_alone():
 
 
 def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
-    run = ControllerRun(RADIUS, SAMPLE, "a scene", tmp_path)
-    with controller_of_run(PortTable(log="a.log"), run, Example(4)) as (own, _):
+    run = ControllerRunData(RADIUS, SAMPLING_PERIOD, "a scene", tmp_path)
+    with controller_of_run(PortTable(log="a.log"), run, ExampleController(4)) as (own, _):
         path = vehicle.run(own, 11.0, SHORT)
     with controller_of_run(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
         assert same(path, vehicle.run(replayed, 11.0, SHORT))
     with (
-        controller_of_run(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
+        controller_of_run(PortTable(replay="a.log"), run, ExampleController(4)) as (replayed, _),
         pytest.raises(RunFailed, match="was asked something else"),
     ):
         vehicle.run(replayed, np.nextafter(11.0, 12.0), SHORT)
     with (
-        controller_of_run(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
+        controller_of_run(PortTable(replay="a.log"), run, ExampleController(4)) as (replayed, _),
         pytest.raises(RunFailed, match=f"sample {len(path.times) - 1}: a.log has ended"),
     ):
         vehicle.run(replayed, 11.0, SHORT + 0.1)
     with (
         pytest.raises(InputError, match="another scene"),
-        controller_of_run(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "another", tmp_path), Example(4)),
+        controller_of_run(
+            PortTable(replay="a.log"),
+            ControllerRunData(RADIUS, SAMPLING_PERIOD, "another", tmp_path),
+            ExampleController(4),
+        ),
     ):
         pass
     (tmp_path / "no.log").write_bytes(b"no")
-    with pytest.raises(InputError, match="no log"), controller_of_run(PortTable(replay="no.log"), run, Example(4)):
+    with (
+        pytest.raises(InputError, match="no log"),
+        controller_of_run(PortTable(replay="no.log"), run, ExampleController(4)),
+    ):
         pass
 
 
 def test_the_wall_clock_changes_no_number_and_counts_overruns(vehicle):
-    clock = WallClock(Example(4), SAMPLE)
+    clock = WallClockController(ExampleController(4), SAMPLING_PERIOD)
     begun = time.perf_counter()
     path = vehicle.run(clock, 11.0, 0.1)
-    assert time.perf_counter() - begun >= 0.1 - 2 * SAMPLE
-    assert same(path, vehicle.run(Example(4), 11.0, 0.1))
+    assert time.perf_counter() - begun >= 0.1 - 2 * SAMPLING_PERIOD
+    assert same(path, vehicle.run(ExampleController(4), 11.0, 0.1))
 
     def slow(given):
         time.sleep(0.02 if given.number == 1 else 0.0)
         return held(given)
 
-    late = WallClock(Says(slow), SAMPLE)
-    vehicle.run(late, 11.0, 4 * SAMPLE)
-    assert late.overruns >= 1 and late.worst >= 0.02 - SAMPLE - 1e-4
+    late = WallClockController(Says(slow), SAMPLING_PERIOD)
+    vehicle.run(late, 11.0, 4 * SAMPLING_PERIOD)
+    assert late.overruns >= 1 and late.worst >= 0.02 - SAMPLING_PERIOD - 1e-4
     assert "overruns, the worst by" in late.report()
 
 
@@ -550,22 +573,22 @@ def test_the_switch_closes_in_time(vehicle):
     seen = Says(lambda given: Command(valves=np.ones(4)))
     path = replace(vehicle, switch_time=0.05).run(seen, 11.0, 0.1)
     closed = [given.brake for given in seen.seen]
-    assert closed == [SAMPLE * i >= 0.05 - 1e-9 for i in range(len(closed))]
+    assert closed == [SAMPLING_PERIOD * i >= 0.05 - 1e-9 for i in range(len(closed))]
     assert not path.pressures[: closed.index(True) + 1].any() and path.pressures[closed.index(True) + 1].all()
 
 
 def test_conversion_to_bits_and_nothing_without_it():
     says = Says(held)
-    controller_behind_sensors(says, 4, Conversion(), Conversion()).sample(of())
+    controller_behind_sensors(says, 4, SensorConversion(), SensorConversion()).sample(of())
     assert says.seen[0].wheels.tolist() == [11.0, 10.0, 9.0, 8.0]
-    converted = controller_behind_sensors(says, 4, Conversion(bits=3, range=14.0), Conversion())
+    converted = controller_behind_sensors(says, 4, SensorConversion(bits=3, range=14.0), SensorConversion())
     converted.sample(of(wheels=(0.9, 1.1, 99.0, -1.0)))  # codes of 2 m/s: 0, 1, the last, 0
     assert says.seen[1].wheels.tolist() == [0.0, 2.0, 14.0, 0.0]
 
 
 def test_noise_gain_and_offset_of_signals_and_pressures():
     says = Says(lambda given: Command(pressures=np.full(4, 2.0)))
-    own = Conversion(gain=2.0, offset=1.0, noise=0.5, seed=7)
+    own = SensorConversion(gain=2.0, offset=1.0, noise=0.5, seed=7)
     one, other = (controller_behind_sensors(says, 4, own, own) for _ in range(2))
     back = np.array([one.sample(of(i)).pressures for i in range(2500)])
     seen = np.array([given.wheels for given in says.seen])
@@ -578,34 +601,34 @@ def test_noise_gain_and_offset_of_signals_and_pressures():
 
 
 def test_a_counted_wheel_of_steady_speed_is_exact_to_a_tick():
-    counted, way = ToothCounter(Teeth(teeth=100, tick=1e-6), RADIUS), 2 * np.pi * 0.5 / 100
+    counted, way = ToothCounter(ToothedWheel(teeth=100, tick=1e-6), RADIUS), 2 * np.pi * 0.5 / 100
     speeds = (20.0, 7.0, 3.0, 0.0)
     for i in range(40):
         shown = counted(of(i, speeds))
     # one tick in the time of the edges of one sample, or in that of one tooth where it takes longer
     for got, speed in zip(shown[:3], speeds[:3], strict=True):
-        assert abs(got - speed) <= speed * 2e-6 / max(way / speed, SAMPLE - way / speed)
+        assert abs(got - speed) <= speed * 2e-6 / max(way / speed, SAMPLING_PERIOD - way / speed)
     assert counted(of(40, (20.0, 7.0, 3.0, 0.0)))[3] == 0.0
 
 
 def test_a_wheel_that_stops_is_seen_to_fall_and_one_that_slows_is_followed():
-    counted, way = ToothCounter(Teeth(teeth=50), RADIUS), 2 * np.pi * 0.5 / 50
+    counted, way = ToothCounter(ToothedWheel(teeth=50), RADIUS), 2 * np.pi * 0.5 / 50
     shown = [counted(of(i, (10.0 if i < 4 else 0.0,) * 4))[0] for i in range(40)]
     assert all(b <= a for a, b in pairwise(shown[3:]))
-    assert shown[-1] <= way / (34 * SAMPLE)  # at most one tooth since
-    slowing = ToothCounter(Teeth(teeth=100), RADIUS)
+    assert shown[-1] <= way / (34 * SAMPLING_PERIOD)  # at most one tooth since
+    slowing = ToothCounter(ToothedWheel(teeth=100), RADIUS)
     for i in range(60):
-        true = 20.0 - 8.0 * SAMPLE * i
+        true = 20.0 - 8.0 * SAMPLING_PERIOD * i
         got = slowing(of(i, (true,) * 4))[0]
         # the mean since the edge before: at most a sample and two teeth old
-        assert i < 2 or -1e-3 <= got - true <= 8.0 * (SAMPLE + 2 * way / true)
+        assert i < 2 or -1e-3 <= got - true <= 8.0 * (SAMPLING_PERIOD + 2 * way / true)
 
 
 def test_a_missing_tooth_makes_one_dip_per_turn():
     teeth, turn = 20, 2 * np.pi * 0.5
-    speed = turn / (20 * SAMPLE)  # one tooth per sample
-    whole = ToothCounter(Teeth(teeth=teeth), RADIUS)
-    less = ToothCounter(Teeth(teeth=teeth), RADIUS, lambda wheel, tooth, time: wheel == 1 and tooth == 5)
+    speed = turn / (20 * SAMPLING_PERIOD)  # one tooth per sample
+    whole = ToothCounter(ToothedWheel(teeth=teeth), RADIUS)
+    less = ToothCounter(ToothedWheel(teeth=teeth), RADIUS, lambda wheel, tooth, time: wheel == 1 and tooth == 5)
     rows = np.array([[*whole(of(i, (speed,) * 4))[:2], *less(of(i, (speed,) * 4))[:2]] for i in range(61)])[3:]
     assert np.allclose(rows[:, :3], speed, rtol=1e-3)
     assert (rows[:, 3] < 0.6 * speed).sum() in (3, 6)  # at the gap, and while it waits, in each of three turns
@@ -614,10 +637,10 @@ def test_a_missing_tooth_makes_one_dip_per_turn():
 def test_lost_and_delayed_samples_and_stuck_valves():
     says = Says(lambda given: Command(valves=np.full(4, 1 if given.number < 5 else -1)))
     faults = [
-        Fault(kind="lost", start=2 * SAMPLE, end=4 * SAMPLE, wheels=[0]),
-        Fault(kind="delayed", start=3 * SAMPLE, samples=2, wheels=[1]),
-        Fault(kind="stuck", start=5 * SAMPLE, wheels=[2]),
-        Fault(kind="stuck", start=2 * SAMPLE, end=3 * SAMPLE, wheels=[3], state=0),
+        ControllerFault(kind="lost", start=2 * SAMPLING_PERIOD, end=4 * SAMPLING_PERIOD, wheels=[0]),
+        ControllerFault(kind="delayed", start=3 * SAMPLING_PERIOD, samples=2, wheels=[1]),
+        ControllerFault(kind="stuck", start=5 * SAMPLING_PERIOD, wheels=[2]),
+        ControllerFault(kind="stuck", start=2 * SAMPLING_PERIOD, end=3 * SAMPLING_PERIOD, wheels=[3], state=0),
     ]
     faulty = FaultyController(says, faults)
     valves = np.array([faulty.sample(of(i, (float(i),) * 4)).valves for i in range(8)])
@@ -647,10 +670,10 @@ def test_a_table_that_cannot_be(table, told):
 
 
 def test_a_fault_of_a_wheel_that_is_not_there():
-    table = PortTable(faults=[Fault(kind="lost", wheels=[4])])
+    table = PortTable(faults=[ControllerFault(kind="lost", wheels=[4])])
     with (
         pytest.raises(InputError, match="from 0 to 3"),
-        controller_of_run(table, ControllerRun(RADIUS, SAMPLE), Example(4)),
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD), ExampleController(4)),
     ):
         pass
 
@@ -677,15 +700,13 @@ def test_a_controller_that_writes_into_its_question_does_not_change_the_log(tmp_
         given.wheels[:] = 0.0
         return Command(valves=np.ones(4, dtype=np.int64))
 
-    with controller_of_run(PortTable(log="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(writes)) as (
-        own,
-        _,
-    ):
+    with controller_of_run(
+        PortTable(log="a.log"), ControllerRunData(RADIUS, SAMPLING_PERIOD, "s", tmp_path), Says(writes)
+    ) as (own, _):
         own.sample(of())
-    with controller_of_run(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(_raises)) as (
-        replayed,
-        _,
-    ):
+    with controller_of_run(
+        PortTable(replay="a.log"), ControllerRunData(RADIUS, SAMPLING_PERIOD, "s", tmp_path), Says(_raises)
+    ) as (replayed, _):
         assert (replayed.sample(of()).valves == 1).all()
 
 

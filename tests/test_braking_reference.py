@@ -10,8 +10,8 @@ import pytest
 from scipy.special import bernoulli
 
 from models.brake import plain
-from models.brake.plain.suspension import Suspension
-from models.brake.plain.wheel import Force, WheelStep, along_nodes, wheel_step
+from models.brake.plain.suspension import PlainSuspension
+from models.brake.plain.wheel import TyreForceCurve, WheelStepData, advance_slip_along_nodes, wheel_step
 from models.brake.plane_vehicle import plane_of_truck
 from models.brake.wheel_step import distance_integral
 from models.core.errors import Refused, RunFailed
@@ -51,18 +51,18 @@ def test_the_states_of_the_wheel_reach_every_branch():
 def test_slip_between_nodes_follows_its_differential_equation():
     nodes, rates = np.array([0.0, 0.1, 0.4, 1.0]), np.array([3.0, 2.0, 2.0, 0.5])
     times = np.linspace(0.0, 0.2, 201)
-    slips, areas = np.array([along_nodes(0.02, nodes, rates, time)[1:] for time in times[1:]]).T
+    slips, areas = np.array([advance_slip_along_nodes(0.02, nodes, rates, time)[1:] for time in times[1:]]).T
     slopes = np.gradient(np.concatenate(([0.02], slips)), times)[1:-1]
     assert slopes == pytest.approx(np.interp(slips[:-1], nodes, rates), rel=2e-2)  # central differences at corners
     assert areas[-1] == pytest.approx(np.trapezoid(np.concatenate(([0.02], slips)), times), rel=1e-5)
-    time, slip, _ = along_nodes(0.02, nodes, rates, 1e3)
+    time, slip, _ = advance_slip_along_nodes(0.02, nodes, rates, 1e3)
     assert slip == 1.0 and time < 1e3
 
 
 def test_a_wheel_keeps_its_momentum_whatever_it_does():
-    force = Force(np.array([0.0, 0.1, 1.0]), np.array([0.0, 5e3, 4e3]))
+    force = TyreForceCurve(np.array([0.0, 0.1, 1.0]), np.array([0.0, 5e3, 4e3]))
     for torques, turning in (((800.0, 900.0), 30.0), ((2e4, 2e4), 0.0), ((0.0, 0.0), 0.0), ((5e3, 100.0), 0.0)):
-        of = WheelStep((10.0, 9.95), torques, 5.5e-3, 0.33, 1.7)
+        of = WheelStepData((10.0, 9.95), torques, 5.5e-3, 0.33, 1.7)
         turned, mean, _, locked = wheel_step(of, turning, force)
         if locked == 0.0:
             braked = 0.5 * sum(torques) * of.step
@@ -73,7 +73,7 @@ def test_a_wheel_keeps_its_momentum_whatever_it_does():
 
 def test_loads_at_rest_are_those_of_levers():
     for own in (box(), car()):
-        assert Suspension(own).loads == pytest.approx(plane_of_truck(own.plane).static, rel=1e-9)
+        assert PlainSuspension(own).loads == pytest.approx(plane_of_truck(own.plane).static, rel=1e-9)
 
 
 @pytest.mark.grounds("plain counterpart")

@@ -4,7 +4,7 @@ that roll or are locked, chambers that fill, surfaces one behind the other, stee
 import numpy as np
 import pytest
 
-from models.brake.controller import Pressures
+from models.brake.controller import ConstantPressures
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.systems.braking.procedures import steer_angles, vehicle_and_start_state
 from models.systems.braking.run import run
@@ -86,7 +86,7 @@ def test_chambers_fill_with_their_time_constant():
 def test_wheels_have_the_pressures_that_they_are_told():
     vehicle, start = vehicle_and_start_state(scene(10.5, 1.0, brakes=LOCKING), "stop")
     asked = np.array([1.3, 1.7, 0.4, 2.1])
-    path = vehicle.run(Pressures(asked), start, 0.05)
+    path = vehicle.run(ConstantPressures(asked), start, 0.05)
     assert path.pressures[-1] == pytest.approx(asked, rel=1e-12)
     assert path.torques[-1] == pytest.approx(1500.0 * asked, rel=1e-12)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.brake.port.sensors import Conversion
+from models.brake.port.sensors import SensorConversion
 from models.core.errors import InputError
 from models.core.scene_effects import check_combination, named_effects, scene_without, with_effects
 from validation.absence.of_systems import bare_scene
@@ -24,7 +24,7 @@ def test_each_leaves_alone_and_takes_all_of_its_own_with_it(full, name):
 
 def test_what_is_left_is_a_perfect_sensor(full):
     bare_port = scene_without(full, *SENSORS).port
-    assert bare_port.signals == bare_port.pressures == Conversion()
+    assert bare_port.signals == bare_port.pressures == SensorConversion()
 
 
 def test_a_sensor_needs_a_port(full):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.brake.quarter import Quarter, QuarterPath, QuarterStop
-from models.brake.relaxation import by_lagging_steps
-from models.brake.samples import by_steps
+from models.brake.quarter import QuarterPath, QuarterStop, QuarterVehicle
+from models.brake.relaxation import compiled_lagging_samples
+from models.brake.samples import compiled_plane_samples
 from models.core.errors import InputError
 from models.tyre.tyre_table import TyreTable, stacked_tables
 from validation.braking.quarter_stops import LITERAL, exact_distance, stopping_distance
@@ -74,14 +74,16 @@ def test_a_torque_that_drives_is_refused():
 
 def test_compiled_samples_are_kept_on_disk_for_other_processes():
     """Numba knows a function by the cells of its closure too, and those of compiled functions differ by process."""
-    assert by_steps.march.py_func.__closure__ is None is by_lagging_steps.march.py_func.__closure__
-    assert by_steps.march.py_func.__qualname__ != by_lagging_steps.march.py_func.__qualname__
+    assert (
+        compiled_plane_samples.march.py_func.__closure__ is None is compiled_lagging_samples.march.py_func.__closure__
+    )
+    assert compiled_plane_samples.march.py_func.__qualname__ != compiled_lagging_samples.march.py_func.__qualname__
 
 
 def test_a_brake_that_holds_a_small_wheel_just_at_the_friction_of_a_locked_one():
     """Its slip tends to 1, and by rounding must not go beyond; the stop is then that of a locked wheel."""
     rising = TyreTable([0.0], [0.0, 0.1, 1.0], [1e4], [[[0.0, 0.2, 0.9]]], [[1.0, 1.0, 1.0]], [[0.0]])
-    quarter, tables = Quarter(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked_tables([rising])
+    quarter, tables = QuarterVehicle(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked_tables([rising])
     locking = 0.9 * quarter.mass * case.GRAVITY * quarter.radius
     for step in (1e-3, 1.3e-2):
         stop = case.braked(quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3)

@@ -157,9 +157,9 @@ KERNELS = "models.contact.fastsim_falling"
 def test_falling_friction_is_computed_only_where_a_scene_names_it(monkeypatch):
     """In full sliding without spin it is known: mu N (0.4 + 0.6 exp(-0.6 * 20 * 0.1)), in the fields as well."""
     monkeypatch.delitem(sys.modules, KERNELS, raising=False)
-    constant = solved_contact(build(TABLE)).roll((0.1, 0.0, 0.0), 21, fields=True)
+    constant = solved_contact(build(TABLE)).roll((0.1, 0.0, 0.0), 21, with_fields=True)
     assert KERNELS not in sys.modules and constant.fx == pytest.approx(-0.3 * 8e4)
-    found = solved_contact(build({**TABLE, "falling_friction": FALLING})).roll((0.1, 0.0, 0.0), 21, fields=True)
+    found = solved_contact(build({**TABLE, "falling_friction": FALLING})).roll((0.1, 0.0, 0.0), 21, with_fields=True)
     assert KERNELS in sys.modules
     assert found.fx == pytest.approx(-0.3 * 8e4 * (0.4 + 0.6 * np.exp(-1.2)), rel=1e-9)
     (field,) = found.fields
@@ -188,7 +188,7 @@ def test_every_theory_opposes_the_creepage_and_gives_what_it_dissipates(name):
     """Small lateral creepage: all theories within 12 % of the linear one (the 1983 theory is the worst)."""
     body = solved_contact(build({**TABLE, "method": {"name": name}}))
     motion = (0.0, 5e-5, 0.0)
-    found = body.roll(motion, 15, fields=True)
+    found = body.roll(motion, 15, with_fields=True)
     linear = solved_contact(build({**TABLE, "method": {"name": "linear"}})).roll(motion, 15)
     assert found.fy == pytest.approx(linear.fy, rel=0.12) and found.fy < 0
     assert found.dissipation == pytest.approx(-found.fy * 5e-5, rel=1e-9)

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from models.advice.price import runner as cost
-from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
+from models.contact.accuracy import (
+    BANDS,
+    FRICTION_SHARE_KNOTS,
+    MOMENT_BANDS,
+    force_error_band,
+    moment_error_band,
+    rolled_with_errors,
+    spin_weight_of_motion,
+)
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fields import fastsim_fields
 from models.contact.material import MaterialPair
@@ -103,7 +111,7 @@ def test_profiles_touch_and_carry_the_load(twinrig):
 def test_the_stated_error_of_the_cells_is_of_the_size_of_the_true_one():
     body = solved_contact(build(TABLE))
     motion = (1e-3, -2e-4, 0.4)
-    found, error = rolled(body, motion, 21)
+    found, error = rolled_with_errors(body, motion, 21)
     true = np.linalg.norm(found.force - body.roll(motion, 201).force)
     assert 0.2 * error.cells < true < 5 * error.cells and error.total == error.cells + error.theory
     turned = abs(found.mz - body.roll(motion, 201).mz)
@@ -117,23 +125,27 @@ def test_the_stated_error_of_the_moment_holds_on_an_ellipse_outside_of_the_set()
         solved_contact(build(table)),
         solved_contact(build({**table, "method": {"name": "exact", "cells": 24}})),
     )
-    found, error = rolled(fast, (0.0, 1e-3, 1.5), 41)
+    found, error = rolled_with_errors(fast, (0.0, 1e-3, 1.5), 41)
     off, limit = abs(found.mz - true.roll((0.0, 1e-3, 1.5), 24).mz), 0.3 * 8e4 * fast.lever
     assert 0.01 * limit < off < error.moment < 0.1 * limit
 
 
 def test_bands_are_zero_without_creepage_and_those_of_the_table_at_the_knots():
-    assert band("blended intermediate", np.array(0.0), np.array(0.0)) == 0.0
+    assert force_error_band("blended intermediate", np.array(0.0), np.array(0.0)) == 0.0
     for name, (without, with_spin) in BANDS.items():
-        assert band(name, np.array(KNOTS), np.array(0.0)) == pytest.approx(without)
-        assert band(name, np.array(KNOTS), np.array(1.0)) == pytest.approx(with_spin)
+        assert force_error_band(name, np.array(FRICTION_SHARE_KNOTS), np.array(0.0)) == pytest.approx(without)
+        assert force_error_band(name, np.array(FRICTION_SHARE_KNOTS), np.array(1.0)) == pytest.approx(with_spin)
     for name, (without, with_spin) in MOMENT_BANDS.items():
-        assert moment_band(name, np.array(0.0), np.array(1.0)) == 0.0
-        assert moment_band(name, np.array(KNOTS), np.array(0.0)) == pytest.approx(without)
-        assert moment_band(name, np.array(KNOTS), np.array(1.0)) == pytest.approx(with_spin)
+        assert moment_error_band(name, np.array(0.0), np.array(1.0)) == 0.0
+        assert moment_error_band(name, np.array(FRICTION_SHARE_KNOTS), np.array(0.0)) == pytest.approx(without)
+        assert moment_error_band(name, np.array(FRICTION_SHARE_KNOTS), np.array(1.0)) == pytest.approx(with_spin)
     one = np.array(5e-3)
-    assert spin_share(one, one, np.array([1e-3, 0.0, 0.0]), 0.28) == 0.0 == spin_share(one, one, np.zeros(3), 0.28)
-    assert spin_share(one, one, np.array([0.0, 0.0, 0.1]), 0.28) == 1.0
+    assert (
+        spin_weight_of_motion(one, one, np.array([1e-3, 0.0, 0.0]), 0.28)
+        == 0.0
+        == spin_weight_of_motion(one, one, np.zeros(3), 0.28)
+    )
+    assert spin_weight_of_motion(one, one, np.array([0.0, 0.0, 0.1]), 0.28) == 1.0
 
 
 def test_forces_that_friction_cannot_carry_are_told(twinrig, capsys):
@@ -173,7 +185,7 @@ def test_the_linear_theory_is_flagged_on_the_work_precision_page():
 
 def test_the_linear_theory_states_how_far_it_is_beyond_friction():
     body = solved_contact(build({**TABLE, "method": {"name": "linear"}}))
-    found, error = rolled(body, (1e-2, 0.0, 2.0), 21)
+    found, error = rolled_with_errors(body, (1e-2, 0.0, 2.0), 21)
     assert error.total >= abs(found.fx) - 0.3 * 8e4  # no force is beyond mu N
     assert error.moment >= abs(found.mz) - 0.3 * 8e4 * 5e-3  # nor a moment beyond mu N times the longer semi-axis
 
@@ -196,7 +208,7 @@ def test_a_row_of_a_table_is_the_contact_with_its_units():
     for heading, value in (("fx [N]", one.fx), ("fy [N]", one.fy), ("mz [N m]", one.mz), ("stick [-]", one.stick)):
         assert float(rows[0][heading]) == pytest.approx(float(value), rel=1e-5)
     body = solved_contact(build(TABLE))
-    error = rolled(body, (1e-3, -2e-4, 0.4), 21)[1]
+    error = rolled_with_errors(body, (1e-3, -2e-4, 0.4), 21)[1]
     assert float(rows[0]["error_of_cells [N]"]) == pytest.approx(error.cells, rel=1e-3)
     assert float(rows[0]["error_of_theory [N]"]) == pytest.approx(error.theory, rel=1e-3)
     assert float(rows[0]["moment_error_of_cells [N m]"]) == pytest.approx(error.moment_cells, rel=1e-3)

@@ -288,7 +288,7 @@ def test_the_fast_route_equals_the_direct_one(truck):
     vehicle, roads = truck
     filters = {"driver": "Wk", "cab": "Wk", "frame centre": "Wd"}  # repeated poles
     quick = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters)
-    slow = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, fast=False)
+    slow = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, by_modes=False)
     assert quick.direct_counts == {} and slow.direct_counts == {DIRECT_BY_REQUEST: 10}
     assert quick.outputs[-1] == "frame centre Wd" and (quick.status == slow.status).all()
     told = slow.variance > 1e-20  # below, an output is zero by symmetry

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from models.contact import hertz
-from models.contact.fastsim import Ellipse, RollingEllipse, fastsim
-from models.contact.fastsim_derivatives import derivatives
-from models.contact.fastsim_grid import POWERS, grid
+from models.contact.fastsim import FastsimEllipse, RollingEllipse, fastsim
+from models.contact.fastsim_derivatives import creep_force_derivatives
+from models.contact.fastsim_grid import POWERS, ellipse_grid
 from models.contact.fields import fastsim_fields
-from models.contact.linear_theory import coefficients, flexibilities
-from models.contact.material import Falling, MaterialPair
+from models.contact.linear_theory import fastsim_flexibilities, kalker_coefficients
+from models.contact.material import FallingFriction, MaterialPair
 from models.core.errors import InputError
 from validation.cases import fastsim as case
 from validation.contact.fuzzed_creepage import COMPUTED_OPTIONS, moment_bound, random_contacts, worst_violation
@@ -41,7 +41,7 @@ def test_eight_times_the_load_doubles_the_radius():
 
 
 def test_a_call_is_the_function():
-    one = Ellipse(AT["a"] / AT["b"], PAIR)
+    one = FastsimEllipse(AT["a"] / AT["b"], PAIR)
     found = fastsim(RollingEllipse(**AT), PAIR)
     values = [AT[name] for name in ("a", "load", "mu", "xi_x", "xi_y", "spin")]
     assert one(*values) == pytest.approx((found.fx, found.fy, found.mz), rel=1e-12)
@@ -64,15 +64,15 @@ def test_many_are_as_they_are_alone():
 def test_no_load_no_force(load):
     found = fastsim(RollingEllipse(**{**AT, "load": load, "a": 0.0, "b": 0.0}), PAIR)
     assert (found.fx, found.fy, found.mz, found.dissipation, found.wear_number) == (0.0,) * 5
-    assert not derivatives(RollingEllipse(**{**AT, "load": load}), PAIR).slopes.any()
+    assert not creep_force_derivatives(RollingEllipse(**{**AT, "load": load}), PAIR).slopes.any()
 
 
 def test_without_creepage_the_slopes_are_those_of_the_linear_theory_and_of_the_bed():
     """Forces by C11, C22 and C23; the moment is that of the bed's tractions, linear along every strip."""
     still = {**AT, "xi_x": 0.0, "xi_y": 0.0, "spin": 0.0}
-    found = derivatives(RollingEllipse(**still), PAIR)
+    found = creep_force_derivatives(RollingEllipse(**still), PAIR)
     assert not found.forces.any() and np.isfinite(found.slopes).all()
-    c, ab, (_, l2, l3) = coefficients(1.5, PAIR.nu), 24e-6, flexibilities(AT["a"], AT["b"], PAIR)
+    c, ab, (_, l2, l3) = kalker_coefficients(1.5, PAIR.nu), 24e-6, fastsim_flexibilities(AT["a"], AT["b"], PAIR)
     # 21 cells: 0.4 %
     assert found.slopes[0, 0] == pytest.approx(-PAIR.G * ab * c.c11, rel=4e-3)
     assert found.slopes[1, 1] == pytest.approx(-PAIR.G * ab * c.c22, rel=4e-3)
@@ -81,7 +81,9 @@ def test_without_creepage_the_slopes_are_those_of_the_linear_theory_and_of_the_b
     assert found.slopes[2, 2] == pytest.approx(-8 / 15 * ab**2 * AT["b"] / l3, rel=6e-3)  # and 24 strips
 
 
-@pytest.mark.parametrize("options", [{}, *COMPUTED_OPTIONS, {"falling": Falling(floor=0.4, decay=0.6, speed=20.0)}])
+@pytest.mark.parametrize(
+    "options", [{}, *COMPUTED_OPTIONS, {"falling": FallingFriction(floor=0.4, decay=0.6, speed=20.0)}]
+)
 def test_the_moment_is_that_of_the_tractions(options):
     """Of every bound, march and kind of flexibility, cell by cell."""
     for scale in (0.1, 1.0, 10.0):
@@ -109,7 +111,9 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
 def test_derivatives_are_those_of_the_march(kind, growing):
     given = case.creepage_contacts(tuple(case.CREEPAGE_KINDS), (0.2, 2.0))
     own = (
-        derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, growing=growing).slopes[..., 3]
+        creep_force_derivatives(
+            RollingEllipse(**given), PAIR, flexibilities=kind, axes_grow_with_load=axes_grow_with_load
+        ).slopes[..., 3]
         * case.NORMAL_LOAD
     )
     ends = []
@@ -124,11 +128,11 @@ def test_derivatives_are_those_of_the_march(kind, growing):
 
 def test_falling_friction():
     given = {**AT, "xi_x": 0.05, "xi_y": 0.0, "spin": 0.0}
-    law = Falling(floor=0.4, decay=0.6, speed=20.0)
+    law = FallingFriction(floor=0.4, decay=0.6, speed=20.0)
     # all slides at 1 m/s: mu (0.4 + 0.6 exp(-0.6))
     expected = -0.3 * 80e3 * (0.4 + 0.6 * math.exp(-0.6))
     assert fastsim(RollingEllipse(**given), PAIR, falling=law).fx == pytest.approx(expected, rel=1e-9)
-    none = fastsim(RollingEllipse(**AT), PAIR, falling=Falling(floor=1.0, decay=1.0, speed=20.0))
+    none = fastsim(RollingEllipse(**AT), PAIR, falling=FallingFriction(floor=1.0, decay=1.0, speed=20.0))
     assert none.fx == pytest.approx(fastsim(RollingEllipse(**AT), PAIR).fx, rel=1e-12)
 
 
@@ -140,7 +144,7 @@ def test_invariants_of_random_contacts(options):
 
 
 def test_a_call_takes_whole_numbers_and_names_what_it_does_not_take():
-    call = Ellipse(1.5, PAIR)
+    call = FastsimEllipse(1.5, PAIR)
     assert call(6e-3, 80_000, 0.3, np.float32(0.5), 0, 0) == call(6e-3, 8e4, 0.3, 0.5, 0.0, 0.0)
     for value in ("much", [1e-3], None, math.nan):
         with pytest.raises(InputError, match="xi_y = "):
@@ -151,7 +155,7 @@ def test_a_call_takes_whole_numbers_and_names_what_it_does_not_take():
 def test_next_to_nothing_is_nothing(name, value):
     """A slip by so small a bound, squared, would be beyond all numbers."""
     assert fastsim(RollingEllipse(**{**AT, name: value}), PAIR).fx == 0.0
-    assert Ellipse(1.5, PAIR)(6e-3, 1e-310, 0.3, 0.1, 0.1, 1.0)[0] == 0.0
+    assert FastsimEllipse(1.5, PAIR)(6e-3, 1e-310, 0.3, 0.1, 0.1, 1.0)[0] == 0.0
     assert fastsim(RollingEllipse(**{**AT, "xi_x": 1.0}), PAIR).stick == 0.0
 
 
@@ -187,7 +191,7 @@ def test_an_unknown_option_is_named(options):
 
 @pytest.mark.parametrize("bound", list(POWERS))
 def test_the_pressure_of_the_cells_is_the_load(bound):
-    strips, cells = grid(21, 36, bound).records
+    strips, cells = ellipse_grid(21, 36, bound).records
     assert strips.part.sum() * cells.bound.sum() == pytest.approx(1.0, rel=1e-14)
 
 

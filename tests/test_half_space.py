@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
-from models.contact.half_space import Convolution, influence, offsets
+from models.contact.half_space import CellConvolution, cell_offsets, influence_of_rectangle
 from models.contact.material import STEEL, Material, MaterialPair
 
 PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.4))  # all nine numbers differ from zero
@@ -33,29 +33,31 @@ def test_numbers_are_the_integrals(x, y):
 
             truth = dblquad(at, -DX / 2, DX / 2, -DY / 2, DY / 2, epsabs=1e-24, epsrel=1e-9)[0]
             scale = (DX * DY) ** 0.5 / PAIR.G
-            assert influence(x, y, DX, DY, PAIR)[i, j] == pytest.approx(truth, abs=1e-9 * scale)
+            assert influence_of_rectangle(x, y, DX, DY, PAIR)[i, j] == pytest.approx(truth, abs=1e-9 * scale)
 
 
 def test_the_middle_of_a_square():
     """Love (1929): u_z = 4 (1 - nu) / (pi G) s ln(1 + sqrt 2) p in the middle of a square of side s."""
     truth = 4 * (1 - PAIR.nu) / (np.pi * PAIR.G) * DX * np.log(1 + 2**0.5)
-    assert influence(0.0, 0.0, DX, DX, PAIR)[2, 2] == pytest.approx(truth, rel=1e-14, abs=0.0)
+    assert influence_of_rectangle(0.0, 0.0, DX, DX, PAIR)[2, 2] == pytest.approx(truth, rel=1e-14, abs=0.0)
 
 
 def test_far_away_a_cell_is_a_point():
-    far = influence(40e-3, 30e-3, DX, DY, PAIR)
+    far = influence_of_rectangle(40e-3, 30e-3, DX, DY, PAIR)
     assert far == pytest.approx(kernel(40e-3, 30e-3) * DX * DY, rel=1e-4, abs=0.0)  # (DX / r)^2 is 1e-4
 
 
 def test_a_rectangle_is_the_sum_of_its_halves():
-    parts = sum(influence(0.1e-3 + s * DX / 4, 0.2e-3, DX / 2, DY, PAIR) for s in (1, -1))
-    assert influence(0.1e-3, 0.2e-3, DX, DY, PAIR) == pytest.approx(parts, abs=1e-14 * DX / PAIR.G)
+    parts = sum(influence_of_rectangle(0.1e-3 + s * DX / 4, 0.2e-3, DX / 2, DY, PAIR) for s in (1, -1))
+    assert influence_of_rectangle(0.1e-3, 0.2e-3, DX, DY, PAIR) == pytest.approx(parts, abs=1e-14 * DX / PAIR.G)
 
 
 def test_convolution_is_the_plain_sum():
     rng = np.random.default_rng(1)
     rows, columns = 4, 7
-    numbers = influence(offsets(columns, DX), offsets(rows, DY)[:, None], DX, DY, PAIR) * PAIR.G / DX
+    numbers = (
+        influence_of_rectangle(cell_offsets(columns, DX), cell_offsets(rows, DY)[:, None], DX, DY, PAIR) * PAIR.G / DX
+    )
     values = rng.normal(size=(rows, columns, 3))
     plain = np.zeros_like(values)
     for row in range(rows):
@@ -63,4 +65,6 @@ def test_convolution_is_the_plain_sum():
             for r in range(rows):
                 for c in range(columns):
                     plain[row, column] += numbers[rows - 1 + row - r, columns - 1 + column - c] @ values[r, c]
-    assert Convolution(numbers)(values) == pytest.approx(plain, abs=1e-13)  # rounding of sums of 28 numbers of size 1
+    assert CellConvolution(numbers)(values) == pytest.approx(
+        plain, abs=1e-13
+    )  # rounding of sums of 28 numbers of size 1

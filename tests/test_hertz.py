@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.contact.hertz import aspect, by_approach, by_axes, by_load, integrals
+from models.contact.hertz import axis_ratio_and_integrals, by_approach, by_axes, by_load, elliptic_integrals
 from models.contact.material import STEEL, Material, MaterialPair
-from models.contact.simplified_theory import roll
+from models.contact.simplified_theory import solve_rolling_contact
 from models.core.errors import InputError
 from models.core.strict import read
 from models.systems.contact.run import interpenetration_contact
@@ -87,8 +87,8 @@ def test_extremes_stay_finite():
 @pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("curvatures", [1e-200, 1e-8, 0.3, 1 - 1e-9, 1.0])
 def test_aspect_solves_its_equation(curvatures):
-    g, cosine, sine = aspect(curvatures)
-    assert (cosine, sine) == integrals(g)
+    g, cosine, sine = axis_ratio_and_integrals(curvatures)
+    assert (cosine, sine) == elliptic_integrals(g)
     # ln g is known to 1e-16, g to 460 times that
     assert g * g * sine / cosine == pytest.approx(curvatures, rel=1e-12, abs=0.0)
 
@@ -148,7 +148,7 @@ def test_unlike_pairs_are_refused_only_where_they_rub():
         by_load(1.0, 1.0, 1e4, unlike), unlike
     )  # the simplified theory, too, leaves K out
     with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
-        roll(pressed, 0.3, 1e-3, 0.0, 0.0)
+        solve_rolling_contact(pressed, 0.3, 1e-3, 0.0, 0.0)
 
 
 def test_a_material_in_a_file_is_read_as_strictly():

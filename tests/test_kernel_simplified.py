@@ -8,10 +8,10 @@ import pytest
 from models.contact import kernel as k
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach
-from models.contact.kernel_pointer import pointer
-from models.contact.kernel_simplified import table
+from models.contact.kernel_pointer import contact_pointer
+from models.contact.kernel_simplified import distance_table
 from models.contact.material import MaterialPair
-from models.contact.simplified_theory import press, roll
+from models.contact.simplified_theory import solve_normal_contact, solve_rolling_contact
 from models.contact.undeformed_distance import from_function, quadratic
 from models.core.errors import InputError
 
@@ -25,10 +25,10 @@ SHAPES = {
 
 
 def solved(bodies, approach, mu, motion, cells=9, given=k.BY_APPROACH):
-    how, outputs = pointer(cells, bodies), np.empty(k.OUTPUTS)
+    how, outputs = contact_pointer(cells, bodies), np.empty(k.OUTPUT_COUNT)
     inputs = np.array([0.0, 0.0, approach, mu, *motion, PAIR.G, PAIR.nu])
     places = (array.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for array in (how.net, inputs, outputs))
-    return how.call(given, *places), outputs.view(k.OUTPUT)[0]
+    return how.call(given, *places), outputs.view(k.OUTPUT_RECORD)[0]
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -36,8 +36,8 @@ def test_numbers_are_those_of_the_package(name):
     bodies, rng = SHAPES[name], np.random.default_rng(3)
     for approach in (1.2e-5, 4e-5, 1.1e-4):
         motion = rng.normal(0.0, [2e-3, 2e-3, 0.5])
-        pressed = press(bodies, PAIR, approach=approach)
-        rolled = roll(pressed, 0.3, *motion, cells=9)
+        pressed = solve_normal_contact(bodies, PAIR, approach=approach)
+        rolled = solve_rolling_contact(pressed, 0.3, *motion, cell_count=9)
         status, out = solved(bodies, approach, 0.3, motion)
         assert status == k.FINE
         # both settle to 1e-11 or better, by different methods
@@ -95,6 +95,6 @@ def test_bodies_apart_and_all_but_apart(approach):
 def test_distances_that_are_none():
     two = from_function(lambda x, y: x**2 + 400.0 * (y**2 - 4e-4) ** 2, SIZE, SIZE, 61)
     with pytest.raises(InputError, match="2 valleys"):
-        table(two)
+        distance_table(two)
     with pytest.raises(InputError, match="cells"):
-        table(ELLIPSE, 2)
+        distance_table(ELLIPSE, 2)

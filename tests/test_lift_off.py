@@ -298,7 +298,7 @@ def test_copies_whose_tyres_stay_on_the_road_are_the_linear_ones():
     own = ride_scene("quarter_car", 1e-6)
     vehicle, linear = vehicle_of(own), vehicle_of(own).with_tyres(pushes_only=False)
     road = excitation_of(own, wheels(vehicle))
-    lifted, plain = (copies_in_time(each, road, 20.0, 1.0, copies=3) for each in (vehicle, linear))
+    lifted, plain = (copies_in_time(each, road, 20.0, 1.0, copy_count=3) for each in (vehicle, linear))
     assert np.allclose(lifted.moments, plain.moments, rtol=1e-12)
 
 
@@ -320,7 +320,7 @@ def test_the_answer_of_a_ride_that_lifts_is_that_of_its_copies(tmp_path):
     own = ride_scene("quarter_car", study="ride_nonlinear", options={"copies": 12, "lasting": 1.0, "beside": [20.0]})
     found = ride_nonlinear.run(own, ("reference",), tmp_path, lambda *_: None)
     vehicle = vehicle_of(own)
-    copies = copies_in_time(vehicle, excitation_of(own, wheels(vehicle)), 20.0, 1.0, copies=12, seed=1)
+    copies = copies_in_time(vehicle, excitation_of(own, wheels(vehicle)), 20.0, 1.0, copy_count=12, seed=1)
     name = "tyre force front left"
     assert found["answer"]["deviation"][name] == [pytest.approx(copies.deviation[copies.names.index(name)])]
     told = "\n".join(found["table"])

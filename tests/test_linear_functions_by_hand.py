@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from models.contact.fastsim_grid import grid
-from models.contact.linear_theory import coefficients
+from models.contact.fastsim_grid import ellipse_grid
+from models.contact.linear_theory import kalker_coefficients
 from models.core.systems import of_table
 from models.engines.native_parts import AxialTravel
 from models.engines.spatial_protocol import EngineKinematics, difference_step
@@ -194,7 +194,7 @@ def test_deviations_of_parts_are_those_of_outputs_that_ask_for_the_same():
 
 def test_pressure_of_a_grid_falls_along_its_ellipse_and_sums_up_to_the_load():
     """4 cells in each of 2 strips, 1 - y^2 = 3/4 of the ellipse; (1 - x^2)(1 - y^2) where the bound is parabolic."""
-    made = grid(4, 2, "parabolic")
+    made = ellipse_grid(4, 2, "parabolic")
     strips, cells = made.records
     assert strips.y.tolist() == [0.5, -0.5] and strips.half == pytest.approx([math.sqrt(0.75)] * 2, rel=1e-12)
     assert cells.centre.tolist() == [0.75, 0.25, -0.25, -0.75]
@@ -206,7 +206,7 @@ def test_pressure_of_a_grid_falls_along_its_ellipse_and_sums_up_to_the_load():
 
 def test_creep_forces_of_a_wheel_are_kalker_s_coefficients_times_its_ellipse():
     ellipse, rigidity = W.ellipse, W.material.E / (2.0 * (1.0 + W.material.nu))
-    c, c2 = coefficients(ellipse.a / ellipse.b, W.material.nu), ellipse.a * ellipse.b
+    c, c2 = kalker_coefficients(ellipse.a / ellipse.b, W.material.nu), ellipse.a * ellipse.b
     expected = [[c2 * c.c11, 0.0, 0.0], [0.0, c2 * c.c22, c2**1.5 * c.c23], [0.0, -(c2**1.5) * c.c23, c2**2 * c.c33]]
     assert kalker_matrix(W) == pytest.approx(rigidity * np.array(expected), rel=1e-9)
 

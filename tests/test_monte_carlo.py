@@ -50,11 +50,11 @@ def test_a_cell_fits_all_distances():
 def test_copies_along_a_drive_agree_with_the_covariance():
     vehicle, road = vehicle_and_road("half_car")
     brake = SpeedProfile((0.0, 1.0), (16.0, 8.0))
-    found = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
+    found = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copy_count=1000, seed=SEED)
     exact = varying_speed(vehicle, road, brake, instants=found.time).at(found.time)
     assert np.abs(found.z(exact)).max() < 4.0  # sixteen values: one run in a thousand would fail
     assert found.error / found.variance == pytest.approx(np.full((2, 8), (2.0 / 1000) ** 0.5), rel=0.15)
-    again = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
+    again = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copy_count=1000, seed=SEED)
     assert np.array_equal(found.variance, again.variance)
 
 
@@ -62,14 +62,14 @@ def test_copies_along_a_drive_agree_with_the_covariance():
 def test_copies_at_constant_speed_agree_with_the_covariance(case):
     vehicle, road = vehicle_and_road("half_car")
     road = road if case == "delayed" else type(road)(road.F, road.G, road.heights, road.lengths, independent=True)
-    found = variances_at_constant_speed(vehicle, road, 15.0, 6.0, copies=512, seed=SEED)
+    found = variances_at_constant_speed(vehicle, road, 15.0, 6.0, copy_count=512, seed=SEED)
     exact = stationary_covariance(system_at_speed(vehicle, road, 15.0))
     assert (found.error / found.variance).max() < 0.03  # sharp enough to tell the two cases, 30 % apart at the centre
     assert np.abs(found.z(exact.deviation[None])).max() < 4.0
 
 
 def test_outputs_with_white_noise_have_no_variance_and_no_z():
-    found = variances_at_constant_speed(*vehicle_and_road("half_car", 100.0), 15.0, 0.1, copies=16, seed=SEED)
+    found = variances_at_constant_speed(*vehicle_and_road("half_car", 100.0), 15.0, 0.1, copy_count=16, seed=SEED)
     force = found.names.index("tyre force front left")
     assert np.isinf(found.variance[0, force])
     assert np.isnan(found.z(np.full((1, len(found.names)), np.inf))[0, force])

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from models.contact import normal_problem
-from models.contact.half_space import influence
+from models.contact.half_space import influence_of_rectangle
 from models.contact.hertz import by_load
 from models.contact.material import MaterialPair
-from models.contact.normal_problem import TOLERANCE, centres, solve_normal
+from models.contact.normal_problem import CONTACT_TOLERANCE, cell_centres, solve_normal
 from models.core.errors import InputError, RunFailed
 
 PAIR = MaterialPair()
 STEP = 0.4e-3
-X = centres(41, STEP)
+X = cell_centres(41, STEP)
 
 
 def bowl(middle=0.0, radius=0.5):
@@ -27,14 +27,14 @@ def test_every_condition_holds_by_a_plain_sum():
     cells = np.flatnonzero(found.contact)
     places = np.concatenate([cells[::7], np.flatnonzero(~found.contact)[::11]])
     far = x.ravel()[places, None] - x.ravel()[cells], y.ravel()[places, None] - y.ravel()[cells]
-    displacement = influence(*far, STEP, STEP, PAIR)[..., 2, 2] @ found.pressure.ravel()[cells]
+    displacement = influence_of_rectangle(*far, STEP, STEP, PAIR)[..., 2, 2] @ found.pressure.ravel()[cells]
     gap = bowl().ravel()[places] + displacement - found.approach
     inside = np.isin(places, cells)
-    allowed = 2 * TOLERANCE * displacement.max()
+    allowed = 2 * CONTACT_TOLERANCE * displacement.max()
     assert np.abs(gap[inside]).max() < allowed
     assert gap[~inside].min() > -allowed
     assert found.pressure.min() == 0.0
-    assert found.residual <= 2 * TOLERANCE
+    assert found.residual <= 2 * CONTACT_TOLERANCE
     assert found.load == pytest.approx(5e4, rel=1e-12)
 
 
@@ -75,12 +75,12 @@ def test_a_rough_surface_touches_in_many_places():
     rough = bowl(radius=50.0) + 1e-6 * np.random.default_rng(3).normal(size=(41, 41))
     rough[[0, -1]], rough[:, [0, -1]] = 1.0, 1.0
     found = solve_normal(rough, STEP, STEP, PAIR, load=3e4)
-    assert found.residual <= 2 * TOLERANCE
+    assert found.residual <= 2 * CONTACT_TOLERANCE
     assert 0.2 < found.contact.mean() < 0.8
 
 
 def test_an_unfinished_solution_is_none(monkeypatch):
-    monkeypatch.setattr(normal_problem, "MOST_ITERATIONS", 3)
+    monkeypatch.setattr(normal_problem, "ITERATION_LIMIT", 3)
     with pytest.raises(RunFailed):
         solve_normal(bowl(), STEP, STEP, PAIR, load=5e4)
 

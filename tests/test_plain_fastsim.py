@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from models.contact import kernel as k
-from models.contact.fastsim import Ellipse as Call
+from models.contact.fastsim import FastsimEllipse as Call
 from models.contact.fastsim import RollingEllipse, fastsim
-from models.contact.fastsim_derivatives import derivatives
+from models.contact.fastsim_derivatives import creep_force_derivatives
 from models.contact.fields import fastsim_fields
-from models.contact.kernel_pointer import pointer
-from models.contact.linear_theory import coefficients, flexibilities
-from models.contact.material import STEEL, Falling, Material, MaterialPair
+from models.contact.kernel_pointer import contact_pointer
+from models.contact.linear_theory import fastsim_flexibilities, kalker_coefficients
+from models.contact.material import STEEL, FallingFriction, Material, MaterialPair
 from validation.contact import plain_fastsim as plain
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -69,12 +69,12 @@ def options(program):
 @pytest.mark.parametrize("ratio", [1e-4, 0.03, 0.13, 0.85, 1.0, 3.7, 12.0, 34.0, 300.0])
 @pytest.mark.parametrize("nu", [0.0, 0.1, 0.28, 0.5])
 def test_coefficients(ratio, nu):
-    computed = coefficients(ratio, nu)
+    computed = kalker_coefficients(ratio, nu)
     expected = plain.coefficients(ratio, nu)
     assert [computed.c11, computed.c22, computed.c23, computed.c33] == pytest.approx(expected, rel=1e-12)
     pair = MaterialPair(Material(E=2e11, nu=nu), Material(E=2e11, nu=nu))
     expected = plain.flexibilities(5e-3, 5e-3 / ratio, pair.G, nu)
-    assert flexibilities(5e-3, 5e-3 / ratio, pair) == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert fastsim_flexibilities(5e-3, 5e-3 / ratio, pair) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=named)
@@ -110,7 +110,7 @@ def test_another_march_and_spin_of_the_other_sign_are_seen():
 
 
 def test_friction_that_falls():
-    law = Falling(floor=0.4, decay=0.6, speed=20.0)
+    law = FallingFriction(floor=0.4, decay=0.6, speed=20.0)
     ellipses, program = drawn(3, 6), PROGRAMS[0]
     ellipses = [replace(each, xi_x=30.0 * each.xi_x) for each in ellipses]  # slip of up to some m/s
     computed = fastsim(given(ellipses), PAIR, cells=9, falling=law)
@@ -130,7 +130,7 @@ def test_friction_that_falls():
 def test_derivatives_are_differences_of_the_plain_march(flexible):
     """By central differences; the contacts are drawn so that no cell begins to slip or stick within a step."""
     ellipses, step, program = drawn(4, 4, 4.0), 1e-6, plain.FastsimSettings(7, flexibilities=flexible)
-    computed = derivatives(given(ellipses), PAIR, cells=7, flexibilities=flexible)
+    computed = creep_force_derivatives(given(ellipses), PAIR, cells=7, flexibilities=flexible)
     for i, ellipse in enumerate(ellipses):
         assert np.abs((computed.forces[i] - plain.fastsim(ellipse, program)[0][:3]) / units(ellipse)).max() <= CLOSE
         scale = np.abs([ellipse.xi_x, ellipse.xi_y, ellipse.spin, ellipse.load])
@@ -150,7 +150,7 @@ def test_derivatives_are_differences_of_the_plain_march(flexible):
 
 def called(how, kind, values):
     """Status and outputs of the kernel as a C function."""
-    inputs, outputs = np.array([*values, PAIR.G, PAIR.nu]), np.empty(k.OUTPUTS)
+    inputs, outputs = np.array([*values, PAIR.G, PAIR.nu]), np.empty(k.OUTPUT_COUNT)
     doubles = how.call.argtypes[1]
     status = how.call(kind, *(array.ctypes.data_as(doubles) for array in (how.net, inputs, outputs)))
     return status, outputs
@@ -159,7 +159,7 @@ def called(how, kind, values):
 @pytest.mark.parametrize("cells", [0, 9])
 def test_the_kernel_from_curvatures_to_forces(cells):
     """All four ways to give the ellipse; without cells the linear theory."""
-    draw, how, elastic = np.random.default_rng(5), pointer(cells), PAIR.G / (1.0 - PAIR.nu)
+    draw, how, elastic = np.random.default_rng(5), contact_pointer(cells), PAIR.G / (1.0 - PAIR.nu)
     for ellipse in drawn(6, 4):
         small, large = sorted(10.0 ** draw.uniform(-1.0, 1.5, 2))
         major, minor, approach = plain.hertz_ellipse(small, large, elastic, ellipse.load)

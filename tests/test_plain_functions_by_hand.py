@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from models.brake.brake import Brake, of_wheels, torques_of_pressures
-from models.brake.controller import SAMPLE, Sample
+from models.brake.brake import Brake, brakes_of_wheels, torques_of_pressures
+from models.brake.controller import SAMPLING_PERIOD, Sample
 from models.brake.controllers.five_phase import FivePhase
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
-from models.brake.port.ask import ask
-from models.brake.pressure import Chambers, resting_chambers
+from models.brake.port.ask import checked_command
+from models.brake.pressure import BrakeChambers, air_at_rest
 from models.brake.steering import Steering
 from models.drift.score import low_pass, root_mean_square
 from models.multibody.numbers import Handling
@@ -46,7 +46,7 @@ def test_loads_of_a_braked_truck_balance_its_weight_and_its_inertia():
 
 def test_torque_rises_and_falls_along_the_lines_of_its_own_brake():
     """From none to 4 bar, and back to 1 bar: rising (p - push out), then at most falling (p - release)."""
-    both = of_wheels(
+    both = brakes_of_wheels(
         Brake(push_out=0.75, release=0.5, rising=1500.5, falling=1800.5),
         Brake(push_out=0.25, release=0.125, rising=900.5, falling=990.5),
     )
@@ -57,7 +57,7 @@ def test_torque_rises_and_falls_along_the_lines_of_its_own_brake():
 
 
 def test_nothing_is_under_pressure_at_the_start_but_the_supply():
-    air = resting_chambers(Chambers(np.array([0.15]), np.array([0.1]), 6.25), SAMPLE)
+    air = air_at_rest(BrakeChambers(np.array([0.15]), np.array([0.1]), 6.25), SAMPLING_PERIOD)
     assert air.supply == pytest.approx([6.25], rel=1e-12)
     assert not np.any(air[0]) and not np.any(air[1])
 
@@ -74,10 +74,12 @@ def followed(accelerations, speed=20.0):
     controller = FivePhase(1, e1=20.0, e2=30.0, e3=25.0, e4=3.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0)
     wheel, pressures = speed, []
     for k, beside in enumerate(accelerations):
-        mean = -SLOWING * (1.0 - (1.0 - SAMPLE / MEMORY) ** k)
-        wheel += (beside + mean) * SAMPLE if k else 0.0
-        sample = Sample(k, round(1e9 * k * SAMPLE), np.array([wheel]), True, 6.0, speed - SLOWING * k * SAMPLE)
-        pressures.append(float(ask(controller, sample).pressures[0]))
+        mean = -SLOWING * (1.0 - (1.0 - SAMPLING_PERIOD / MEMORY) ** k)
+        wheel += (beside + mean) * SAMPLING_PERIOD if k else 0.0
+        sample = Sample(
+            k, round(1e9 * k * SAMPLING_PERIOD), np.array([wheel]), True, 6.0, speed - SLOWING * k * SAMPLING_PERIOD
+        )
+        pressures.append(float(checked_command(controller, sample).pressures[0]))
     return np.array(pressures)
 
 
@@ -87,16 +89,20 @@ def test_the_five_phases_end_at_their_thresholds_and_have_their_rates():
     passed = [(-60.0, -1.0), (20.0, 1.0), (30.0, 1.0), (25.0, -1.0), (3.0, -1.0), (-60.0, -1.0)]
     near = [threshold + way * off for threshold, way in passed for off in (-NEAR, NEAR)]
     rates = [40.0] * 13 + [-60.0, -60.0, 0.0, 0.0, 40.0, 40.0, 0.0, 0.0, 8.0, 8.0, -60.0]
-    assert followed(begins + near) == pytest.approx(SAMPLE * np.cumsum(rates), rel=1e-9)
+    assert followed(begins + near) == pytest.approx(SAMPLING_PERIOD * np.cumsum(rates), rel=1e-9)
 
 
 def test_a_wheel_beyond_the_deep_slip_is_released_and_a_slow_vehicle_is_braked():
     """Slip of 0.299 and 0.301 about the limit of 0.3; below the speed at which control ends it is the supply's."""
     for slip, pressures in ((0.299, [40.0, 80.0]), (0.301, [0.0, 0.0])):
         controller, wheel = FivePhase(1, fast=40.0), np.array([10.0 * (1.0 - slip)])
-        asked = [float(ask(controller, Sample(k, k, wheel, True, 6.0, 10.0)).pressures[0]) for k in range(2)]
-        assert np.array(asked) == pytest.approx(SAMPLE * np.array(pressures), rel=1e-12)
-    assert ask(FivePhase(1), Sample(0, 0, np.array([1.0]), True, 6.25, 1.49)).pressures == pytest.approx([6.25])
+        asked = [
+            float(checked_command(controller, Sample(k, k, wheel, True, 6.0, 10.0)).pressures[0]) for k in range(2)
+        ]
+        assert np.array(asked) == pytest.approx(SAMPLING_PERIOD * np.array(pressures), rel=1e-12)
+    assert checked_command(FivePhase(1), Sample(0, 0, np.array([1.0]), True, 6.25, 1.49)).pressures == pytest.approx(
+        [6.25]
+    )
 
 
 def test_a_class_of_road_has_the_variance_of_its_density():

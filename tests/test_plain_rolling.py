@@ -5,7 +5,14 @@ import pytest
 from scipy.optimize import brentq
 
 from models.contact.material import MaterialPair
-from models.contact.rolling_kernels import cell_traction, factorise, orthogonalise, rotate_column, substitute, sweep
+from models.contact.rolling_kernels import (
+    cell_traction,
+    factorise_matrices,
+    gauss_seidel_sweep,
+    orthogonalise,
+    rotate_column,
+    solve_factorised,
+)
 from models.contact.rolling_operator import SlipOperator, gmres
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -19,11 +26,11 @@ def test_factors_of_many_systems_and_their_solutions():
         skewed = draw.normal(size=(stop - start, stop - start))
         system[start:stop, start:stop] = skewed @ skewed.T + np.eye(stop - start) + skewed - skewed.T
     factors, wanted = systems.copy(), draw.normal(size=(2, 7))
-    factorise(factors, spans)
+    factorise_matrices(factors, spans)
     for made, system in zip(factors, systems, strict=True):
         assert (np.tril(made, -1) + np.eye(7)) @ np.triu(made) == pytest.approx(system, abs=1e-12)
     solved = np.linalg.solve(systems, wanted[..., None])[..., 0]
-    assert substitute(factors, spans, wanted) == pytest.approx(solved, rel=1e-10)
+    assert solve_factorised(factors, spans, wanted) == pytest.approx(solved, rel=1e-10)
 
 
 def test_steps_of_gmres():
@@ -77,7 +84,9 @@ def test_a_sweep_takes_one_cell_after_the_other():
     bound[0, :2] = 0.0
     traction = draw.normal(0.0, 0.3, (4, 5, 2)) * (bound > 0.0)[..., None]
     computed = np.ascontiguousarray(np.moveaxis(traction, -1, 0))
-    sweep(computed, np.ascontiguousarray(np.moveaxis(rigid, -1, 0)), operator.reversed_kernel, bound, relaxation)
+    gauss_seidel_sweep(
+        computed, np.ascontiguousarray(np.moveaxis(rigid, -1, 0)), operator.reversed_kernel, bound, relaxation
+    )
     for row in range(4):
         for column in range(4, -1, -1):
             if bound[row, column] > 0.0:

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 from models.contact import kernel as k
-from models.contact.distance_kernels import least_of_row
-from models.contact.kernel_pointer import Pointer, pointer
-from models.contact.kernel_simplified import table
+from models.contact.distance_kernels import least_value_of_row
+from models.contact.kernel_pointer import ContactPointer, contact_pointer
+from models.contact.kernel_simplified import distance_table
 from models.contact.material import MaterialPair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import (
-    FineNet,
+    FineGrid,
     coarse_tractions,
     covariances,
     normal_displacement_sums,
     slope_products,
     tangential_displacement_sums,
 )
-from models.contact.simplified_theory import SimplifiedOptions, press, roll
+from models.contact.simplified_theory import SimplifiedOptions, solve_normal_contact, solve_rolling_contact
 from models.contact.undeformed_distance import from_arrays
 from validation.contact import plain_simplified as plain
 
@@ -82,20 +82,20 @@ def test_the_least_of_a_row_and_its_place():
     turning = line.derivative().roots(extrapolate=False)
     places = np.append(turning, line.x)
     k = np.argmin(line(places))
-    assert least_of_row(row) == pytest.approx((float(line(places[k])), places[k]), rel=1e-10)
+    assert least_value_of_row(row) == pytest.approx((float(line(places[k])), places[k]), rel=1e-10)
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=lambda each: each.fit)
 @pytest.mark.parametrize("name", HEIGHTS)
 def test_load_and_forces_of_the_package(name, options):
-    pressed = press(bodies(name)[0], PAIR, approach=APPROACH, options=options)
+    pressed = solve_normal_contact(bodies(name)[0], PAIR, approach=APPROACH, simplified_options=options)
     truth, rolled = expected(name, options)
     assert pressed.load == pytest.approx(truth.load, rel=CLOSE)
     assert pressed.patches[0].stiffness == pytest.approx(truth.stiffness, rel=CLOSE)
-    by_load = press(bodies(name)[0], PAIR, load=truth.load, options=options)
+    by_load = solve_normal_contact(bodies(name)[0], PAIR, load=truth.load, simplified_options=options)
     assert by_load.approach == pytest.approx(APPROACH, rel=CLOSE)
     for motion, (forces, flexibility) in zip(MOTIONS, rolled, strict=True):
-        computed = roll(pressed, MU, *motion, cells=CELLS)
+        computed = solve_rolling_contact(pressed, MU, *motion, cell_count=CELLS)
         unit = MU * truth.load * np.array([1.0, 1.0, 5e-3])
         assert np.abs((np.array([computed.fx, computed.fy, computed.mz]) - forces[:3]) / unit).max() <= CLOSE
         assert computed.stick_share == pytest.approx(forces[3], abs=1e-9)
@@ -105,15 +105,17 @@ def test_load_and_forces_of_the_package(name, options):
 @pytest.mark.parametrize("options", OPTIONS, ids=lambda each: each.fit)
 @pytest.mark.parametrize("name", HEIGHTS)
 def test_load_and_forces_of_the_kernel(name, options):
-    how = Pointer(pointer(0).address, table(bodies(name)[0], CELLS, options), pointer(0).call)
+    how = ContactPointer(
+        contact_pointer(0).address, distance_table(bodies(name)[0], CELLS, options), contact_pointer(0).call
+    )
     truth, rolled = expected(name, options)
     for motion, (forces, _) in zip(MOTIONS, rolled, strict=True):
         inputs = np.array([0.0, 0.0, APPROACH, MU, *motion, PAIR.G, PAIR.nu])
-        outputs = np.empty(k.OUTPUTS)
+        outputs = np.empty(k.OUTPUT_COUNT)
         doubles = ctypes.POINTER(ctypes.c_double)
         places = (array.ctypes.data_as(doubles) for array in (how.net, inputs, outputs))
         assert how.call(k.BY_APPROACH, *places) == k.FINE
-        out = outputs.view(k.OUTPUT)[0]
+        out = outputs.view(k.OUTPUT_RECORD)[0]
         unit = MU * truth.load * np.array([1.0, 1.0, 5e-3])
         assert np.abs((outputs[:3] - forces[:3]) / unit).max() <= CLOSE
         x0, x1, y0, y1 = truth.box
@@ -145,7 +147,7 @@ def test_tractions_of_the_meshes():
     net = plain.interval_midpoints(*box[2:], 7), low, high, 6e-3 / 7, np.ones((7, 6))
     tractions = draw.normal(size=(7, 6, 2))
     expected = plain.mean_tractions(plain.Strips(*net), tractions[..., 0] + 1j * tractions[..., 1], box, 5)
-    assert coarse_tractions(FineNet(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
+    assert coarse_tractions(FineGrid(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 
 def test_loads_press_and_drag_the_surface_beside_them():

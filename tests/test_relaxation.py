@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.brake.controller import AllApplied
+from models.brake.controller import NoAntiLock
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.brake.relaxation import DAMPING, Lag, lag_on, lagging_slip, longest_step
-from models.brake.surfaces import UNIFORM_ROAD, OnRoad
+from models.brake.relaxation import DAMPING, TyreLag, advance_all_lagging_slips, lagging_slip, longest_stable_step
+from models.brake.surfaces import UNIFORM_ROAD, VehicleOnRoad
 from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import vehicle_in_engine
 from models.systems.braking.scene import build
@@ -45,7 +45,7 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference")
     vehicle, start = vehicle_and_start_state(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))
-    return vehicle_in_engine(vehicle, engine).run(AllApplied(4), start, duration)
+    return vehicle_in_engine(vehicle, engine).run(NoAntiLock(4), start, duration)
 
 
 def test_a_j_turn_with_lag_tends_to_the_one_without_and_mirrors():
@@ -69,14 +69,18 @@ def test_the_step_is_of_second_order():
 def test_it_damps_at_rest():
     # a wheel's share of a mass on its tyre alone, at rest along it and pushed aside at 0.3 m/s
     plane, slope, step = plane_of_truck(PAPER_TRUCK), table_of_surface("ice").cornering, 5.5e-3
-    lag, lagging, state = Lag(np.full(4, 0.3), np.zeros(4)), np.zeros(4), np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
+    lag, lagging, state = (
+        TyreLag(np.full(4, 0.3), np.zeros(4)),
+        np.zeros(4),
+        np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]]),
+    )
     vehicle, way = (
-        OnRoad(plane, np.zeros(4, dtype=int), slope, stacked_tables([table_of_surface("ice")]), UNIFORM_ROAD),
+        VehicleOnRoad(plane, np.zeros(4, dtype=int), slope, stacked_tables([table_of_surface("ice")]), UNIFORM_ROAD),
         0.0,
     )
     for _ in range(round(2.0 / step)):
         for half in (True, False):
-            lag_on(state, 0.5 * step, np.zeros(4), vehicle, lag, lagging)
+            advance_all_lagging_slips(state, 0.5 * step, np.zeros(4), vehicle, lag, lagging)
             if half:
                 state[1, 1] -= step * 9.81 * slope * lagging.mean()
                 way += step * state[1, 1]
@@ -94,7 +98,7 @@ def test_a_vehicle_at_rest_rocks_up_in_longer_steps_than_the_longest_and_in_no_s
     slope, length = 20.0, 0.3
     rate, damped = slope * lively / length, 2.0 * DAMPING * slope * lively / np.sqrt(slope * 9.81 * length)
     for factor, grows in ((0.99, False), (1.01, True)):
-        step = factor * longest_step(slope, lively, length)
+        step = factor * longest_stable_step(slope, lively, length)
         # y' = y + h v, then v' = v - h (w^2 y' + c v): way and speed across
         across = np.array([[1.0, step], [-step * rate, 1.0 - step * damped - step**2 * rate]])
         assert (np.abs(np.linalg.eigvals(across)).max() > 1.0) == grows

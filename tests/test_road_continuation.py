@@ -117,7 +117,7 @@ def test_two_tracks_with_one_reference_keep_their_bank():
     other = SplineProfile.through(STATION, HEIGHT + 0.05)
     level = reference_height(ROAD)
     s = ROAD.start + 6.0
-    heights = [run_in(track, reference=level).height_slope_at(s)[0] for track in (ROAD, other)]
+    heights = [run_in(track, reference_height_value=level).height_slope_at(s)[0] for track in (ROAD, other)]
     assert heights[1] - heights[0] == pytest.approx(0.05, abs=1e-10)
 
 

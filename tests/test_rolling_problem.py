@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from models.contact import rolling_problem
-from models.contact.half_space import influence
-from models.contact.linear_theory import coefficients
+from models.contact.half_space import influence_of_rectangle
+from models.contact.linear_theory import kalker_coefficients
 from models.contact.material import STEEL, Material, MaterialPair
-from models.contact.normal_problem import PressureGrid, centres, hertzian, solve_normal
+from models.contact.normal_problem import PressureGrid, cell_centres, hertzian_pressure_grid, solve_normal
 from models.contact.rolling_operator import SlipOperator
-from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
+from models.contact.rolling_problem import STICK_SLIP_TOLERANCE, rigid_slip, solve_rolling, solve_shift
 from models.core.errors import InputError, RunFailed
 from validation.cases.contact_exact import CREEPAGE_CASES, carter_traction, measure, rolling_forces
 
 PAIR, LOAD, A, B, MU = MaterialPair(), 8e4, 6e-3, 4e-3, 0.3
-PRESSED = hertzian(A, B, LOAD, 16)
+PRESSED = hertzian_pressure_grid(A, B, LOAD, 16)
 SCALE = MU * LOAD / (PAIR.G * A * B)
 
 
@@ -32,14 +32,14 @@ def test_every_condition_holds_by_a_plain_sum():
     u = [
         np.einsum(
             "abcdij,cdj->abi",
-            influence(away[0] + i * PRESSED.dx, away[1], PRESSED.dx, PRESSED.dy, PAIR)[..., :2, :2],
+            influence_of_rectangle(away[0] + i * PRESSED.dx, away[1], PRESSED.dx, PRESSED.dy, PAIR)[..., :2, :2],
             found.traction,
         )
         for i in range(3)
     ]
     slip = rigid_slip(PRESSED.x, PRESSED.y, *motion) + (3 * u[0] - 4 * u[1] + u[2]) / (2 * PRESSED.dx)
     size, bound = np.linalg.norm(found.traction, axis=-1), MU * PRESSED.pressure
-    allowed = 10 * TOLERANCE
+    allowed = 10 * STICK_SLIP_TOLERANCE
     assert (size <= bound * (1 + 1e-12)).all()
     assert np.linalg.norm(slip[found.stick], axis=-1).max() < allowed * SCALE
     slips = PRESSED.contact & ~found.stick
@@ -47,7 +47,7 @@ def test_every_condition_holds_by_a_plain_sum():
     against = -bound[slips][:, None] * slip[slips] / np.linalg.norm(slip[slips], axis=-1)[:, None]
     assert np.abs(found.traction[slips] - against).max() < allowed * bound.max()
     assert np.abs(found.slip[slips] - slip[slips]).max() < allowed * SCALE
-    assert found.residual <= TOLERANCE
+    assert found.residual <= STICK_SLIP_TOLERANCE
 
 
 @pytest.mark.parametrize("name", CREEPAGE_CASES)
@@ -63,13 +63,13 @@ def test_slow_creepage_is_the_linear_theory():
     """At 1e-4 of the scale of sliding, on the area of the cells; 16 of them leave 3 %."""
     little = 1e-4 * SCALE
     found = solve_rolling(PRESSED, MU, little, 0.0, 0.0, PAIR)
-    slope = float(coefficients(A / B, PAIR.nu).c11)
+    slope = float(kalker_coefficients(A / B, PAIR.nu).c11)
     assert found.fx == pytest.approx(-PAIR.G * PRESSED.area / np.pi * slope * little, rel=0.03)
     assert 0.0 <= found.power <= 0.1 * little * abs(found.fx)  # next to nothing slips
 
 
 def test_an_unfinished_solution_is_none(monkeypatch):
-    monkeypatch.setattr(rolling_problem, "MOST_ROUNDS", 1)
+    monkeypatch.setattr(rolling_problem, "ROUND_LIMIT", 1)
     with pytest.raises(RunFailed):
         solve_rolling(PRESSED, MU, 0.2 * SCALE, 0.0, 0.0, PAIR)
 
@@ -80,7 +80,7 @@ def test_nothing_from_nothing():
     assert still.stick[PRESSED.contact].all()
     smooth = solve_rolling(PRESSED, 0.0, 0.01, 0.0, 0.0, PAIR)
     assert smooth.fx == 0.0
-    apart = PressureGrid(np.zeros((5, 5)), centres(5, 1e-3), centres(5, 1e-3))
+    apart = PressureGrid(np.zeros((5, 5)), cell_centres(5, 1e-3), cell_centres(5, 1e-3))
     assert solve_rolling(apart, MU, 0.01, 0.0, 0.0, PAIR).fx == 0.0
 
 
@@ -99,11 +99,14 @@ def test_next_to_no_friction_turns_with_the_slip(part):
         (lambda: solve_rolling(PRESSED, MU, [1e-3, 2e-3], 0.0, 0.0, PAIR), r"xi_x = .*one number, not an array"),
         (lambda: solve_rolling(PRESSED, MU, 0.0, 0.0, 1e12, PAIR), r"spin = 1000000000000.0: must be a spin in 1/m"),
         (
-            lambda: PressureGrid(np.zeros((5, 4)), centres(5, 1e-3), centres(4, 1e-3)),
+            lambda: PressureGrid(np.zeros((5, 4)), cell_centres(5, 1e-3), cell_centres(4, 1e-3)),
             r"pressure = \[5, 4\]: .*\(4, 5\)",
         ),
-        (lambda: PressureGrid(np.zeros((4, 5)), centres(5, 1e-3)[::-1], centres(4, 1e-3)), r"x: must ascend"),
-        (lambda: PressureGrid(np.full((4, 5), -1.0), centres(5, 1e-3), centres(4, 1e-3)), r"pressure\[0, 0\] = -1.0"),
+        (lambda: PressureGrid(np.zeros((4, 5)), cell_centres(5, 1e-3)[::-1], cell_centres(4, 1e-3)), r"x: must ascend"),
+        (
+            lambda: PressureGrid(np.full((4, 5), -1.0), cell_centres(5, 1e-3), cell_centres(4, 1e-3)),
+            r"pressure\[0, 0\] = -1.0",
+        ),
     ],
 )
 def test_wrong_input_is_named(wrong, words):
@@ -117,7 +120,9 @@ def test_size_and_stiffness_do_not_matter():
     soft = Material(E=7e10, nu=STEEL.nu)
     pair, load, mu, size = MaterialPair(soft, soft), 10.0, 0.05, 1e-2
     scale = mu * load / (pair.G * A * B * size**2)
-    other = solve_rolling(hertzian(size * A, size * B, load, 16), mu, 0.2 * scale, 0.0, 0.1 * scale / (size * A), pair)
+    other = solve_rolling(
+        hertzian_pressure_grid(size * A, size * B, load, 16), mu, 0.2 * scale, 0.0, 0.1 * scale / (size * A), pair
+    )
     assert other.fx / (mu * load) == pytest.approx(found.fx / (MU * LOAD), rel=1e-6)
     assert other.mz / (mu * load * size) == pytest.approx(found.mz / (MU * LOAD), rel=1e-6)
 
@@ -134,11 +139,11 @@ def test_empty_cells_around_do_not_matter():
 def test_pressure_of_our_own_gives_the_same_forces():
     """Rolling on the pressure of the normal problem instead of Hertz'."""
     step = 0.5e-3
-    x = centres(33, step)
+    x = cell_centres(33, step)
     pressed = solve_normal((x**2 + x[:, None] ** 2) / 1.0, step, step, PAIR, load=LOAD)
     radius = (0.75 * LOAD * 0.5 / PAIR.modulus) ** (1 / 3)
     motion = (0.2 * MU * LOAD / (PAIR.G * radius**2), 0.0, 0.0)
-    truth = solve_rolling(hertzian(radius, radius, LOAD, 24), MU, *motion, PAIR)
+    truth = solve_rolling(hertzian_pressure_grid(radius, radius, LOAD, 24), MU, *motion, PAIR)
     found = solve_rolling(pressed, MU, *motion, PAIR)
     assert found.fx == pytest.approx(truth.fx, abs=0.015 * MU * LOAD)  # 24 cells across, error up to 0.7 % each
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import polynomial
 
-from models.brake.brake import Brake, of_wheels
-from models.brake.controllers.five_phase_cycle import WheelState, time_to_corner
+from models.brake.brake import Brake, brakes_of_wheels
+from models.brake.controllers.five_phase_cycle import CycleWheelState, time_to_corner
 from models.core.piecewise import evaluate, interpolate
 from models.multibody.tree import add, cross, dot, plus, times
 from models.road.kernels import cubics_uniform
@@ -20,12 +20,12 @@ CLOSE = pytest.approx
 
 def rolling_at(pressure, torque):
     """A state of a wheel of which only its brake counts."""
-    return WheelState(pressure, torque, 50.0, 0.0, 0.0)
+    return CycleWheelState(pressure, torque, 50.0, 0.0, 0.0)
 
 
 def test_corners_of_the_brake_s_loop_lie_where_its_two_lines_meet_the_torque():
     """The upward line gives 1500 N m at 0.75 + 1500/1500 bar, the downward one at 0.5 + 1500/2000 bar."""
-    brakes = of_wheels(Brake(push_out=0.75, release=0.5, rising=1500.0, falling=2000.0))
+    brakes = brakes_of_wheels(Brake(push_out=0.75, release=0.5, rising=1500.0, falling=2000.0))
     assert time_to_corner(rolling_at(1.0, 1500.0), 10.0, brakes) == CLOSE(0.075, rel=ROUNDING)
     assert time_to_corner(rolling_at(1.5, 1500.0), -10.0, brakes) == CLOSE(0.025, rel=ROUNDING)
     assert time_to_corner(rolling_at(1.0, 1000.0), -10.0, brakes) == CLOSE(0.05, rel=ROUNDING)

@@ -145,7 +145,7 @@ def test_road_in_time_has_the_roads_covariance(case):
 def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
     vehicle = load_vehicle("half_car")
     own = wheels_on_track(wheels(vehicle), 1.0)
-    road = road_path(road_excitation(road_of_level(1.0, cutoff=3.0), own), SPEED, 1e-3)
+    road = road_path(road_excitation(road_of_level(1.0, cutoff_wavenumber=3.0), own), SPEED, 1e-3)
     table = road.wheel_heights_and_rates(400, 3)
     lag = round((own[0].x - own[1].x) / SPEED / road.half_step)
     assert np.abs(table[lag:, 1] - table[:-lag, 0]).max() == 0.0
@@ -170,7 +170,7 @@ def test_damped_tyres_need_a_road_with_rates():
 def test_copies_of_a_linear_vehicle_have_its_covariance():
     """A half car with the delay between its axles, 60 copies of 3 s: variances and means within 4 standard errors."""
     vehicle, road = vehicle_and_road("half_car")
-    copies = copies_in_time(vehicle, road, SPEED, 3.0, copies=60, seed=4)
+    copies = copies_in_time(vehicle, road, SPEED, 3.0, copy_count=60, seed=4)
     exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
     assert np.abs(copies.z(exact.deviation)).max() < 4.0
     assert np.abs(copies.mean / copies.mean_error).max() < 4.0
@@ -240,7 +240,7 @@ def test_standard_errors_of_a_run():
         displacement_factors=np.zeros(2),
         road_factors=np.ones(1),
     )
-    road = road_excitation(road_of_level(1.0, corners=(0.3, 0.3)), wheels_on_track(wheels(vehicle), 1.0))
+    road = road_excitation(road_of_level(1.0, corner_wavenumbers=(0.3, 0.3)), wheels_on_track(wheels(vehicle), 1.0))
     P, a, T = (
         stationary_covariance(vehicle_with_road(replace(linear, outputs=(height,)), road, 10.0)).variance[0],
         3.0,

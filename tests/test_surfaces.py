@@ -4,22 +4,31 @@ import numpy as np
 import pytest
 
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.brake.surfaces import OnRoad, Stretch, Surfaces, check_way, road, under_wheels
+from models.brake.surfaces import (
+    RoadStretch,
+    VehicleOnRoad,
+    WheelSurfaces,
+    check_step_distance,
+    fill_surfaces_under_wheels,
+    road_of_stretches,
+)
 from models.core.errors import InputError
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import stacked_tables
 
 PLANE, ICE = plane_of_truck(PAPER_TRUCK), table_of_surface("ice")
 KINDS = np.array([0, 0, 1, 1])
-ROAD = road([Stretch(0.0, 0, 1), Stretch(10.0, 2, 3), Stretch(12.0, 0, 0)], line=0.5, kind_count=2)
+ROAD = road_of_stretches(
+    [RoadStretch(0.0, 0, 1), RoadStretch(10.0, 2, 3), RoadStretch(12.0, 0, 0)], dividing_line=0.5, tyre_kind_count=2
+)
 FRONT, REAR = PAPER_TRUCK.front.x, PAPER_TRUCK.rear.x
 
 
 def under(x, y=0.0, vx=0.0, vy=0.0, step=0.1, own=ROAD):
     """Of each wheel its first and its second table and the share of the second."""
-    surfaces = Surfaces(*np.zeros((4, 4)))
-    vehicle = OnRoad(PLANE, KINDS, 0.0, stacked_tables([ICE]), own)
-    under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, vehicle, surfaces)
+    surfaces = WheelSurfaces(*np.zeros((4, 4)))
+    vehicle = VehicleOnRoad(PLANE, KINDS, 0.0, stacked_tables([ICE]), own)
+    fill_surfaces_under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, vehicle, surfaces)
     return np.column_stack((surfaces.first, surfaces.second, surfaces.share))
 
 
@@ -57,12 +66,14 @@ def test_shares_of_successive_steps_add_up_to_the_way():
 
 
 def test_roads_that_cannot_be_are_told():
-    for wrong in ([], [Stretch(0, 0, 0), Stretch(0, 1, 1)], [Stretch(np.nan, 0, 0)]):
+    for wrong in ([], [RoadStretch(0, 0, 0), RoadStretch(0, 1, 1)], [RoadStretch(np.nan, 0, 0)]):
         with pytest.raises(InputError, match="rise strictly"):
-            road(wrong)
+            road_of_stretches(wrong)
     with pytest.raises(InputError, match="count from 0"):
-        road([Stretch(0, -1, 0)])
-    check_way(ROAD, 2.0)
+        road_of_stretches([RoadStretch(0, -1, 0)])
+    check_step_distance(ROAD, 2.0)
     with pytest.raises(InputError, match=r"stretches = 2.0: .*more substeps"):
-        check_way(ROAD, 2.1)
-    check_way(road([Stretch(0, 0, 0), Stretch(0.1, 1, 1)]), 50.0)  # the last and the first have no end
+        check_step_distance(ROAD, 2.1)
+    check_step_distance(
+        road_of_stretches([RoadStretch(0, 0, 0), RoadStretch(0.1, 1, 1)]), 50.0
+    )  # the last and the first have no end

@@ -143,6 +143,6 @@ def test_the_error_of_a_held_wheelset_is_that_against_four_times_the_cells():
 
 def test_an_error_beyond_all_measure_is_refused_with_the_cells_to_use(monkeypatch):
     """Planted: a theory whose coarser grid has nothing in common with the finer one."""
-    monkeypatch.setattr("models.contact.accuracy.LIKELY_SHARE", 50.0)
+    monkeypatch.setattr("models.contact.accuracy.LIKELY_ERROR_SHARE", 50.0)
     with pytest.raises(RunFailed, match=r"the cells are too few, this is no answer: .* use at least \d+ cells"):
         run(scene(method={"cells": 5}))

@@ -7,7 +7,7 @@ import pytest
 from numba import njit
 
 from models.brake.advance import FINE, FOLDED
-from models.brake.sprung_step import OVER, Units, status_at_end, to_units
+from models.brake.sprung_step import OVER, TrainUnits, fill_unit_values, status_at_end
 from models.machine.stack import start
 from models.multibody.forces import _axle_of_towed_wheel
 from models.multibody.tree import PER_LINK, TURNED
@@ -40,11 +40,11 @@ def test_an_axle_beside_a_towed_body_is_turned_by_its_heading_whatever_it_pitche
 
 def test_headings_of_units_are_the_sums_of_what_they_yaw_beside_one_another():
     whole, turns, plane = np.array([3.0, 4.0, 0.5, 7.0, 0.25, 9.0, -0.125]), np.array([4, 6]), np.zeros(5)
-    to_units(whole, turns, plane)
+    fill_unit_values(whole, turns, plane)
     assert plane.tolist() == [3.0, 4.0, 0.5, 0.75, 0.625]
 
 
 def test_a_train_ends_where_it_folds_or_leans_beyond_half_a_radian():
-    units = Units(np.array([3]), np.array([4, 5]), np.zeros((2, 4)))
+    units = TrainUnits(np.array([3]), np.array([4, 5]), np.zeros((2, 4)))
     for turn, lean, end in ((0.9, 0.4, FINE), (-1.1, 0.0, FOLDED), (math.nan, 0.0, FOLDED), (0.0, -0.6, OVER)):
         assert ending(np.array([0.0, 0.0, 2.0, turn, 0.0, lean]), units, 1.0) == end

@@ -164,7 +164,7 @@ def test_one_curve_for_both_directions_is_not_above_its_peak():
 
 @pytest.mark.grounds("closed form")
 def test_friction_falls_with_the_load_as_asked():
-    table = table_of_surface("dry", load=2e4, fall=0.1)
+    table = table_of_surface("dry", load=2e4, friction_loss=0.1)
     slips, angles = np.array([0.12]), np.array([0.1])
     x, y = (np.array([table.friction(angles, slips, load)[i][0, 0] for load in (5e3, 2e4, 3e4, 4e4)]) for i in (0, 1))
     assert x / x[1] == pytest.approx([1.075, 1.0, 0.95, 0.9], rel=1e-12)
@@ -175,7 +175,7 @@ def test_friction_falls_with_the_load_as_asked():
 
 @pytest.mark.grounds("closed form")
 def test_front_and_rear_differ():
-    assert table_of_named_tyre("dry", rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
+    assert table_of_named_tyre("dry", is_rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
     assert table_of_named_tyre("dry").mu_x.max() == pytest.approx(1.20, abs=1e-4) and table_of_named_tyre(
         "ice"
     ).h.max() == pytest.approx(0.162, abs=1e-4)
@@ -207,4 +207,4 @@ def test_a_surface_that_is_none_is_told():
     with pytest.raises(InputError, match="did you mean 'snow'"):
         table_of_surface("snw")
     with pytest.raises(InputError, match="fall = 1"):
-        table_of_surface("dry", fall=1.0)
+        table_of_surface("dry", friction_loss=1.0)

@@ -7,10 +7,10 @@ import pytest
 
 from models.contact.material import MaterialPair
 from models.contact.profile_files import read_profile
-from models.contact.profiles import ContactProfile, profile
-from models.contact.simplified_theory import press
-from models.contact.standard_profiles import built_in, s1002, s1002_height, uic60
-from models.contact.wheel_on_rail import Track, Wheelset, rail_in_track, wheel_on_rail
+from models.contact.profiles import ContactProfile, profile_of_points
+from models.contact.simplified_theory import solve_normal_contact
+from models.contact.standard_profiles import built_in_profile, s1002_height, s1002_profile, uic60_profile
+from models.contact.wheel_on_rail import TrackGeometry, WheelsetGeometry, rail_in_track, wheel_on_rail
 from models.core.errors import InputError
 from validation.cases.contact_profiles import (
     PROFILE_TOLERANCE,
@@ -45,7 +45,7 @@ def test_sections_of_the_wheel_meet():
 
 
 def test_head_of_the_rail():
-    rail = uic60()
+    rail = uic60_profile()
     assert rail.z.min() == pytest.approx(0.0, abs=1e-15)
     assert 2 * np.interp(0.01426, rail.z[rail.y > 0], rail.y[rail.y > 0]) == pytest.approx(0.072, abs=2e-5)  # its width
     top = np.abs(rail.y) < 5e-3
@@ -54,12 +54,12 @@ def test_head_of_the_rail():
 
 
 def test_inclination_moves_the_top_outwards():
-    leaning = uic60().turned(0.025)
+    leaning = uic60_profile().turned(0.025)
     assert leaning.y[np.argmin(leaning.z)] == pytest.approx(0.3 * math.sin(0.025), abs=1e-4)
 
 
 def test_gauge_is_where_it_is_measured():
-    rail = rail_in_track(uic60(), Track(inclination=0.05))
+    rail = rail_in_track(uic60_profile(), TrackGeometry(inclination=0.05))
     inner = rail.y < rail.y[np.argmin(rail.z)]
     face = np.interp(-0.014, -rail.z[inner], rail.y[inner])
     assert face == pytest.approx(0.7175, abs=1e-12)  # between points; at the point below it, 9 um would be missing
@@ -80,7 +80,9 @@ def coned_wheel(slope):
 @pytest.mark.grounds("closed form")
 def test_cone_on_a_round_head_touches_where_geometry_says():
     radius, slope = 0.04, 0.05
-    touch = wheel_on_rail(coned_wheel(slope), cone(radius), track=Track(inclination=0.0, gauge=1.5 - 2 * 0.0303975))[0]
+    touch = wheel_on_rail(
+        coned_wheel(slope), cone(radius), track=TrackGeometry(inclination=0.0, gauge=1.5 - 2 * 0.0303975)
+    )[0]
     assert touch.angle == pytest.approx(-math.atan(slope), abs=1e-4)
     assert touch.rail_y == pytest.approx(-radius * math.sin(math.atan(slope)), abs=1e-5)
     height = touch.patch.distance
@@ -92,22 +94,27 @@ def test_cone_on_a_round_head_touches_where_geometry_says():
 
 
 def test_mirror_image():
-    one = wheel_on_rail(s1002(), uic60(), lateral_shift=0.004, yaw=0.01)
-    other = wheel_on_rail(s1002(), uic60(), lateral_shift=0.004, yaw=-0.01)
+    one = wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=0.004, yaw=0.01)
+    other = wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=0.004, yaw=-0.01)
     assert other[0].rail_y == pytest.approx(one[0].rail_y, abs=2e-4)
     assert other[0].x == pytest.approx(-one[0].x, abs=1e-4)
 
 
 def test_yaw_moves_the_contact_along_the_flange():
     # A flange of slope tan(70 degrees) at 20 mrad leads by r tan(70) yaw = 25 mm: to the front for one hand of yaw.
-    straight, turned = (wheel_on_rail(s1002(), uic60(), lateral_shift=0.008, yaw=yaw)[0] for yaw in (0.0, 0.02))
+    straight, turned = (
+        wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=0.008, yaw=yaw)[0] for yaw in (0.0, 0.02)
+    )
     assert straight.x == pytest.approx(0.0, abs=1e-6)
     assert abs(turned.x) == pytest.approx(0.47 * math.tan(abs(turned.angle)) * 0.02, rel=0.05)
     assert turned.patch.low == pytest.approx(0.0, abs=2e-8)
 
 
 def test_contact_jumps_at_5_mm_and_the_flange_touches_from_6_5_mm():
-    places = {shift: wheel_on_rail(s1002(), uic60(), lateral_shift=1e-3 * shift) for shift in (4.5, 5.0, 6.0, 6.5)}
+    places = {
+        shift: wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=1e-3 * shift)
+        for shift in (4.5, 5.0, 6.0, 6.5)
+    }
     assert places[4.5][0].rail_y == pytest.approx(-22.6e-3, abs=1e-3)  # Manchester benchmark
     assert places[5.0][0].rail_y == pytest.approx(-33.4e-3, abs=1e-3)
     assert len(places[5.0]) == 2
@@ -115,8 +122,8 @@ def test_contact_jumps_at_5_mm_and_the_flange_touches_from_6_5_mm():
 
 
 def test_patches_share_the_vertical_load():
-    touches = wheel_on_rail(s1002(), uic60())
-    found = press([touch.patch for touch in touches], MaterialPair(), load=1e4)
+    touches = wheel_on_rail(s1002_profile(), uic60_profile())
+    found = solve_normal_contact([touch.patch for touch in touches], MaterialPair(), load=1e4)
     assert len(found.patches) == 2
     assert sum(part.load * math.cos(part.patch.lean) for part in found.patches) == pytest.approx(1e4, rel=1e-9)
 
@@ -124,8 +131,10 @@ def test_patches_share_the_vertical_load():
 @pytest.mark.parametrize("load", [9400.0, 1e4])
 def test_a_patch_that_only_just_touches_settles(load):
     """Beside one that carries hundreds of times as much, where one way of solving alone is caught in kinks."""
-    touches = wheel_on_rail(s1002(), uic60(), lateral_shift=4e-3, yaw=0.03, track=Track(inclination=0.0))
-    found = press([touch.patch for touch in touches], MaterialPair(), load=load)
+    touches = wheel_on_rail(
+        s1002_profile(), uic60_profile(), lateral_shift=4e-3, yaw=0.03, track=TrackGeometry(inclination=0.0)
+    )
+    found = solve_normal_contact([touch.patch for touch in touches], MaterialPair(), load=load)
     assert found.load == pytest.approx(load, rel=1e-9) and found.patches[0].load > 50 * sum(
         part.load for part in found.patches[1:]
     )
@@ -134,10 +143,10 @@ def test_a_patch_that_only_just_touches_settles(load):
 def test_smoothing_halves_its_wavelength():
     y = np.linspace(-0.03, 0.03, 1201)
     wave = 1e-5 * np.sin(2 * np.pi * y / 3e-3)
-    smooth = profile(y, wave, smoothing=3e-3)
+    smooth = profile_of_points(y, wave, smoothing=3e-3)
     inside = np.abs(smooth.y) < 0.02
     assert np.ptp(smooth.z[inside]) == pytest.approx(1e-5, rel=0.03)  # half of 2e-5
-    passed = profile(y, 1e-5 * np.sin(2 * np.pi * y / 12e-3), smoothing=3e-3)
+    passed = profile_of_points(y, 1e-5 * np.sin(2 * np.pi * y / 12e-3), smoothing=3e-3)
     assert np.ptp(passed.z[np.abs(passed.y) < 0.02]) == pytest.approx(2e-5 / (1 + 4.0**-4), rel=0.01)
 
 
@@ -160,7 +169,7 @@ spline.end
 
 
 def test_every_format_gives_the_same_profile(tmp_path):
-    rail = uic60()
+    rail = uic60_profile()
     (tmp_path / "rail.txt").write_text("\ufeff# y z\n" + columns(rail).replace(" ", " ; "))
     (tmp_path / "rail.prr").write_text(SIMPACK.format(mirror=0, inversion=0, factor=1000.0, points=columns(rail)))
     mirrored = "".join(f"{-y:.9f}\t{z:.9f} 1.0\n" for y, z in zip(rail.y[::4], rail.z[::4], strict=True))
@@ -174,7 +183,7 @@ def test_every_format_gives_the_same_profile(tmp_path):
 
 
 def test_a_wheel_is_laid_with_its_flange_down_and_inwards(tmp_path):
-    wheel = s1002()
+    wheel = s1002_profile()
     lines = "".join(f"{-1e3 * y:.6f} {-1e3 * z:.6f}\n" for y, z in zip(wheel.y[::10], wheel.z[::10], strict=True))
     (tmp_path / "wheel.txt").write_text(lines)
     found = read_profile(tmp_path / "wheel.txt", "wheel")
@@ -190,19 +199,23 @@ BAD_FILES = {
     "word": ("rail.txt", "1.0 2.0\n3.0 four\n", r"rail.txt: line 2 = '3.0 four': must hold 2 or more finite numbers"),
     "one column": ("rail.txt", "1.0\n", "line 1 = '1.0'"),
     "not finite": ("rail.txt", "1.0 nan\n", "line 1"),
-    "decimal commas": ("rail.txt", columns(uic60()).replace(".", ","), "line 1 = '.*,.*': has decimal commas"),
+    "decimal commas": ("rail.txt", columns(uic60_profile()).replace(".", ","), "line 1 = '.*,.*': has decimal commas"),
     "three columns": ("rail.txt", "1 0.5 0.1\n", "line 1 = '1 0.5 0.1': must hold y and z, found 3"),
     "columns exchanged": (
         "rail.txt",
-        "".join(f"{1e3 * z:.4f} {1e3 * y:.4f}\n" for y, z in zip(uic60().y, uic60().z, strict=True)),
+        "".join(f"{1e3 * z:.4f} {1e3 * y:.4f}\n" for y, z in zip(uic60_profile().y, uic60_profile().z, strict=True)),
         "against it: points must follow the contour, y before z",
     ),
     "empty": ("rail.txt", "# nothing\n", "0: points found; a profile needs ten"),
     "no points": ("rail.prr", "header.begin\nheader.end\n", "no points between point.begin"),
-    "unit": ("rail.prr", SIMPACK.format(mirror=0, inversion=0, factor=0.0, points=columns(uic60())), "must be above 0"),
+    "unit": (
+        "rail.prr",
+        SIMPACK.format(mirror=0, inversion=0, factor=0.0, points=columns(uic60_profile())),
+        "must be above 0",
+    ),
     "metres": (
         "rail.txt",
-        "".join(f"{y:.6f} {z:.6f}\n" for y, z in zip(uic60().y, uic60().z, strict=True)),
+        "".join(f"{y:.6f} {z:.6f}\n" for y, z in zip(uic60_profile().y, uic60_profile().z, strict=True)),
         "the unit right",
     ),
     "header": ("rail.ban", "MiniProf file\n\n", "line 1 = 'MiniProf file': must be key=value"),
@@ -225,13 +238,18 @@ def test_a_missing_file_is_told_with_the_nearest(tmp_path):
 
 
 BAD_PLACES = {
-    "name": (lambda: built_in("S102"), "did you mean 'S1002'"),
-    "shift": (lambda: wheel_on_rail(s1002(), uic60(), lateral_shift=5.0), "-0.03 to 0.03"),
-    "yaw": (lambda: wheel_on_rail(s1002(), uic60(), yaw=math.nan), "a yaw angle in rad"),
-    "gauge": (lambda: wheel_on_rail(s1002(), uic60(), track=Track(gauge=1.0)), "lateral_shift"),
-    "wheelset": (lambda: wheel_on_rail(s1002(), uic60(), wheelset=Wheelset(back_to_back=1.0)), "lateral_shift"),
+    "name": (lambda: built_in_profile("S102"), "did you mean 'S1002'"),
+    "shift": (lambda: wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=5.0), "-0.03 to 0.03"),
+    "yaw": (lambda: wheel_on_rail(s1002_profile(), uic60_profile(), yaw=math.nan), "a yaw angle in rad"),
+    "gauge": (lambda: wheel_on_rail(s1002_profile(), uic60_profile(), track=TrackGeometry(gauge=1.0)), "lateral_shift"),
+    "wheelset": (
+        lambda: wheel_on_rail(s1002_profile(), uic60_profile(), wheelset=WheelsetGeometry(back_to_back=1.0)),
+        "lateral_shift",
+    ),
     "shallow rail": (
-        lambda: rail_in_track(ContactProfile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
+        lambda: rail_in_track(
+            ContactProfile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), TrackGeometry()
+        ),
         "the gauge is measured at 0.014 m",
     ),
 }

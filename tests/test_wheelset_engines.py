@@ -113,7 +113,7 @@ def test_limit_cycle(engine):
     expected = attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=11))
     slower = solved_orbit(replace(expected, equations=Equations(CHOSEN_WHEELSET, 74.5, cells=11)), "amplitude")
     guess = replace(slower, equations=engine(CHOSEN_WHEELSET, 75.0, cells=11))
-    found = refined_orbit(solved_orbit(guess, "amplitude", precise=False), "amplitude")
+    found = refined_orbit(solved_orbit(guess, "amplitude", is_precise=False), "amplitude")
     half = refined_orbit(expected, "amplitude")
     assert found.amplitude - slower.amplitude > 1e-5
     assert abs(found.amplitude - half.amplitude) <= half.error < 1e-2 * half.amplitude

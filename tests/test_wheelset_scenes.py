@@ -154,7 +154,7 @@ def test_a_branch_stands_upright_until_flanges_touch():
 
 
 def test_orbits_that_are_none():
-    assert attained_cycle(Equations(CHOSEN_WHEELSET, 40.0, cells=7), start_displacement=1e-3) is None
+    assert attained_cycle(Equations(CHOSEN_WHEELSET, 40.0, cells=7), initial_displacement=1e-3) is None
     orbit = attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=7))
     with pytest.raises(RunFailed, match="no periodic motion"):
         solved_orbit(replace(orbit, equations=Equations(CHOSEN_WHEELSET, 20.0, cells=7)), "amplitude")

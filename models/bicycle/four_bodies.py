@@ -39,13 +39,13 @@ class Ride:
         return float(np.abs(self.energy - self.work - self.energy[0]).max() / abs(self.energy[0]))
 
 
-def four_bodies(b: Whipple) -> SpatialVehicle:
+def four_bodies(bicycle: Whipple) -> SpatialVehicle:
     """The bicycle's bodies in tree order, as a vehicle description in the design position with the steering axis
     upright.
     """
-    sine, cosine = math.sin(b.tilt), math.cos(b.tilt)
+    sine, cosine = math.sin(bicycle.tilt), math.cos(bicycle.tilt)
     rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-    origin = np.array([0.0, 0.0, b.rear_wheel.radius])
+    origin = np.array([0.0, 0.0, bicycle.rear_wheel.radius])
 
     def place(x: float, z: float) -> tuple[float, float, float]:
         x, y, z = (origin + rotation @ (np.array([x, 0.0, z]) - origin)).tolist()
@@ -55,9 +55,9 @@ def four_bodies(b: Whipple) -> SpatialVehicle:
         flip = np.diag([1.0, -1.0, -1.0])
         return tuple(map(tuple, (rotation @ flip @ inertia @ flip @ rotation.T).tolist()))
 
-    R, B, H, F = b.rear_wheel, b.body, b.front_frame, b.front_wheel
+    R, B, H, F = bicycle.rear_wheel, bicycle.body, bicycle.front_frame, bicycle.front_wheel
     rear, front = (np.diag([wheel.Ixx, wheel.Iyy, wheel.Ixx]) for wheel in (R, F))
-    hub, pivot = place(0.0, R.radius), place(b.wheelbase + b.trail, 0.0)
+    hub, pivot = place(0.0, R.radius), place(bicycle.wheelbase + bicycle.trail, 0.0)
     bodies = (
         Body("carrier", 0.0, (0.0, 0.0, 0.0), ("x", "y", "rz")),
         Body("frame", 0.0, hub, ("z", "rx", "ry"), parent="carrier"),
@@ -65,17 +65,17 @@ def four_bodies(b: Whipple) -> SpatialVehicle:
         Body("rear wheel", R.mass, hub, ("ry",), tensor(rear), "body"),  # type: ignore[arg-type]
         Body("steering", 0.0, pivot, ("rz",), parent="body"),
         Body("front frame", H.mass, place(H.x, -H.z), (), tensor(H.inertia), "steering"),  # type: ignore[arg-type]
-        Body("front wheel", F.mass, place(b.wheelbase, F.radius), ("ry",), tensor(front), "front frame"),  # type: ignore[arg-type]
+        Body("front wheel", F.mass, place(bicycle.wheelbase, F.radius), ("ry",), tensor(front), "front frame"),  # type: ignore[arg-type]
     )
-    return SpatialVehicle("bicycle", bodies, (), (), (), gravity=b.gravity)
+    return SpatialVehicle("bicycle", bodies, (), (), (), gravity=bicycle.gravity)
 
 
-def straight_rolling(b: Whipple, speed: float, lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def straight_rolling(bicycle: Whipple, speed: float, lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions and rates (9,) of straight upright rolling at a speed (m/s), with a lean rate (rad/s) about the line
     through both contact points.
     """
     q, v = np.zeros(COUNT), np.zeros(COUNT)
-    q[PITCH] = -b.tilt
-    v[X], v[REAR], v[FRONT] = speed, speed / b.rear_wheel.radius, speed / b.front_wheel.radius
-    v[LEAN], v[Y] = lean_rate, -lean_rate * b.rear_wheel.radius
+    q[PITCH] = -bicycle.tilt
+    v[X], v[REAR], v[FRONT] = speed, speed / bicycle.rear_wheel.radius, speed / bicycle.front_wheel.radius
+    v[LEAN], v[Y] = lean_rate, -lean_rate * bicycle.rear_wheel.radius
     return q, v

@@ -43,49 +43,56 @@ class IdealBicycle:
         wheels = {"rear wheel": bicycle.rear_wheel.radius, "front wheel": bicycle.front_wheel.radius}
         self._wheels = [(self.bodies.row[name], radius) for name, radius in wheels.items()]
 
-    def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def contacts(self, bicycle_motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Kinematics of both wheel contacts: their heights (2,) in m, the Jacobian (6, 9) of the velocities of the
         material points there, and the part (6,) of these points' accelerations without dv/dt.
         """
-        contact_rows = [_wheel_contact(motion.matrices[row], radius) for row, radius in self._wheels]
+        contact_rows = [_wheel_contact(bicycle_motion.matrices[row], radius) for row, radius in self._wheels]
         heights, jacobians, rates = zip(*contact_rows, strict=True)
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
 
-    def rolling(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def rolling(self, positions: np.ndarray, free_rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix N (9, 3) of rolling, with v = N u and the free rates u of FREE_RATES, and all rates v (9,)."""
-        contact = self.contacts(self.bodies.move(q, np.zeros(COUNT)))[1]
+        contact = self.contacts(self.bodies.move(positions, np.zeros(COUNT)))[1]
         N = np.zeros((COUNT, 3))
         N[FREE_RATES] = np.eye(3)
         N[DEPENDENT_RATES] = -np.linalg.solve(contact[:, DEPENDENT_RATES], contact[:, FREE_RATES])
-        return N, N @ u
+        return N, N @ free_rates
 
-    def rates(self, time: float, state: np.ndarray) -> np.ndarray:
+    def rates(self, time: float, rolling_state: np.ndarray) -> np.ndarray:
         """Time derivatives (12,) of the bicycle's state, which holds positions (9,) and free rates (3,)."""
-        q, (N, v) = state[:COUNT], self.rolling(state[:COUNT], state[COUNT:])
+        q, (N, v) = rolling_state[:COUNT], self.rolling(rolling_state[:COUNT], rolling_state[COUNT:])
         motion, bias = self.bodies.move(q, v), np.zeros(COUNT)
         _, contact, without = self.contacts(motion)
         bias[DEPENDENT_RATES] = -np.linalg.solve(contact[:, DEPENDENT_RATES], without)
         mass, force = self.bodies.inertia(motion, self.gravity)
         return np.concatenate([v, np.linalg.solve(N.T @ mass @ N, N.T @ (force + self.applied(v) - mass @ bias))])
 
-    def applied(self, v: np.ndarray) -> np.ndarray:
+    def applied(self, all_rates: np.ndarray) -> np.ndarray:
         """Generalised forces (9,) of control and steering friction; the control depends on the speed of the rear
         wheel.
         """
         force, control = np.zeros(COUNT), self.control
-        speed = v[REAR] * self.bicycle.rear_wheel.radius
-        force[STEER] = -control.lean_rate_gain(speed) * v[LEAN] - control.friction * v[STEER]
-        force[STEER] -= control.dry_friction * np.tanh(v[STEER] / control.dry_rate)
+        speed = all_rates[REAR] * self.bicycle.rear_wheel.radius
+        force[STEER] = -control.lean_rate_gain(speed) * all_rates[LEAN] - control.friction * all_rates[STEER]
+        force[STEER] -= control.dry_friction * np.tanh(all_rates[STEER] / control.dry_rate)
         return force
 
-    def upright(self, speed: float, lean_rate: float = 0.0, lean: float = 0.0, steer: float = 0.0) -> np.ndarray:
+    def upright(
+        self, speed: float, lean_rate: float = 0.0, lean_angle: float = 0.0, steer_angle: float = 0.0
+    ) -> np.ndarray:
         """Start state (12,) with the wheels on the ground, at a speed (m/s) of the rear wheel, with a lean rate
         (rad/s).
 
         lean, steer in rad; height and pitch follow from the contacts.
         """
         q, radius = np.zeros(COUNT), self.bicycle.rear_wheel.radius
-        q[LEAN], q[STEER], q[PITCH], q[HEIGHT] = lean, steer, -self.bicycle.tilt, radius * (np.cos(lean) - 1.0)
+        q[LEAN], q[STEER], q[PITCH], q[HEIGHT] = (
+            lean_angle,
+            steer_angle,
+            -self.bicycle.tilt,
+            radius * (np.cos(lean_angle) - 1.0),
+        )
         for _ in range(20):
             heights, jacobian, _ = self.contacts(self.bodies.move(q, np.zeros(COUNT)))
             if np.abs(heights).max() < 1e-15:
@@ -102,18 +109,18 @@ class IdealBicycle:
         levels = motion.matrices[1:, PLACE, 2, 3]
         return float(0.5 * v @ mass @ v + self.bicycle.gravity * self._masses @ levels)
 
-    def run(self, state: np.ndarray, duration: float, rows: int = 501, tolerance: float = 1e-9) -> Ride:
+    def run(self, start_state: np.ndarray, duration: float, row_count: int = 501, tolerance: float = 1e-9) -> Ride:
         """Integrate the motion from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the
         ground.
         """
 
-        def lies(time: float, state: np.ndarray) -> float:
-            return FALLEN_LEAN - abs(state[LEAN])
+        def lies(time: float, rolling_state: np.ndarray) -> float:
+            return FALLEN_LEAN - abs(rolling_state[LEAN])
 
         lies.terminal = True  # type: ignore[attr-defined]
-        times = np.linspace(0.0, duration, rows)
+        times = np.linspace(0.0, duration, row_count)
         solution = solve_ivp(
-            self.rates, (0.0, duration), state, "DOP853", times, events=lies, rtol=tolerance, atol=tolerance
+            self.rates, (0.0, duration), start_state, "DOP853", times, events=lies, rtol=tolerance, atol=tolerance
         )
         if solution.status != 0:
             why = "the bicycle has fallen over" if solution.status == 1 else solution.message
@@ -125,18 +132,18 @@ class IdealBicycle:
         return Ride(times, q, v, energy, work, solution.nfev)
 
 
-def _wheel_contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
+def _wheel_contact(wheel_matrices: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
     """Height (m) of a wheel's material point at the ground, Jacobian (3, 9) of its velocity, and its acceleration (3,)
     without dv/dt.
 
-    wheel (12, 3, 4) : its matrices. The point s that touches, in the wheel's axes, runs on by s' while it rolls, and
+    wheel_matrices (12, 3, 4) : its matrices. The point s that touches, in the wheel's axes, runs on by s' while it rolls, and
     the rate of its velocity R' s + c' is R'' s + c'' + R' s'.
     """
-    axes, moving = wheel[PLACE, :, :3], wheel[RATE, :, :3]
+    axes, moving = wheel_matrices[PLACE, :, :3], wheel_matrices[RATE, :, :3]
     axle, turning = axes[:, 1], moving[:, 1]
     flat = np.sqrt(1.0 - axle[2] ** 2)
     downward = (axle * axle[2] - UPWARD) / flat
     lowering = (turning * axle[2] + axle * turning[2] + downward * axle[2] * turning[2] / flat) / flat
     point, running = radius * axes.T @ downward, radius * (moving.T @ downward + axes.T @ lowering)
-    point_terms = wheel @ np.append(point, 1.0)
+    point_terms = wheel_matrices @ np.append(point, 1.0)
     return point_terms[PLACE, 2], point_terms[FIRST_DERIVATIVE:].T, point_terms[BIAS] + moving @ running

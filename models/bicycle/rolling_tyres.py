@@ -166,32 +166,47 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
 
 
 @lean
-def _tyre_load(tyre, vehicle, wheel):
+def _tyre_load(tyre_parameters, vehicle, wheel_contact):
     """Apply the load of a tyre at the wheel's lowest point, and fill the ``WheelContact`` for the tyre's creep
     forces.
     """
-    patch, slip, way, report, ledger = wheel.patch, wheel.slip, wheel.way, wheel.report, vehicle.ledger
-    spot = row(vehicle.tree.spots, tree.PER_SPOT, int(tyre[forces.POINT]))
+    patch, slip, way, report, ledger = (
+        wheel_contact.patch,
+        wheel_contact.slip,
+        wheel_contact.way,
+        wheel_contact.report,
+        vehicle.ledger,
+    )
+    spot = row(vehicle.tree.spots, tree.PER_SPOT, int(tyre_parameters[forces.POINT]))
     link, spin = (
-        row(vehicle.tree.links, tree.PER_LINK, int(tyre[forces.KNUCKLE])),
-        vehicle.rates[int(tyre[forces.ROTOR])],
+        row(vehicle.tree.links, tree.PER_LINK, int(tyre_parameters[forces.KNUCKLE])),
+        vehicle.rates[int(tyre_parameters[forces.ROTOR])],
     )
     axle, centre = three(link, tree.TURNED + 3), three(spot, tree.WHERE)
     flat = math.sqrt(1.0 - axle[2] * axle[2])
-    arm = times(plus(times(axle, axle[2]), (0.0, 0.0, -1.0)), tyre[forces.RADIUS] / flat)
+    arm = times(plus(times(axle, axle[2]), (0.0, 0.0, -1.0)), tyre_parameters[forces.RADIUS] / flat)
     along = times((axle[1], -axle[0], 0.0), 1.0 / flat)
     across = (-along[1], along[0], 0.0)
     turning = plus(plus(three(link, tree.TURNING), (0.0, 0.0, vehicle.frame.yaw_rate)), times(axle, spin))
     sliding = plus(plus(three(spot, tree.RATE), carried_velocity(vehicle.frame, centre)), cross(turning, arm))
-    elastic = max(tyre[forces.STATIC] + tyre[forces.VERTICAL] * (tyre[forces.RADIUS] * flat - centre[2]), 0.0)
-    load = max(elastic - tyre[forces.VISCOUS] * sliding[2], 0.0) if elastic > 0.0 else 0.0
-    ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[forces.VERTICAL]
+    elastic = max(
+        tyre_parameters[forces.STATIC]
+        + tyre_parameters[forces.VERTICAL] * (tyre_parameters[forces.RADIUS] * flat - centre[2]),
+        0.0,
+    )
+    load = max(elastic - tyre_parameters[forces.VISCOUS] * sliding[2], 0.0) if elastic > 0.0 else 0.0
+    ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre_parameters[forces.VERTICAL]
     ledger[DISSIPATED] += (load - elastic) * sliding[2]
     slip[0], slip[1], slip[2] = dot(sliding, along), dot(sliding, across), turning[2]
     slip[3] = -spin * dot(cross(axle, arm), along)
-    patch[A], patch[B] = math.sqrt(tyre[forces.RADIUS] * load / tyre[forces.VERTICAL]), tyre[forces.HALF_WIDTH]
-    patch[LOAD], patch[MU] = load, tyre[forces.GRIP]
-    patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = 1.0 / tyre[forces.BRISTLES]
+    patch[A], patch[B] = (
+        math.sqrt(tyre_parameters[forces.RADIUS] * load / tyre_parameters[forces.VERTICAL]),
+        tyre_parameters[forces.HALF_WIDTH],
+    )
+    patch[LOAD], patch[MU] = load, tyre_parameters[forces.GRIP]
+    patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = (
+        1.0 / tyre_parameters[forces.BRISTLES]
+    )
     report[PRESS] = load
     report[forces.SLIP_X], report[forces.SLIP_Y], report[forces.TURN] = slip[0], slip[1], slip[2]
     put(way, forces.CENTRE, centre)
@@ -265,13 +280,13 @@ def bicycle_forces(table_of_numbers, t, q, v, forces_on_coordinates):
 
 
 @lean
-def set_bicycle_forces(block, t, n):
+def set_bicycle_forces(memory_block, t, coordinate_count):
     """Set the generalised forces f of ``bicycle_forces``. All data are in one block of doubles at an address: f, q and
     v (n,), then the table.
     """
-    f = at(block)
-    array(f, (n,))[:] = 0.0
-    bicycle_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
+    f = at(memory_block)
+    array(f, (coordinate_count,))[:] = 0.0
+    bicycle_forces(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
 
 
 @lean

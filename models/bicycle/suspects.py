@@ -44,12 +44,12 @@ def ranked_suspects(
     bicycle: Whipple,
     base_control: Control,
     observations: Sequence[Observation],
-    suspects: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
+    parameter_names: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
 ) -> SubsetChoice:
     """Fits of every subset of the suspected control parameters, ranked; InputError for fewer than two speeds, or an
     unknown name.
     """
-    for name in suspects:
+    for name in parameter_names:
         if name not in SUSPECTED_PARAMETERS:
             raise InputError("", "suspects", name, "no such suspect", tuple(SUSPECTED_PARAMETERS))
     if len(observations) < 2:
@@ -57,33 +57,33 @@ def ranked_suspects(
     sensor = _sensor_error(observations)
     weights = [_whitening_matrix(observation, sensor) for observation in observations]
 
-    def left(values: dict[str, float]) -> np.ndarray:
-        control = base_control.model_copy(update=values)
+    def left(parameter_values: dict[str, float]) -> np.ndarray:
+        control = base_control.model_copy(update=parameter_values)
         return np.concatenate(
             [w @ (o.mean - predicted_weave(bicycle, control, o)) for w, o in zip(weights, observations, strict=True)]
         )
 
-    return chosen_of(left, {name: SUSPECTED_PARAMETERS[name] for name in suspects}, FRICTION_SETS)
+    return chosen_of(left, {name: SUSPECTED_PARAMETERS[name] for name in parameter_names}, FRICTION_SETS)
 
 
 def averaged_weave(
-    bicycle: Whipple, base_control: Control, choice: SubsetChoice, observation: Observation
+    bicycle: Whipple, base_control: Control, subset_choice: SubsetChoice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Real and imaginary part (2,) of the weave eigenvalue (1/s), averaged over all subsets of parameters with their
     weights, and their standard deviations (2,).
     """
-    return choice.forecast(
+    return subset_choice.forecast(
         lambda values: predicted_weave(bicycle, base_control.model_copy(update=values), observation)[:2]
     )
 
 
 def forecast_deviations(
-    bicycle: Whipple, base_control: Control, choice: SubsetChoice, observation: Observation
+    bicycle: Whipple, base_control: Control, subset_choice: SubsetChoice, observation: Observation
 ) -> np.ndarray:
     """Forecast less measured real and imaginary part of the weave (2,), divided by the standard deviation of
     measurement and forecast together.
     """
-    mean, deviation = averaged_weave(bicycle, base_control, choice, observation)
+    mean, deviation = averaged_weave(bicycle, base_control, subset_choice, observation)
     return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 
@@ -98,11 +98,11 @@ def _sensor_error(observations: Sequence[Observation]) -> float:
     return float(np.sqrt(np.sum(left**2) / (len(observations) - 2)))
 
 
-def _whitening_matrix(observation: Observation, sensor: float) -> np.ndarray:
+def _whitening_matrix(observation: Observation, sensor_error: float) -> np.ndarray:
     """Matrix (3, 3) that maps deviations from the prediction to independent standard normal ones; the error of the
     speed sensor counts as independent.
     """
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = np.cov(observation.parts[:, :2].T)
-    covariance[2, 2] = observation.deviation[2] ** 2 / len(observation.weave) + sensor**2
+    covariance[2, 2] = observation.deviation[2] ** 2 / len(observation.weave) + sensor_error**2
     return np.linalg.inv(np.linalg.cholesky(covariance))

@@ -56,11 +56,11 @@ class Observation:
         return self.parts.std(axis=0, ddof=1)
 
 
-def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> complex:
+def decaying_sinusoid(rate_samples: np.ndarray, sampling_rate: float = SAMPLING_RATE) -> complex:
     """Eigenvalue s + i w (1/s) of the function e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least
     squares; w is not negative.
     """
-    times = np.arange(len(values)) / rate
+    times = np.arange(len(rate_samples)) / sampling_rate
 
     def left(decay_and_frequency: np.ndarray) -> np.ndarray:
         swing = np.exp(decay_and_frequency[0] * times)
@@ -71,7 +71,7 @@ def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> comple
                 np.ones_like(times),
             ]
         )
-        return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0])
+        return np.asarray(rate_samples - basis @ np.linalg.lstsq(basis, rate_samples, rcond=None)[0])
 
     best = min(
         (least_squares(left, start, x_scale=(1.0, 3.0)) for start in FIT_STARTS), key=lambda fit: float(fit.cost)
@@ -79,56 +79,62 @@ def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> comple
     return complex(best.x[0], abs(best.x[1]))
 
 
-def observations(folder: str | Path) -> list[Observation]:
+def observations(data_folder: str | Path) -> list[Observation]:
     """Observations of the weave from a folder, by ascending speed; InputError with file, position and value where it
     cannot be read.
     """
-    folder, rows = Path(folder), _rows_of_windows(Path(folder) / "windows.csv")
-    recordings = {label: _columns_of_recording(folder, label) for label in {row[0] for row in rows}}
+    data_folder, rows = Path(data_folder), _rows_of_windows(Path(data_folder) / "windows.csv")
+    recordings = {label: _columns_of_recording(data_folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
     for line, (label, speed, first_sample, last_sample) in enumerate(rows, 2):
         recording = recordings[label]
         if last_sample >= len(recording["speed"]):
             allowed = f"the recording has {len(recording['speed'])} samples"
-            raise InputError(folder / "windows.csv", f"line {line}, last sample", last_sample, allowed)
+            raise InputError(data_folder / "windows.csv", f"line {line}, last sample", last_sample, allowed)
         lean, steer, sensor = (recording[name][first_sample : last_sample + 1] for name in COLUMN_HEADINGS)
         if not np.isfinite([lean, steer, sensor]).all() or not np.any(steer) or np.ptp(lean) == 0.0:
-            raise InputError(folder / "windows.csv", f"line {line}", first_sample, "gaps, or no motion, in this window")
+            raise InputError(
+                data_folder / "windows.csv", f"line {line}", first_sample, "gaps, or no motion, in this window"
+            )
         slowness = np.abs(steer).mean() / np.mean(steer**2)
         by_speed.setdefault(speed, []).append((decaying_sinusoid(lean), float(sensor.mean()), float(slowness)))
     for speed, of_speed in by_speed.items():
         if len(of_speed) < 3:
             allowed = f"has {len(of_speed)} window(s); a scatter needs 3 or more"
-            raise InputError(folder / "windows.csv", "speed [m/s]", speed, allowed)
+            raise InputError(data_folder / "windows.csv", "speed [m/s]", speed, allowed)
     return [Observation(speed, *map(np.array, zip(*by_speed[speed], strict=True))) for speed in sorted(by_speed)]
 
 
-def _rows_of_windows(path: Path) -> list[tuple[str, float, int, int]]:
+def _rows_of_windows(windows_path: Path) -> list[tuple[str, float, int, int]]:
     """Rows of the file windows.csv: label of the recording, speed (m/s), first and last sample."""
-    if not path.is_file():
-        raise InputError(path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
+    if not windows_path.is_file():
+        raise InputError(windows_path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
     rows = []
-    for line, text in enumerate(path.read_text().splitlines()[1:], 2):
+    for line, text in enumerate(windows_path.read_text().splitlines()[1:], 2):
         cells = [cell.strip() for cell in text.split(",")]
         try:
             row = cells[0], float(cells[1]), int(cells[2]), int(cells[3])
         except (ValueError, IndexError):
-            raise InputError(path, f"line {line}", text, "must be: file, speed (m/s), first and last sample") from None
+            raise InputError(
+                windows_path, f"line {line}", text, "must be: file, speed (m/s), first and last sample"
+            ) from None
         if not 0.0 < row[1] < np.inf or not 0 <= row[2] <= row[3] - SHORTEST_WINDOW:
             allowed = f"needs a speed above 0 and at least {SHORTEST_WINDOW} samples from first to last"
-            raise InputError(path, f"line {line}", text, allowed)
+            raise InputError(windows_path, f"line {line}", text, allowed)
         rows.append(row)
     if not rows:
-        raise InputError(path, "", None, "lists no window")
+        raise InputError(windows_path, "", None, "lists no window")
     return rows
 
 
-def _columns_of_recording(folder: Path, label: str) -> dict[str, np.ndarray]:
+def _columns_of_recording(data_folder: Path, recording_label: str) -> dict[str, np.ndarray]:
     """Columns lean rate, fork rate (rad/s) and speed (m/s) of the recording with a given label."""
-    paths = sorted(path for path in folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{label}kph"))
+    paths = sorted(
+        path for path in data_folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{recording_label}kph")
+    )
     if len(paths) != 1:
-        allowed = f"{len(paths)} recordings end in _{label}kph.csv or .csv.gz, one is needed"
-        raise InputError(folder / "windows.csv", "file [km/h]", label, allowed)
+        allowed = f"{len(paths)} recordings end in _{recording_label}kph.csv or .csv.gz, one is needed"
+        raise InputError(data_folder / "windows.csv", "file [km/h]", recording_label, allowed)
     table = np.genfromtxt(paths[0], delimiter=",", names=True, invalid_raise=False)
     names: Iterable[str] = table.dtype.names or ()
     for name in COLUMN_HEADINGS:

@@ -101,13 +101,13 @@ class Control(Strict):
         missing = max(self.until - self.speed_gain * abs(speed) - self.speed_bias, 0.0)
         return self.torque_gain * self.gain * missing
 
-    def viscous(self, slowness: float) -> "Control":
+    def viscous(self, inverse_steer_rate: float) -> "Control":
         """The same control with viscous in place of dry friction, which does the same work in a given motion of the
         steering.
 
-        slowness : ratio (s/rad) of the mean of |steer rate| to the mean of its square.
+        inverse_steer_rate : ratio (s/rad) of the mean of |steer rate| to the mean of its square.
         """
-        added = self.friction + slowness * self.dry_friction
+        added = self.friction + inverse_steer_rate * self.dry_friction
         return self.model_copy(update={"friction": added, "dry_friction": 0.0})
 
 
@@ -205,11 +205,11 @@ class Whipple(Strict):
         """Coefficients of 1, s, ..., s^4 in det(M s^2 + v C1 s + g K0 + v^2 K2), each a polynomial of the speed v."""
         M, C1, K0, K2 = self.linear
 
-        def entry(i: int, j: int) -> list[Polynomial]:
+        def entry(row: int, column: int) -> list[Polynomial]:
             return [
-                Polynomial([self.gravity * K0[i, j], 0.0, K2[i, j]]),
-                Polynomial([0, C1[i, j]]),
-                Polynomial(M[i, j]),
+                Polynomial([self.gravity * K0[row, column], 0.0, K2[row, column]]),
+                Polynomial([0, C1[row, column]]),
+                Polynomial(M[row, column]),
             ]
 
         diagonal_product, other_product = (
@@ -257,16 +257,22 @@ def _positive_roots(condition: Polynomial) -> list[float]:
     return sorted(float(np.sqrt(square)) for square in real if square > 0.0)
 
 
-def load_bicycle(name: str, folder: str | Path = ".", file: str = "", key_path: str = "bicycle") -> Whipple:
-    """The bicycle's parameter set with this name, or in a TOML file with all parameters; ``file`` and ``key_path`` name
+def load_bicycle(
+    bicycle_name: str, scene_folder: str | Path = ".", scene_path: str = "", key_path: str = "bicycle"
+) -> Whipple:
+    """The bicycle's parameter set with this name, or in a TOML file with all parameters; ``scene_path`` and ``key_path`` name
     the scene in error messages.
     """
     sets = {path.stem: path for path in sorted(PARAMETER_SET_FOLDER.glob("*.toml"))}
-    if name not in sets and not name.endswith(".toml"):
+    if bicycle_name not in sets and not bicycle_name.endswith(".toml"):
         raise InputError(
-            file, key_path, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets)
+            scene_path,
+            key_path,
+            bicycle_name,
+            "must be a TOML file with all parameters, or a parameter set",
+            tuple(sets),
         )
-    path = sets.get(name) or existing_file(name, Path(folder), file, key_path)
+    path = sets.get(bicycle_name) or existing_file(bicycle_name, Path(scene_folder), scene_path, key_path)
     bicycle = read(Whipple, parse(path), path.name)
     try:
         bicycle.linear  # noqa: B018

@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from models.brake.plane_chain import ChainPoint, Direction, fill_velocity_rows
-from models.brake.plane_records import PlaneMotion, Report, report_of
-from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import Plane
-from models.brake.surfaces import is_uniform, surfaces_of, under_wheels
+from models.brake.plane_records import PlaneMotion, WheelReport, report_of
+from models.brake.plane_step import advance_one_step
+from models.brake.plane_vehicle import PlaneVehicle
+from models.brake.surfaces import fill_surfaces_under_wheels, is_uniform, surfaces_of_rows
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 
@@ -17,20 +17,20 @@ FINE, AT_REST, NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED = range(6)
 without load; a hinge of the train beyond its limit.
 """
 
-MOST_PARTS = 64
+STEP_PART_LIMIT = 64
 """Largest number of parts into which a step is cut where the vehicle is so slow that its side forces respond faster
 than the step.
 """
 
 
 @inlined
-def end_status(motion, plane):
+def end_status(vehicle_motion, plane_vehicle):
     """FINE, or the way in which a step ends the run: an axle or a side of a two-axle unit without load, or a hinge
     beyond its limit angle.
 
     One lifted wheel does not end the run. It ends when both wheels of a side, or of an axle, lift.
     """
-    status, load, headings = FINE, report_of(motion.report).load, motion.state[0, 2:]
+    status, load, headings = FINE, report_of(vehicle_motion.report).load, vehicle_motion.state[0, 2:]
     for first in range(0, load.size - 3, 4):
         a, b = load[first] > 0.0, load[first + 1] > 0.0
         c, d = load[first + 2] > 0.0, load[first + 3] > 0.0
@@ -38,37 +38,44 @@ def end_status(motion, plane):
             status = PITCHED_OVER
         elif not (a or c) or not (b or d):
             status = ROLLED_OVER
-    for k in range(1, plane.masses.size):
-        if abs(headings[k] - headings[k - 1]) > plane.jackknife_angle:
+    for k in range(1, plane_vehicle.masses.size):
+        if abs(headings[k] - headings[k - 1]) > plane_vehicle.jackknife_angle:
             status = FOLDED
     return status
 
 
 @inlined
-def parts_of(state, regularising_speed):
+def count_of_step_parts(vehicle_state, regularising_speed):
     """Number of equal parts into which to cut a step, so that the part's ``regularising_speed`` (m/s) is at most the
     vehicle's speed.
 
     Slip angles are too small below ``regularising_speed``: the vehicle would slip sideways, and yaw on split friction,
     too far.
     """
-    speed = math.hypot(state[1, 0], state[1, 1])
-    return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), MOST_PARTS))
+    speed = math.hypot(vehicle_state[1, 0], vehicle_state[1, 1])
+    return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), STEP_PART_LIMIT))
 
 
 @inlined
-def in_parts(part_count, motion, torques, step, steer, vehicle, surfaces):
+def advance_in_parts(part_count, vehicle_motion, brake_torques, time_step, steer_angles, vehicle, surfaces):
     """Advance the vehicle by a step in ``part_count`` equal parts; returns the time (s) that passed, or -1 where wheel
     loads were not solved. The report holds means over the parts, but the sum of the times locked.
     """
-    rows, piece, time, regular = motion.report, step / part_count, 0.0, vehicle.slope * 9.81 * step / part_count
-    ends, sums = array(doubles(torques.size), torques.shape), array(doubles(rows.size), rows.shape)
+    rows, piece, time, regular = (
+        vehicle_motion.report,
+        time_step / part_count,
+        0.0,
+        vehicle.slope * 9.81 * time_step / part_count,
+    )
+    ends, sums = array(doubles(brake_torques.size), brake_torques.shape), array(doubles(rows.size), rows.shape)
     sums[:] = 0.0
     for k in range(part_count):
-        for i in range(torques.shape[1]):
+        for i in range(brake_torques.shape[1]):
             for side in range(2):
-                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / part_count
-        used = step_on(motion, ends, piece, steer, regular, vehicle, surfaces)
+                ends[side, i] = (
+                    brake_torques[0, i] + (brake_torques[1, i] - brake_torques[0, i]) * (k + side) / part_count
+                )
+        used = advance_one_step(vehicle_motion, ends, piece, steer_angles, regular, vehicle, surfaces)
         if used < 0.0:
             return used
         time += used
@@ -82,91 +89,109 @@ def in_parts(part_count, motion, torques, step, steer, vehicle, surfaces):
         for i in range(rows.shape[1]):
             rows[c, i] = sums[c, i] / part_count
     for i in range(locked.size):
-        report.locked[i], report.turning[i] = locked[i], motion.turning[i]
-    return step
+        report.locked[i], report.turning[i] = locked[i], vehicle_motion.turning[i]
+    return time_step
 
 
 @lean
-def advance(motion, torques, step, steer, vehicle):
+def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle):
     """Advance a ``PlaneMotion`` by n steps (s) under torques (n + 1, W) in N m at the steps' ends, which come from
     ``pressure``.
 
     steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
-    wheels, time = motion.turning.size, 0.0
-    surfaces = surfaces_of(array(doubles(4 * wheels), (4, wheels)))
-    for n in range(torques.shape[0] - 1):
+    wheels, time = vehicle_motion.turning.size, 0.0
+    surfaces = surfaces_of_rows(array(doubles(4 * wheels), (4, wheels)))
+    for n in range(brake_torques.shape[0] - 1):
         if n == 0 or not is_uniform(vehicle.road):
-            under_wheels(motion.state, step, vehicle, surfaces)
-        regular = vehicle.slope * 9.81 * step
-        parts = parts_of(motion.state, regular)
+            fill_surfaces_under_wheels(vehicle_motion.state, time_step, vehicle, surfaces)
+        regular = vehicle.slope * 9.81 * time_step
+        parts = count_of_step_parts(vehicle_motion.state, regular)
         if parts <= 1:
-            used = step_on(motion, torques[n : n + 2], step, steer, regular, vehicle, surfaces)
+            used = advance_one_step(
+                vehicle_motion, brake_torques[n : n + 2], time_step, steer_angles, regular, vehicle, surfaces
+            )
         else:
-            used = in_parts(parts, motion, torques[n : n + 2], step, steer, vehicle, surfaces)
+            used = advance_in_parts(
+                parts, vehicle_motion, brake_torques[n : n + 2], time_step, steer_angles, vehicle, surfaces
+            )
         if used < 0.0:
             return NOT_FOUND, time
         time += used
-        if used < step:
+        if used < time_step:
             return AT_REST, time
-        status = end_status(motion, vehicle.plane)
+        status = end_status(vehicle_motion, vehicle.plane)
         if status != FINE:
             return status, time
     return FINE, time
 
 
-FATAL_ENDS = (NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED)
+FATAL_END_STATUSES = (NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED)
 """Ends of a sample after which a run cannot continue."""
 BODY_NAMES = ("vehicle", "trailer")
 HINGE_NAMES = ("the drawbar against the truck", "the trailer's body against the drawbar")
 
 
-def ending_sentence(status: int, plane: Plane, motion: PlaneMotion) -> str:
+def ending_sentence(status: int, plane_vehicle: PlaneVehicle, vehicle_motion: PlaneMotion) -> str:
     """Sentence on why a run ended, from the end status and the motion of its last step."""
     if status == FOLDED:
-        return _folded_sentence(plane, motion.state[0, 2:])
+        return _folded_sentence(plane_vehicle, vehicle_motion.state[0, 2:])
     if status == NOT_FOUND:
         return "no loads were found"
-    loads = Report(*motion.report).load
-    first = next(i for i in range(0, plane.wheels, 4) if _side_or_axle_lifted(loads[i : i + 4]))
-    return _tipping_sentence(status, plane, slice(first, first + 4), _acceleration(plane, first, motion), loads)
+    loads = WheelReport(*vehicle_motion.report).load
+    first = next(i for i in range(0, plane_vehicle.wheels, 4) if _is_side_or_axle_lifted(loads[i : i + 4]))
+    return _tipping_sentence(
+        status, plane_vehicle, slice(first, first + 4), _unit_acceleration(plane_vehicle, first, vehicle_motion), loads
+    )
 
 
-def _folded_sentence(plane: Plane, headings: np.ndarray) -> str:
+def _folded_sentence(plane_vehicle: PlaneVehicle, headings: np.ndarray) -> str:
     """Sentence on the hinge at which a train of vehicles jackknifes, with its angle."""
     angles = np.degrees(np.diff(headings))
     k = int(np.argmax(np.abs(angles)))
     hinge = HINGE_NAMES[k] if angles.size > 1 else HINGE_NAMES[1]
-    return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {math.degrees(plane.jackknife_angle):g} deg"
+    limit = math.degrees(plane_vehicle.jackknife_angle)
+    return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {limit:g} deg"
 
 
-def _side_or_axle_lifted(loads: np.ndarray) -> bool:
+def _is_side_or_axle_lifted(unit_wheel_loads: np.ndarray) -> bool:
     """Whether both wheels of a side, or both wheels of an axle, carry no load."""
-    is_lifted = loads <= 0.0
+    is_lifted = unit_wheel_loads <= 0.0
     return bool((is_lifted[0] or is_lifted[3]) and (is_lifted[1] or is_lifted[2]))
 
 
-def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float, float]:
-    """Longitudinal and lateral acceleration (m/s^2) of the unit whose first wheel is ``first``, in the unit's axes."""
-    accelerations = motion.accelerations
-    k, row_along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
-    units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
+def _unit_acceleration(
+    plane_vehicle: PlaneVehicle, first_wheel: int, vehicle_motion: PlaneMotion
+) -> tuple[float, float]:
+    """Longitudinal and lateral acceleration (m/s^2) of the unit whose first wheel is ``first_wheel``, in the unit's
+    axes.
+    """
+    accelerations = vehicle_motion.accelerations
+    k, row_along, across = plane_vehicle.group[first_wheel], np.zeros(accelerations.size), np.zeros(accelerations.size)
+    units = np.column_stack((np.cos(vehicle_motion.state[0, 2:]), np.sin(vehicle_motion.state[0, 2:])))
     bias_along, bias_across = fill_velocity_rows(
-        ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, row_along, across
+        ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, vehicle_motion.state[1], plane_vehicle, row_along, across
     )
     return float(row_along @ accelerations + bias_along), float(across @ accelerations + bias_across)
 
 
-def _tipping_sentence(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
+def _tipping_sentence(
+    status: int,
+    plane_vehicle: PlaneVehicle,
+    unit_wheels: slice,
+    unit_accelerations: tuple[float, float],
+    wheel_loads: np.ndarray,
+) -> str:
     """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road, for quasi-static wheel
     loads.
     """
-    body, (deceleration, side_acceleration) = BODY_NAMES[four.start // 4], rates
+    body, (deceleration, side_acceleration) = BODY_NAMES[unit_wheels.start // 4], unit_accelerations
     static, by_x, by_y, y = (
-        wheel_values[four] for wheel_values in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1])
+        wheel_values[unit_wheels]
+        for wheel_values in (plane_vehicle.static, plane_vehicle.by_x, plane_vehicle.by_y, plane_vehicle.place[:, 1])
     )
     if status == PITCHED_OVER:
-        axle = 0 if loads[four][:2].max() <= 0.0 else 2
+        axle = 0 if wheel_loads[unit_wheels][:2].max() <= 0.0 else 2
         limit = -static[axle : axle + 2].sum() / by_x[axle : axle + 2].sum()
         return (
             f"the {body} pitches over: its {'rear' if axle else 'front'} wheels lift off at {deceleration:.2f} m/s^2 "
@@ -174,6 +199,6 @@ def _tipping_sentence(status: int, plane: Plane, four: slice, rates: tuple[float
         )
     pressed = static + by_x * deceleration
     limit = float(np.abs(y) @ pressed / np.abs(by_y @ y))
-    side = "left" if loads[four][0] <= 0.0 else "right"
+    side = "left" if wheel_loads[unit_wheels][0] <= 0.0 else "right"
     lift_off = f"its {side} wheels lift off at {side_acceleration:.2f} m/s^2 across it"
     return f"the {body} rolls over: {lift_off}, limit {limit:.2f}"

@@ -36,7 +36,7 @@ class Brake(Strict):
         return self
 
 
-class Brakes(NamedTuple):
+class WheelBrakes(NamedTuple):
     """Parameters of the brakes of W wheels, one array (W,) each, for compiled functions; see ``Brake``."""
 
     push_out: np.ndarray
@@ -45,31 +45,31 @@ class Brakes(NamedTuple):
     falling: np.ndarray
 
 
-def of_wheels(*brakes: Brake) -> Brakes:
+def brakes_of_wheels(*brakes: Brake) -> WheelBrakes:
     """Brake parameters (W,) of all wheels, in the order of the wheels."""
-    return Brakes(*(np.array([getattr(brake, name) for brake in brakes]) for name in Brakes._fields))
+    return WheelBrakes(*(np.array([getattr(brake, name) for brake in brakes]) for name in WheelBrakes._fields))
 
 
 @lean
-def torque(i, pressure, last_torque, brakes):
+def brake_torque(wheel_index, pressure, last_torque, brakes):
     """Torque (N m) of brake i at a pressure (bar) that has changed monotonically since the torque was ``last_torque``
     (N m).
     """
-    rising_torque = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
-    falling_torque = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
+    rising_torque = brakes.rising[wheel_index] * max(0.0, pressure - brakes.push_out[wheel_index])
+    falling_torque = brakes.falling[wheel_index] * max(0.0, pressure - brakes.release[wheel_index])
     return max(rising_torque, min(falling_torque, last_torque))
 
 
-def torques_of_pressures(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
+def torques_of_pressures(pressures: np.ndarray, brakes: WheelBrakes) -> np.ndarray:
     """Torques (n,) in N m of the first brake over a sequence of pressures (n,) in bar, starting without torque."""
     last_torque, torques = 0.0, np.empty(len(pressures))
     for n, pressure in enumerate(pressures):
-        last_torque = torques[n] = torque(0, pressure, last_torque, brakes)
+        last_torque = torques[n] = brake_torque(0, pressure, last_torque, brakes)
     return torques
 
 
-PAPER_FRONT = Brake(push_out=0.75, release=0.71, rising=1500.0, falling=1500.0)
-PAPER_REAR = Brake(push_out=0.25, release=0.25, rising=1200.0, falling=1200.0)
+PAPER_FRONT_BRAKE = Brake(push_out=0.75, release=0.71, rising=1500.0, falling=1500.0)
+PAPER_REAR_BRAKE = Brake(push_out=0.25, release=0.25, rising=1200.0, falling=1200.0)
 """The paper's brakes as far as its printed data can be read: its hysteresis parameters (0.71, 0.75; 0.25, 0.25) are
 good, that they are these two pressures and that the factors are 1500 and 1200 N m/bar is guessed."""
-PAPER_BRAKES = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
+PAPER_BRAKES = brakes_of_wheels(PAPER_FRONT_BRAKE, PAPER_FRONT_BRAKE, PAPER_REAR_BRAKE, PAPER_REAR_BRAKE)

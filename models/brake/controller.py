@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-SAMPLE = 0.0055
+SAMPLING_PERIOD = 0.0055
 """Time (s) between two controller samples: the paper's, 182 samples per second."""
 RELEASE, HOLD, APPLY, SLOW = -1, 0, 1, 2
 """Valve commands: release, hold, apply, and apply slowly, the last one only where the scene has such valves."""
@@ -63,7 +63,7 @@ def is_steady(controller: Controller) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressures:
+class ConstantPressures:
     """Controller that commands constant pressures (W,) in bar, as in a test without anti-lock system."""
 
     pressures: np.ndarray
@@ -75,7 +75,7 @@ class Pressures:
 
 
 @dataclass(frozen=True)
-class AllApplied:
+class NoAntiLock:
     """Controller without anti-lock function: every valve stays open while the driver brakes."""
 
     wheels: int

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.surfaces import Surfaces
+from models.brake.surfaces import WheelSurfaces
 from models.machine.compiled import inlined
 
 
-class Report(NamedTuple):
+class WheelReport(NamedTuple):
     """Forces, loads and slips of the wheels, (W,) each for a step, or (samples, W) for a run.
 
     force_x, force_y : mean forces on the wheel in its own axes (N); load : N; slip : the mean one; slip_angle : rad;
@@ -29,18 +29,18 @@ class Report(NamedTuple):
     turning: np.ndarray
 
 
-REPORT_SIZE = len(Report._fields)
+REPORT_SIZE = len(WheelReport._fields)
 """Number of values that a wheel reports."""
-TURNING_ROW = Report._fields.index("turning")
+TURNING_ROW = WheelReport._fields.index("turning")
 """Index of the report's row with rotational speeds, for code that also runs in Python, where ``report_of`` gives no
-``Report``.
+``WheelReport``.
 """
 
 
 @inlined
 def report_of(rows):
-    """``Report`` of views of the rows (7, W), for compiled functions; in Python, use ``Report(*rows)``."""
-    return Report(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+    """``WheelReport`` of views of the rows (7, W), for compiled functions; in Python, use ``Report(*rows)``."""
+    return WheelReport(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
 class PlaneMotion(NamedTuple):
@@ -48,7 +48,7 @@ class PlaneMotion(NamedTuple):
 
     state (2, n) : positions and rates; turning (W,) : rotational speeds of the wheels, rad/s; accelerations (2 + U,) :
     of the last step, the start values of the search in the next one; report (7, W) : the rows of the last step's
-    ``Report``.
+    ``WheelReport``.
     """
 
     state: np.ndarray
@@ -57,14 +57,16 @@ class PlaneMotion(NamedTuple):
     report: np.ndarray
 
 
-def motion_of(state: np.ndarray, wheel_turning: np.ndarray) -> PlaneMotion:
+def motion_of(vehicle_state: np.ndarray, wheel_turning: np.ndarray) -> PlaneMotion:
     """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates (2, n), and the wheels'
     rotational speeds (W,) in rad/s.
     """
-    return PlaneMotion(state, wheel_turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, wheel_turning.size)))
+    return PlaneMotion(
+        vehicle_state, wheel_turning, np.zeros(vehicle_state.shape[1]), np.zeros((REPORT_SIZE, wheel_turning.size))
+    )
 
 
-class Wheels(NamedTuple):
+class WheelStates(NamedTuple):
     """State and geometry of each wheel within a time step, each (W,).
 
     start : speed of its centre along the wheel at the start (m/s); rate : rate of this speed without the part due to
@@ -86,17 +88,19 @@ class Wheels(NamedTuple):
     sine: np.ndarray
 
 
-KNOWN = len(Wheels._fields)
-"""Number of values in ``Wheels`` for each wheel."""
+WHEEL_QUANTITY_COUNT = len(WheelStates._fields)
+"""Number of values in ``WheelStates`` for each wheel."""
 
 
 @inlined
 def wheels_of(rows):
-    """``Wheels`` of views of the rows (11, W), for compiled functions; in Python, use ``Wheels(*rows)``."""
-    return Wheels(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10])
+    """``WheelStates`` of views of the rows (11, W), for compiled functions; in Python, use ``Wheels(*rows)``."""
+    return WheelStates(
+        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10]
+    )
 
 
-class Frame(NamedTuple):
+class StepWorkspace(NamedTuple):
     """Arrays shared by all iterations within a time step.
 
     along, across, press (W, n) : see ``plane_chain.fill_velocity_rows``, and load by accelerations; units (U, 2) : see
@@ -104,9 +108,9 @@ class Frame(NamedTuple):
     out_before, off (n,) : accelerations from the last iteration, from the one before, and the residual of the latter.
     """
 
-    wheels: Wheels
-    surfaces: Surfaces
-    report: Report
+    wheels: WheelStates
+    surfaces: WheelSurfaces
+    report: WheelReport
     along: np.ndarray
     across: np.ndarray
     press: np.ndarray

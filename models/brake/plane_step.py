@@ -12,16 +12,16 @@ import math
 from models.brake.plane_chain import (
     ChainPoint,
     Direction,
-    coordinates,
+    count_of_coordinates,
     count_of_prescribed,
     factorise_mass,
     fill_headings,
+    fill_mass_matrix,
     fill_velocity_rows,
-    inertia,
-    solve,
+    solve_accelerations,
 )
-from models.brake.plane_records import KNOWN, Frame, report_of, wheels_of
-from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
+from models.brake.plane_records import WHEEL_QUANTITY_COUNT, StepWorkspace, report_of, wheels_of
+from models.brake.wheel_step import BrakedWheel, TyreGrip, WheelStepInput, wheel_step
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 from models.tyre.tyre_table import TableCell, cell_and_share, lateral_adhesion
@@ -53,85 +53,87 @@ def scalar_product(row, vector):
 
 
 @inlined
-def copy_row(row, target_row):
+def copy_row(source_row, target_row):
     """Copy the row's values into ``target_row``; array assignment would allocate a temporary array."""
-    for a in range(row.size):
-        target_row[a] = row[a]
+    for a in range(source_row.size):
+        target_row[a] = source_row[a]
 
 
 @inlined
-def fill_state_quantities(motion, steer, regularising_speed, starts, vehicle, frame):
-    """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
-    the start of the step, and the wheels' steer angles and speeds along them are stored.
+def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_step_start, vehicle, workspace):
+    """Fill wheel quantities and equations of motion that follow from the state. With ``at_step_start``, the state is
+    that at the start of the step, and the wheels' steer angles and speeds along them are stored.
     """
-    plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
-    positions, rates, still = motion.state[0], motion.state[1], frame.wheels.static_load
+    plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, workspace.wheels, workspace.units
+    positions, rates, still = vehicle_motion.state[0], vehicle_motion.state[1], workspace.wheels.static_load
     fill_headings(positions, units)
     for i in range(plane.unit.size):
-        row_along, row_across, g, k = frame.along[i], frame.across[i], plane.group[i], plane.unit[i]
+        row_along, row_across, g, k = workspace.along[i], workspace.across[i], plane.group[i], plane.unit[i]
         still[i] = plane.static[i]
         if plane.by_x[i] != 0.0 or plane.by_y[i] != 0.0:
             heading = Direction(units[g, 0], units[g, 1])
             bias_along, bias_across = fill_velocity_rows(
                 ChainPoint(g, 0.0, 0.0), heading, units, rates, plane, row_along, row_across
             )
-            for a in range(coordinates(plane)):
-                frame.press[i, a] = plane.by_x[i] * row_along[a] + plane.by_y[i] * row_across[a]
+            for a in range(count_of_coordinates(plane)):
+                workspace.press[i, a] = plane.by_x[i] * row_along[a] + plane.by_y[i] * row_across[a]
             still[i] += plane.by_x[i] * bias_along + plane.by_y[i] * bias_across
-        if starts:
-            same_steer = i > 0 and steer[i] == steer[i - 1]
-            wheels.cosine[i] = wheels.cosine[i - 1] if same_steer else math.cos(steer[i])
-            wheels.sine[i] = wheels.sine[i - 1] if same_steer else math.sin(steer[i])
+        if at_step_start:
+            same_steer = i > 0 and steer_angles[i] == steer_angles[i - 1]
+            wheels.cosine[i] = wheels.cosine[i - 1] if same_steer else math.cos(steer_angles[i])
+            wheels.sine[i] = wheels.sine[i - 1] if same_steer else math.sin(steer_angles[i])
         c = units[k, 0] * wheels.cosine[i] - units[k, 1] * wheels.sine[i]
         s = units[k, 1] * wheels.cosine[i] + units[k, 0] * wheels.sine[i]
         centre = ChainPoint(k, plane.place[i, 0], plane.place[i, 1])
         bias_along, _ = fill_velocity_rows(centre, Direction(c, s), units, rates, plane, row_along, row_across)
         u, v = scalar_product(row_along, rates), scalar_product(row_across, rates)
-        if starts:
+        if at_step_start:
             wheels.start[i] = u
         wheels.rate[i] = bias_along + v * rates[2 + k]
-        set_slip_angle(i, u, v, regularising_speed, frame.surfaces.lag, angles, wheels)
-    inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
-    for a in range(count_of_prescribed(plane), coordinates(plane)):
+        set_slip_angle(i, u, v, regularising_speed, workspace.surfaces.lag, angles, wheels)
+    fill_mass_matrix(units, rates, plane, workspace.mass, workspace.right, workspace.out, workspace.out_before)
+    for a in range(count_of_prescribed(plane), count_of_coordinates(plane)):
         for b in range(count_of_prescribed(plane)):
-            frame.right[a] -= frame.mass[a, b] * motion.accelerations[b]
-    factorise_mass(frame.mass, plane)
+            workspace.right[a] -= workspace.mass[a, b] * vehicle_motion.accelerations[b]
+    factorise_mass(workspace.mass, plane)
 
 
 @inlined
-def set_slip_angle(i, u, v, regularising_speed, lag, angles, wheels):
+def set_slip_angle(wheel_index, speed_along, speed_across, regularising_speed, lagging_slips, table_angles, wheels):
     """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
-    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
+    Where ``lagging_slips`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
     """
-    forwards = u if wheels.start[i] >= 0.0 else -u
-    if not math.isnan(lag[i]):
-        v = lag[i] * max(forwards, regularising_speed)
-    angle = math.atan2(abs(v), max(forwards, regularising_speed))
-    wheels.along[i], wheels.aside[i], wheels.angle[i] = max(forwards, 0.0), v, angle
-    wheels.cell[i], wheels.share[i] = cell_and_share(angles, angle)
+    i = wheel_index
+    forwards = speed_along if wheels.start[i] >= 0.0 else -speed_along
+    if not math.isnan(lagging_slips[i]):
+        speed_across = lagging_slips[i] * max(forwards, regularising_speed)
+    angle = math.atan2(abs(speed_across), max(forwards, regularising_speed))
+    wheels.along[i], wheels.aside[i], wheels.angle[i] = max(forwards, 0.0), speed_across, angle
+    wheels.cell[i], wheels.share[i] = cell_and_share(table_angles, angle)
 
 
 @inlined
-def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
-    """Fill the report of wheel i, whose slip angle and load are known, from a ``StepInput`` with the speeds along the
-    wheel.
+def fill_tyre_report(wheel_index, step_input, wheel, tyre_tables, wheels, surfaces, report):
+    """Fill the report of wheel i, whose slip angle and load are known, from a ``WheelStepInput`` with the speeds along
+    the wheel.
     """
+    i = wheel_index
     v, speed_along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
     sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
-    j, q = cell_and_share(tables.loads, load)
+    j, q = cell_and_share(tyre_tables.loads, load)
     cells = TableCell(int(wheels.cell[i]), wheels.share[i], j, q)
     w, force, slip, locked = wheel_step(
-        StepInput(
+        WheelStepInput(
             sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
         ),
-        Wheel(wheel.radius, wheel.inertia, sign * wheel.turning),
-        Grip(first, second, share, cells, load, tables.slips, tables.mu_x),
+        BrakedWheel(wheel.radius, wheel.inertia, sign * wheel.turning),
+        TyreGrip(first, second, share, cells, load, tyre_tables.slips, tyre_tables.mu_x),
     )
-    k, cell_share = cell_and_share(tables.slips, abs(slip))
-    side = lateral_adhesion(first, cells, k, cell_share, tables.g, tables.h)
+    k, cell_share = cell_and_share(tyre_tables.slips, abs(slip))
+    side = lateral_adhesion(first, cells, k, cell_share, tyre_tables.g, tyre_tables.h)
     if share > 0.0:
-        side += share * (lateral_adhesion(second, cells, k, cell_share, tables.g, tables.h) - side)
+        side += share * (lateral_adhesion(second, cells, k, cell_share, tyre_tables.g, tyre_tables.h) - side)
     side *= load
     if slip > LOCKING_SLIP and (speed_along > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
         total, speed = math.hypot(force, side), math.hypot(speed_along, v)
@@ -144,16 +146,20 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
 
 
 @lean
-def redistribute_negative_loads(loads, positions):
+def redistribute_negative_loads(wheel_loads, wheel_positions):
     """Correct loads (W,) in N of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and
-    the other wheels keep the static equilibrium. positions (W, 2) : positions of the wheels in their units' axes, m.
+    the other wheels keep the static equilibrium. wheel_positions (W, 2) : positions of the wheels in their units' axes,
+    m.
 
     The other wheel of its axle bears the axle's load, and the other axle what this one cannot take of the roll moment.
     An axle that would lift leaves all its load to the other one. Beyond balance, both wheels of a side bear none.
     """
-    for first in range(0, loads.size - 3, 4):
-        front, rear = loads[first : first + 2], loads[first + 2 : first + 4]
-        width, behind = positions[first, 1] - positions[first + 1, 1], positions[first + 2, 1] - positions[first + 3, 1]
+    for first in range(0, wheel_loads.size - 3, 4):
+        front, rear = wheel_loads[first : first + 2], wheel_loads[first + 2 : first + 4]
+        width, behind = (
+            wheel_positions[first, 1] - wheel_positions[first + 1, 1],
+            wheel_positions[first + 2, 1] - wheel_positions[first + 3, 1],
+        )
         front_load, back, front_difference, moved_back = (
             front[0] + front[1],
             rear[0] + rear[1],
@@ -175,50 +181,62 @@ def redistribute_negative_loads(loads, positions):
 
 
 @lean
-def fill_response(motion, torques_before, torques_after, step, vehicle, frame):
+def fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace):
     """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
-    ``motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : brake torques (N m)
-    at the ends of the step.
+    ``vehicle_motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : brake
+    torques (N m) at the ends of the step.
     """
-    plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
+    plane, tables, wheels, surfaces, report = (
+        vehicle.plane,
+        vehicle.tables,
+        workspace.wheels,
+        workspace.surfaces,
+        workspace.report,
+    )
     accelerations, response, rows_along, rows_across, right = (
-        motion.accelerations,
-        frame.out,
-        frame.along,
-        frame.across,
-        frame.right,
+        vehicle_motion.accelerations,
+        workspace.out,
+        workspace.along,
+        workspace.across,
+        workspace.right,
     )
     load, still, rate, start = wheels.load, wheels.static_load, wheels.rate, wheels.start
-    size, free, lifts = coordinates(plane), count_of_prescribed(plane), False
+    size, free, lifts = count_of_coordinates(plane), count_of_prescribed(plane), False
     for a in range(size):
         response[a] = accelerations[a] if a < free else right[a]
     for i in range(load.size):
-        load[i] = still[i] + scalar_product(frame.press[i], accelerations)
+        load[i] = still[i] + scalar_product(workspace.press[i], accelerations)
         lifts = lifts or load[i] < 0.0
     if lifts:
         redistribute_negative_loads(load, plane.place)
     for i in range(load.size):
-        speed1 = start[i] + step * (rate[i] + scalar_product(rows_along[i], accelerations))
-        step_input = StepInput(start[i], speed1, torques_before[i], torques_after[i], step)
-        wheel = Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
-        tyre(i, step_input, wheel, tables, wheels, surfaces, report)
+        speed1 = start[i] + time_step * (rate[i] + scalar_product(rows_along[i], accelerations))
+        step_input = WheelStepInput(start[i], speed1, torques_before[i], torques_after[i], time_step)
+        wheel = BrakedWheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
+        fill_tyre_report(i, step_input, wheel, tables, wheels, surfaces, report)
         for a in range(free, size):
             response[a] += rows_along[i, a] * report.force_x[i] + rows_across[i, a] * report.force_y[i]
-    solve(frame.mass, plane, response)
+    solve_accelerations(workspace.mass, plane, response)
 
 
 @inlined
-def find_accelerations(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
-    """Find the mean accelerations over a step by iteration, from the last ones on, and write them into ``motion``.
+def find_accelerations(vehicle_motion, torques_before, torques_after, time_step, round_limit, vehicle, workspace):
+    """Find the mean accelerations over a step by iteration, from the last ones on, and write them into
+    ``vehicle_motion``.
 
-    Anderson's method of depth one runs for at most ``most_rounds`` rounds. If they have not converged and were
-    ``ANDERSON_ROUNDS`` or more, ``find_by_means`` takes over. Returns the estimated remaining error, from the last
-    change and the ratio of the last two.
+    Anderson's method of depth one runs for at most ``round_limit`` rounds. If they have not converged and were
+    ``ANDERSON_ROUNDS`` or more, ``find_mean_accelerations`` takes over. Returns the estimated remaining error, from the
+    last change and the ratio of the last two.
     """
-    accelerations, response, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
-    size, remaining_error, last_change = coordinates(vehicle.plane), math.inf, 0.0
-    for rounds in range(most_rounds):
-        fill_response(motion, torques_before, torques_after, step, vehicle, frame)
+    accelerations, response, out0, off0 = (
+        vehicle_motion.accelerations,
+        workspace.out,
+        workspace.out_before,
+        workspace.off,
+    )
+    size, remaining_error, last_change = count_of_coordinates(vehicle.plane), math.inf, 0.0
+    for rounds in range(round_limit):
+        fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
         change, product, square = 0.0, 0.0, 0.0
         for a in range(size):
             residual = response[a] - accelerations[a]
@@ -226,7 +244,7 @@ def find_accelerations(motion, torques_before, torques_after, step, most_rounds,
             product += residual * (residual - off0[a])
             square += (residual - off0[a]) ** 2
         remaining_error = change * min(change / last_change, 1.0) if last_change > 0.0 else change
-        is_done, last_change = not remaining_error > ACCELERATION_TOLERANCE or rounds == most_rounds - 1, change
+        is_done, last_change = not remaining_error > ACCELERATION_TOLERANCE or rounds == round_limit - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not is_done else 0.0
         for a in range(size):
             off0[a] = response[a] - accelerations[a]
@@ -236,13 +254,13 @@ def find_accelerations(motion, torques_before, torques_after, step, most_rounds,
             break
     return (
         remaining_error
-        if remaining_error <= ACCELERATION_TOLERANCE or most_rounds < ANDERSON_ROUNDS
-        else find_by_means(motion, torques_before, torques_after, step, vehicle, frame)
+        if remaining_error <= ACCELERATION_TOLERANCE or round_limit < ANDERSON_ROUNDS
+        else find_mean_accelerations(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
     )
 
 
 @lean
-def find_by_means(motion, torques_before, torques_after, step, vehicle, frame):
+def find_mean_accelerations(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace):
     """Accelerations as from ``find_accelerations``, for steps in which wheel loads jump between two solutions, so that
     only a mean of both is in equilibrium; returns the remaining error.
 
@@ -254,11 +272,11 @@ def find_by_means(motion, torques_before, torques_after, step, vehicle, frame):
     Source: A. F. Filippov, Differential equations with discontinuous righthand sides (1988); W. R. Mann, Proc. AMS 4
     (1953) 506-510; recalled, not checked.
     """
-    accelerations, response, report = motion.accelerations, frame.out, motion.report
-    size, share, last_change = coordinates(vehicle.plane), 0.5, math.inf
+    accelerations, response, report = vehicle_motion.accelerations, workspace.out, vehicle_motion.report
+    size, share, last_change = count_of_coordinates(vehicle.plane), 0.5, math.inf
     means = array(doubles(report.size), report.shape)
     start_accelerations = array(doubles(accelerations.size), accelerations.shape)
-    fill_response(motion, torques_before, torques_after, step, vehicle, frame)
+    fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
     copy_row(response, accelerations)
     for c in range(report.shape[0]):
         copy_row(report[c], means[c])
@@ -266,7 +284,7 @@ def find_by_means(motion, torques_before, torques_after, step, vehicle, frame):
         total_change, net, largest_change, change = 0.0, 0.0, 0.0, 0.0
         copy_row(accelerations, start_accelerations)
         for _ in range(ROUNDS_PER_WINDOW):
-            fill_response(motion, torques_before, torques_after, step, vehicle, frame)
+            fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace)
             change = 0.0
             for a in range(size):
                 change = max(change, abs(response[a] - accelerations[a]))
@@ -292,43 +310,49 @@ def find_by_means(motion, torques_before, torques_after, step, vehicle, frame):
 
 
 @inlined
-def time_of_rest(rates, wheel_turning, accelerations, step, plane):
+def time_of_rest(coordinate_rates, wheel_turning, accelerations, time_step, plane_vehicle):
     """Time (s) within the step at which the vehicle comes to rest, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
     kinetic energy along the step is least, if it was about to lose all of its speed in that step anyhow.
     """
     speed, power, rate, mass = 0.0, 0.0, 0.0, 0.0
-    for k in range(rates.size - 2):
-        mass += plane.masses[k]
-    for a in range(rates.size):
-        weight = mass if a < 2 else plane.inertias[a - 2]
-        speed += weight * rates[a] ** 2
-        power += weight * rates[a] * accelerations[a]
+    for k in range(coordinate_rates.size - 2):
+        mass += plane_vehicle.masses[k]
+    for a in range(coordinate_rates.size):
+        weight = mass if a < 2 else plane_vehicle.inertias[a - 2]
+        speed += weight * coordinate_rates[a] ** 2
+        power += weight * coordinate_rates[a] * accelerations[a]
         rate += weight * accelerations[a] ** 2
     if speed == 0.0 and not wheel_turning.any():
         return 0.0
-    if rate == 0.0 or power >= 0.0 or -power > step * rate or speed > 2.25 * step * step * rate:
+    if rate == 0.0 or power >= 0.0 or -power > time_step * rate or speed > 2.25 * time_step * time_step * rate:
         return -1.0
     return -power / rate
 
 
 @lean
-def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces):
+def advance_one_step(vehicle_motion, brake_torques, time_step, steer_angles, regularising_speed, vehicle, surfaces):
     """Advance a ``PlaneMotion`` whose wheels are on ``Surfaces`` by one step (s).
 
-    torques (2, W) : of the brakes at the step's ends; steer (W,) : angles of the wheels in their units (rad);
-    regularising_speed : m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does
-    not, -1 if the loads were not found.
+    brake_torques (2, W) : of the brakes at the step's ends; steer_angles (W,) : angles of the wheels in their units
+    (rad);
+    regularising_speed : m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``time_step`` if it
+    does not, -1 if the loads were not found.
     """
-    plane, state, turning, accelerations = vehicle.plane, motion.state, motion.turning, motion.accelerations
-    count, size = turning.size, coordinates(plane)
+    plane, state, turning, accelerations = (
+        vehicle.plane,
+        vehicle_motion.state,
+        vehicle_motion.turning,
+        vehicle_motion.accelerations,
+    )
+    count, size = turning.size, count_of_coordinates(plane)
     state_rows = array(doubles(3 * count * size), (3, count, size))
     plane_rows, middle = array(doubles(6 * size), (6, size)), array(doubles(count), (count,))
-    frame = Frame(
-        wheels_of(array(doubles(KNOWN * count), (KNOWN, count))),
+    frame = StepWorkspace(
+        wheels_of(array(doubles(WHEEL_QUANTITY_COUNT * count), (WHEEL_QUANTITY_COUNT, count))),
         surfaces,
-        report_of(motion.report),
+        report_of(vehicle_motion.report),
         state_rows[0],
         state_rows[1],
         state_rows[2],
@@ -344,17 +368,19 @@ def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces)
     for a in range(size):
         place0[a], rate0[a] = state[0, a], state[1, a]
     for i in range(count):
-        middle[i] = 0.5 * (torques[0, i] + torques[1, i])
+        middle[i] = 0.5 * (brake_torques[0, i] + brake_torques[1, i])
     for half in (True, False):
-        fill_state_quantities(motion, steer, regularising_speed, half, vehicle, frame)
-        time, end_torques = (0.5 * step, middle) if half else (step, torques[1])
+        fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, half, vehicle, frame)
+        time, end_torques = (0.5 * time_step, middle) if half else (time_step, brake_torques[1])
         most_rounds = HALF_ROUNDS if half else ANDERSON_ROUNDS
-        if not find_accelerations(motion, torques[0], end_torques, time, most_rounds, vehicle, frame) <= (
+        if not find_accelerations(vehicle_motion, brake_torques[0], end_torques, time, most_rounds, vehicle, frame) <= (
             math.inf if half else ACCELERATION_TOLERANCE
         ):
             return -1.0
         rest_time = (
-            time_of_rest(rate0, turning, accelerations, step, plane) if half and not plane.has_prescribed_hook else -1.0
+            time_of_rest(rate0, turning, accelerations, time_step, plane)
+            if half and not plane.has_prescribed_hook
+            else -1.0
         )
         if rest_time >= 0.0:
             time = rest_time
@@ -366,4 +392,4 @@ def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces)
             return rest_time
     for i in range(count):
         turning[i] = frame.report.turning[i]
-    return step
+    return time_step

@@ -14,7 +14,7 @@ GRAVITY = 9.81
 """Gravitational acceleration (m/s^2)."""
 
 
-class Axle(Strict):
+class TruckAxle(Strict):
     """An axle with two wheels, at one position along its unit."""
 
     x: float = quantity("m", "ahead of the unit's centre of mass", signed=True)
@@ -33,8 +33,8 @@ class Truck(Strict):
     mass: float = quantity("kg", "of the vehicle")
     yaw_inertia: float = quantity("kg m^2", "about the vertical through its centre of mass")
     height: float = quantity("m", "of the centre of mass", zero=True)
-    front: Axle
-    rear: Axle
+    front: TruckAxle
+    rear: TruckAxle
 
     @property
     def wheelbase(self) -> float:
@@ -42,7 +42,7 @@ class Truck(Strict):
         return self.front.x - self.rear.x
 
 
-class Plane(NamedTuple):
+class PlaneVehicle(NamedTuple):
     """Parameters of a vehicle in the plane, of U units and W wheels, for compiled functions.
 
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
@@ -74,14 +74,16 @@ class Plane(NamedTuple):
         return self.unit.size
 
 
-def plane_of_truck(vehicle: Truck, with_load_transfer: bool = True) -> Plane:
-    """``Plane`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay at their static values."""
-    check_wheels(vehicle, vehicle.mass)
+def plane_of_truck(truck: Truck, with_load_transfer: bool = True) -> PlaneVehicle:
+    """``PlaneVehicle`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay at their static
+    values.
+    """
+    check_wheels(truck, truck.mass)
     zeros = np.zeros(4, dtype=np.int64)
-    wheel_positions, radius, spin, static, by_x, by_y = wheels(vehicle, with_load_transfer)
-    return Plane(
-        np.array([vehicle.mass]),
-        np.array([vehicle.yaw_inertia]),
+    wheel_positions, radius, spin, static, by_x, by_y = wheel_fields_of_plane(truck, with_load_transfer)
+    return PlaneVehicle(
+        np.array([truck.mass]),
+        np.array([truck.yaw_inertia]),
         np.zeros((1, 1)),
         zeros,
         zeros.copy(),
@@ -95,36 +97,36 @@ def plane_of_truck(vehicle: Truck, with_load_transfer: bool = True) -> Plane:
     )
 
 
-def check_wheels(vehicle: Truck, mass: float) -> None:
+def check_wheels(truck: Truck, mass: float) -> None:
     """Refuse a vehicle whose mass (kg) is at most its wheels' smallest possible mass: J / r^2 each, as if all mass were
     in the rim.
     """
-    least_mass = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
+    least_mass = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (truck.front, truck.rear))
     if mass <= least_mass:
         allowed = f"must be above {least_mass:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
         raise InputError("", "mass", mass, allowed)
 
 
-def wheels(vehicle: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
-    """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
-    body.
+def wheel_fields_of_plane(truck: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
+    """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``PlaneVehicle`` for the four wheels of a
+    two-axle body.
     """
-    if not vehicle.front.x > 0.0 > vehicle.rear.x:
-        raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
-    shares = vehicle.front.roll_share + vehicle.rear.roll_share
+    if not truck.front.x > 0.0 > truck.rear.x:
+        raise InputError("", "rear.x", truck.rear.x, "must be below 0, and front.x above")
+    shares = truck.front.roll_share + truck.rear.roll_share
     if with_load_transfer and abs(shares - 1.0) > 1e-9:
         raise InputError("", "roll_share", shares, "of both axles must add up to 1")
-    front, rear, side = vehicle.front, vehicle.rear, np.array([1.0, -1.0, 1.0, -1.0])
+    front, rear, side = truck.front, truck.rear, np.array([1.0, -1.0, 1.0, -1.0])
 
-    def by_wheel(name: str) -> np.ndarray:
+    def by_wheel(parameter_name: str) -> np.ndarray:
         """One value per wheel (4,) of a parameter that belongs to its axle."""
-        return np.repeat([getattr(front, name), getattr(rear, name)], 2)
+        return np.repeat([getattr(front, parameter_name), getattr(rear, parameter_name)], 2)
 
-    share = np.repeat([-rear.x / vehicle.wheelbase, front.x / vehicle.wheelbase], 2)
-    pitch = np.repeat([-1.0, 1.0], 2) * vehicle.mass * vehicle.height / (2.0 * vehicle.wheelbase)
-    roll = -side * by_wheel("roll_share") * vehicle.mass * vehicle.height / by_wheel("track")
+    share = np.repeat([-rear.x / truck.wheelbase, front.x / truck.wheelbase], 2)
+    pitch = np.repeat([-1.0, 1.0], 2) * truck.mass * truck.height / (2.0 * truck.wheelbase)
+    roll = -side * by_wheel("roll_share") * truck.mass * truck.height / by_wheel("track")
     wheel_positions = np.column_stack((by_wheel("x"), side * by_wheel("track") / 2.0))
-    static = vehicle.mass * GRAVITY * share / 2.0
+    static = truck.mass * GRAVITY * share / 2.0
     return (
         wheel_positions,
         by_wheel("radius"),
@@ -139,8 +141,8 @@ PAPER_TRUCK = Truck(
     mass=5640.0,
     yaw_inertia=25000.0,
     height=1.2,
-    front=Axle(x=1.42, track=1.9, radius=0.5, spin_inertia=13.35, roll_share=0.3),
-    rear=Axle(x=-2.19, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.7),
+    front=TruckAxle(x=1.42, track=1.9, radius=0.5, spin_inertia=13.35, roll_share=0.3),
+    rear=TruckAxle(x=-2.19, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.7),
 )
 """The paper's unladen truck of two axles as far as its printed data can be read.
 

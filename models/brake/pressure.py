@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.brake import torque
+from models.brake.brake import brake_torque
 from models.brake.controller import APPLY, RELEASE, SLOW
 from models.core.errors import InputError
 from models.machine.compiled import lean
 
-NO_VALUES = np.zeros(0)
+EMPTY_ARRAY = np.zeros(0)
 
 
-class Chambers(NamedTuple):
+class BrakeChambers(NamedTuple):
     """Dynamics of brake chambers (W,): time constants (s) of first-order filling and emptying; supply pressure (bar).
 
     volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
@@ -32,13 +32,13 @@ class Chambers(NamedTuple):
     fill_time: np.ndarray
     empty_time: np.ndarray
     supply: float
-    volumes: np.ndarray = NO_VALUES
+    volumes: np.ndarray = EMPTY_ARRAY
     reservoir: float = math.inf
     delay: float = 0.0
-    slow: np.ndarray = NO_VALUES
+    slow: np.ndarray = EMPTY_ARRAY
 
 
-class Air(NamedTuple):
+class AirState(NamedTuple):
     """State of the brakes' air system, which is updated in place.
 
     pressure, torque (W,) : bar, N m, with which the hysteresis remembers; supply (1,) : bar; commands (d + 2, W) :
@@ -46,20 +46,20 @@ class Air(NamedTuple):
     """
 
     pressure: np.ndarray
-    torque: np.ndarray
+    brake_torque: np.ndarray
     supply: np.ndarray
     commands: np.ndarray
 
 
-def resting_chambers(chambers: Chambers, sample: float) -> Air:
-    """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sample : duration
-    (s).
+def air_at_rest(chambers: BrakeChambers, sampling_period: float) -> AirState:
+    """``AirState`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sampling_period :
+    duration (s).
     """
     wheels = chambers.fill_time.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
-    rows = int(chambers.delay / sample) + 2
-    return Air(
+    rows = int(chambers.delay / sampling_period) + 2
+    return AirState(
         np.zeros(wheels),
         np.zeros(wheels),
         np.array([float(chambers.supply)]),
@@ -68,58 +68,72 @@ def resting_chambers(chambers: Chambers, sample: float) -> Air:
 
 
 @lean
-def chamber_pressure(pressure, valve, time, fill, empty, supply):
+def chamber_pressure(pressure, valve_state, duration, fill_time, empty_time, supply_pressure):
     """Pressure (bar) of a brake chamber after a time (s) in which its valve applies, holds or releases."""
-    if valve >= APPLY:
-        return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
-    if valve == RELEASE:
-        return pressure * math.exp(-time / empty) if empty > 0.0 else 0.0
+    if valve_state >= APPLY:
+        return (
+            supply_pressure + (pressure - supply_pressure) * math.exp(-duration / fill_time)
+            if fill_time > 0.0
+            else supply_pressure
+        )
+    if valve_state == RELEASE:
+        return pressure * math.exp(-duration / empty_time) if empty_time > 0.0 else 0.0
     return pressure
 
 
 @lean
-def press(valves, time, air, chambers, brakes):
+def advance_pressures(valve_states, duration, air_state, chambers, brakes):
     """Update chamber pressures and brake torques over a time (s) with constant valve states (W,). Every pressure
     changes monotonically, as the hysteresis of the torque requires.
     """
     air_used = 0.0
-    for i in range(valves.size):
-        pressure_before = air.pressure[i]
-        fill = chambers.slow[i] if valves[i] == SLOW else chambers.fill_time[i]
-        pressure_after = chamber_pressure(pressure_before, valves[i], time, fill, chambers.empty_time[i], air.supply[0])
-        air.pressure[i], air.torque[i] = pressure_after, torque(i, pressure_after, air.torque[i], brakes)
-        if valves[i] >= APPLY and chambers.reservoir < math.inf:
+    for i in range(valve_states.size):
+        pressure_before = air_state.pressure[i]
+        fill = chambers.slow[i] if valve_states[i] == SLOW else chambers.fill_time[i]
+        pressure_after = chamber_pressure(
+            pressure_before, valve_states[i], duration, fill, chambers.empty_time[i], air_state.supply[0]
+        )
+        air_state.pressure[i], air_state.torque[i] = (
+            pressure_after,
+            brake_torque(i, pressure_after, air_state.torque[i], brakes),
+        )
+        if valve_states[i] >= APPLY and chambers.reservoir < math.inf:
             air_used += chambers.volumes[i] * (pressure_after - pressure_before)
     if air_used > 0.0:
-        air.supply[0] -= air_used / chambers.reservoir
+        air_state.supply[0] -= air_used / chambers.reservoir
 
 
 @lean
-def by_valves(valves, sample, air, chambers, brakes, torques):
-    """Control by valve states (W,) over a sample (s): fill ``torques`` (n + 1, W) in N m at the ends of its n steps."""
-    steps, last_command = torques.shape[0] - 1, air.commands.shape[0] - 1
-    for i in range(valves.size):
+def advance_by_valves(valve_states, sampling_period, air_state, chambers, brakes, brake_torques):
+    """Control by valve states (W,) over a sampling_period (s): fill ``brake_torques`` (n + 1, W) in N m at the ends of
+    its n steps.
+    """
+    steps, last_command = brake_torques.shape[0] - 1, air_state.commands.shape[0] - 1
+    for i in range(valve_states.size):
         for k in range(last_command):
-            air.commands[k, i] = air.commands[k + 1, i]
-        air.commands[last_command, i], torques[0, i] = valves[i], air.torque[i]
-    late = chambers.delay - (last_command - 1) * sample
-    step = sample / steps
+            air_state.commands[k, i] = air_state.commands[k + 1, i]
+        air_state.commands[last_command, i], brake_torques[0, i] = valve_states[i], air_state.torque[i]
+    late = chambers.delay - (last_command - 1) * sampling_period
+    step = sampling_period / steps
     for n in range(steps):
         wait = min(max(late - n * step, 0.0), step)
         if wait > 0.0:
-            press(air.commands[0], wait, air, chambers, brakes)
+            advance_pressures(air_state.commands[0], wait, air_state, chambers, brakes)
         if wait < step:
-            press(air.commands[1], step - wait, air, chambers, brakes)
-        for i in range(valves.size):
-            torques[n + 1, i] = air.torque[i]
+            advance_pressures(air_state.commands[1], step - wait, air_state, chambers, brakes)
+        for i in range(valve_states.size):
+            brake_torques[n + 1, i] = air_state.torque[i]
 
 
 @lean
-def by_pressures(pressures, air, brakes, torques):
-    """Control by pressures (W,) in bar, which are reached at once and kept for the sample; fill ``torques`` (n + 1, W)
-    in N m.
+def advance_by_pressures(pressures, air_state, brakes, brake_torques):
+    """Control by pressures (W,) in bar, which are reached at once and kept for the sample; fill ``brake_torques`` (n +
+    1, W) in N m.
     """
     for i in range(pressures.size):
-        air.pressure[i], air.torque[i] = pressures[i], torque(i, pressures[i], air.torque[i], brakes)
-        for n in range(torques.shape[0]):
-            torques[n, i] = air.torque[i]
+        air_state.pressure[i], air_state.torque[i] = (
+            pressures[i],
+            brake_torque(i, pressures[i], air_state.torque[i], brakes),
+        )
+        for n in range(brake_torques.shape[0]):
+            brake_torques[n, i] = air_state.torque[i]

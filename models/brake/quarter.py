@@ -11,15 +11,15 @@ import numpy as np
 from pydantic import model_validator
 
 from models.brake.plane_records import motion_of, report_of
-from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import GRAVITY, Plane
-from models.brake.surfaces import OnRoad, Road, surfaces_of, under_wheels
+from models.brake.plane_step import advance_one_step
+from models.brake.plane_vehicle import GRAVITY, PlaneVehicle
+from models.brake.surfaces import RoadSurfaces, VehicleOnRoad, fill_surfaces_under_wheels, surfaces_of_rows
 from models.core.errors import InputError, RunFailed
 from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
 from models.tyre.tyre_table import Tables
 
-LEAST_SLIP_SPEED = 0.1
+LEAST_SLIP_ANGLE_SPEED = 0.1
 """Speed (m/s) that replaces lower speeds in slip angles; without lateral motion they are zero."""
 
 
@@ -35,7 +35,7 @@ class QuarterPath(NamedTuple):
     locked: np.ndarray
 
 
-class Quarter(Strict):
+class QuarterVehicle(Strict):
     """A quarter vehicle: one wheel, and the vehicle mass that it carries."""
 
     mass: float = quantity("kg", "of vehicle and wheel together")
@@ -43,17 +43,17 @@ class Quarter(Strict):
     spin_inertia: float = quantity("kg m^2", "of the wheel about its axle")
 
     @model_validator(mode="after")
-    def _holds_its_wheel(self) -> "Quarter":
+    def _holds_its_wheel(self) -> "QuarterVehicle":
         least_mass = self.spin_inertia / self.radius**2
         if self.mass <= least_mass:
             raise ValueError(f"mass must be above {least_mass:.4g} kg: J / r^2 of the wheel, which cannot be lighter")
         return self
 
     @property
-    def plane(self) -> Plane:
-        """The quarter vehicle as a ``Plane`` for compiled functions: one unit with one wheel at its centre."""
+    def plane(self) -> PlaneVehicle:
+        """The quarter vehicle as a ``PlaneVehicle`` for compiled functions: one unit with one wheel at its centre."""
         zeros, unit = np.zeros(1, dtype=np.int64), np.ones(1)
-        return Plane(
+        return PlaneVehicle(
             self.mass * unit,
             unit,
             np.zeros((1, 1)),
@@ -68,9 +68,9 @@ class Quarter(Strict):
             0,
         )
 
-    def steady_torque(self, slip: float, force: float) -> float:
+    def steady_torque(self, slip: float, tyre_force: float) -> float:
         """Brake torque (N m) that keeps a slip constant while the tyre gives a longitudinal force (N)."""
-        return force * (self.radius + self.spin_inertia * (1.0 - slip) / (self.mass * self.radius))
+        return tyre_force * (self.radius + self.spin_inertia * (1.0 - slip) / (self.mass * self.radius))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,49 +96,58 @@ class QuarterStop:
 
 
 @njit(cache=True, error_model="numpy")
-def march(motion, torques, step, vehicle, path):
-    """Advance one wheel's ``motion`` in steps (s) under torques (n + 1, 1) in N m at the steps' ends; see ``advance``.
+def march_quarter_vehicle(wheel_motion, brake_torques, time_step, vehicle, quarter_path):
+    """Advance one wheel's ``wheel_motion`` in steps (s) under torques (n + 1, 1) in N m at the steps' ends; see
+    ``advance``.
 
     path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
     loads were not found; a vehicle that rests is left to its torques like one that moves.
     """
-    rest_step, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
-    for n in range(torques.shape[0] - 1):
-        under_wheels(motion.state, step, vehicle, surfaces)
-        used = step_on(motion, torques[n : n + 2], step, straight, LEAST_SLIP_SPEED, vehicle, surfaces)
+    rest_step, straight, surfaces = -1, np.zeros(1), surfaces_of_rows(np.empty((4, 1)))
+    for n in range(brake_torques.shape[0] - 1):
+        fill_surfaces_under_wheels(wheel_motion.state, time_step, vehicle, surfaces)
+        used = advance_one_step(
+            wheel_motion, brake_torques[n : n + 2], time_step, straight, LEAST_SLIP_ANGLE_SPEED, vehicle, surfaces
+        )
         if used < 0.0:
             return -2
-        if used < step and rest_step < 0:
+        if used < time_step and rest_step < 0:
             rest_step = n + 1
-        path.time[n + 1], path.position[n + 1] = path.time[n] + step, motion.state[0, 0]
-        path.speed[n + 1], path.turning[n + 1] = motion.state[1, 0], motion.turning[0]
-        path.locked[n + 1] = report_of(motion.report).locked[0] if used == step else 0.0
+        quarter_path.time[n + 1], quarter_path.position[n + 1] = (
+            quarter_path.time[n] + time_step,
+            wheel_motion.state[0, 0],
+        )
+        quarter_path.speed[n + 1], quarter_path.turning[n + 1] = wheel_motion.state[1, 0], wheel_motion.turning[0]
+        quarter_path.locked[n + 1] = report_of(wheel_motion.report).locked[0] if used == time_step else 0.0
     return rest_step
 
 
-def braked(
-    quarter: Quarter,
-    tyres: Tables,
-    road: Road,
-    torques: np.ndarray,
-    step: float,
-    speed: float,
-    rim_turning: float | None = None,
+def stop_of_quarter_vehicle(
+    quarter_vehicle: QuarterVehicle,
+    tyre_tables: Tables,
+    road: RoadSurfaces,
+    brake_torques: np.ndarray,
+    time_step: float,
+    start_speed: float,
+    start_spin_speed: float | None = None,
 ) -> QuarterStop:
     """Straight braking of a quarter vehicle from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s),
     linear between.
 
-    rim_turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
+    start_spin_speed : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no
+    number.
     """
-    if not (np.isfinite(torques).all() and (torques >= 0.0).all()):
-        raise InputError("", "torques", float(np.min(torques)), "must be numbers from 0 on: a brake opposes turning")
-    state, path = np.zeros((2, 3)), QuarterPath(*np.zeros((5, torques.size)))
-    state[1, 0] = speed
-    spin = np.array([speed / quarter.radius if rim_turning is None else rim_turning])
-    path.speed[0], path.turning[0] = speed, spin[0]
-    vehicle = OnRoad(quarter.plane, np.zeros(1, dtype=np.int64), 0.0, tyres, road)
-    ends = np.ascontiguousarray(torques, dtype=float)[:, None]
-    rest_step = march(motion_of(state, spin), ends, step, vehicle, path)
+    if not (np.isfinite(brake_torques).all() and (brake_torques >= 0.0).all()):
+        raise InputError(
+            "", "torques", float(np.min(brake_torques)), "must be numbers from 0 on: a brake opposes turning"
+        )
+    state, path = np.zeros((2, 3)), QuarterPath(*np.zeros((5, brake_torques.size)))
+    state[1, 0] = start_speed
+    spin = np.array([start_speed / quarter_vehicle.radius if start_spin_speed is None else start_spin_speed])
+    path.speed[0], path.turning[0] = start_speed, spin[0]
+    vehicle = VehicleOnRoad(quarter_vehicle.plane, np.zeros(1, dtype=np.int64), 0.0, tyre_tables, road)
+    ends = np.ascontiguousarray(brake_torques, dtype=float)[:, None]
+    rest_step = march_quarter_vehicle(motion_of(state, spin), ends, time_step, vehicle, path)
     if rest_step == -2 or not all(np.isfinite(path_array).all() for path_array in path):
         raise RunFailed("braking", "no loads were found", float(path.time.max()))
     return QuarterStop(path, rest_step)

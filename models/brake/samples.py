@@ -16,14 +16,14 @@ from numba import types
 from numba.experimental import structref
 
 from models.brake.advance import AT_REST, FINE, advance
-from models.brake.brake import Brakes
+from models.brake.brake import WheelBrakes
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_step import copy_row
-from models.brake.pressure import Air, Chambers, by_pressures, by_valves
+from models.brake.pressure import AirState, BrakeChambers, advance_by_pressures, advance_by_valves
 from models.machine.compiled import inlined, named_closure, njit
 
 
-class Row(NamedTuple):
+class RecordedRow(NamedTuple):
     """A recorded row of a braking run and its fields, which are views of the row.
 
     time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (7, W):
@@ -43,43 +43,43 @@ class Row(NamedTuple):
         return PlaneMotion(self.state, self.turning, accelerations, self.report)
 
 
-def row(coordinates: int, wheels: int) -> Row:
-    """A ``Row`` of zeros for these numbers of coordinates and wheels."""
-    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORT_SIZE, wheels))
+def empty_row(coordinate_count: int, wheel_count: int) -> RecordedRow:
+    """A ``RecordedRow`` of zeros for these numbers of coordinates and wheels."""
+    shapes = ((1,), (2, coordinate_count), *((wheel_count,),) * 3, (REPORT_SIZE, wheel_count))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     block = np.zeros(ends[-1])
     columns = np.split(block, ends[:-1])
-    return Row(block, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
+    return RecordedRow(block, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
 
 
-def parts(rows: list[np.ndarray], like: Row) -> Row:
-    """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``like``: every field has an additional
-    first axis, over the rows.
+def rows_in_one(row_blocks: list[np.ndarray], layout_row: RecordedRow) -> RecordedRow:
+    """``RecordedRow`` whose fields hold many rows each, from blocks of rows laid out as ``layout_row``: every field has
+    an additional first axis, over the rows.
     """
-    ends = np.cumsum([field.size for field in like[1:]])
-    block = np.concatenate(rows)
+    ends = np.cumsum([field.size for field in layout_row[1:]])
+    block = np.concatenate(row_blocks)
     columns = np.split(block, ends[:-1], axis=1)
-    return Row(
+    return RecordedRow(
         block,
         *(
             np.ascontiguousarray(column).reshape(-1, *field.shape)
-            for column, field in zip(columns, like[1:], strict=True)
+            for column, field in zip(columns, layout_row[1:], strict=True)
         ),
     )
 
 
-class Commands(NamedTuple):
-    """Commands that stay constant over the next ``samples`` (1,) samples: states of the valves (W,), pressures (W,) in
-    bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad.
+class BrakeCommands(NamedTuple):
+    """Commands that stay constant over the next ``sample_generator`` (1,) samples: states of the valves (W,), pressures
+    (W,) in bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad.
     """
 
-    samples: np.ndarray
+    sample_generator: np.ndarray
     valves: np.ndarray
     pressures: np.ndarray
     steer: np.ndarray
 
 
-class Record(NamedTuple):
+class SampleRecord(NamedTuple):
     """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
     states at earlier samples, of which the first ``left`` (1,) are filled and not yet collected; until (s): the run
     ends with the first sample that ends then or later.
@@ -91,62 +91,62 @@ class Record(NamedTuple):
     until: float
 
 
-class Braking(NamedTuple):
+class BrakeSystem(NamedTuple):
     """Brakes and their pressures; torques (n + 1, W) in N m: at the ends of the n steps of a sample."""
 
-    air: Air
-    chambers: Chambers
-    brakes: Brakes
+    air: AirState
+    chambers: BrakeChambers
+    brakes: WheelBrakes
     torques: np.ndarray
 
 
-class Subject(NamedTuple):
+class BrakingRun(NamedTuple):
     """All data of a braking run that its samples need; sample : duration (s); others: further arguments of ``advance``,
     after the steer angles.
     """
 
-    commands: Commands
-    record: Record
+    commands: BrakeCommands
+    record: SampleRecord
     sample: float
-    braking: Braking
+    braking: BrakeSystem
     motion: PlaneMotion
     others: tuple[Any, ...]
 
 
 @structref.register
-class ReferenceType(types.StructRef):
-    """Type of a ``Reference`` for the compiler numba."""
+class BrakingRunReferenceType(types.StructRef):
+    """Type of a ``BrakingRunReference`` for the compiler numba."""
 
 
-class Reference(structref.StructRefProxy):
-    """A ``Subject`` that compiled code refers to by its address."""
+class BrakingRunReference(structref.StructRefProxy):
+    """A ``BrakingRun`` that compiled code refers to by its address."""
 
 
-structref.define_proxy(Reference, ReferenceType, Subject._fields)
+structref.define_proxy(BrakingRunReference, BrakingRunReferenceType, BrakingRun._fields)
 
 
 @njit(cache=True, error_model="numpy")
-def by_reference(commands, record, sample, braking, motion, vehicle_parts):
-    """``Reference`` to the fields of a ``Subject``."""
-    return Reference(commands, record, sample, braking, motion, vehicle_parts)
+def reference_to_run(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts):
+    """``BrakingRunReference`` to the fields of a ``BrakingRun``."""
+    return BrakingRunReference(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts)
 
 
 go: Callable[..., Any] = advance
-"""Placeholder of the function that advances the vehicle by a sample; ``moved`` replaces it."""
+"""Placeholder of the function that advances the vehicle by a sample; ``samples_with_step`` replaces it."""
 
 
-def some_samples(commands, record, sample, braking, motion, simulated_time, vehicle_parts):
+def advance_some_samples(commands, record, sampling_period, braking, vehicle_motion, simulated_time, vehicle_parts):
     """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends; ``go``
     advances each sample. Returns the status of the last sample, and the time (s).
     """
     air, chambers, brakes, torques = braking
-    status, step = FINE, sample / (torques.shape[0] - 1)
+    status, step = FINE, sampling_period / (torques.shape[0] - 1)
     for _ in range(commands.samples[0]):
         if math.isnan(commands.pressures[0]):
-            by_valves(commands.valves, sample, air, chambers, brakes, torques)
+            advance_by_valves(commands.valves, sampling_period, air, chambers, brakes, torques)
         else:
-            by_pressures(commands.pressures, air, brakes, torques)
-        status, used = go(motion, torques, step, commands.steer, *vehicle_parts)
+            advance_by_pressures(commands.pressures, air, brakes, torques)
+        status, used = go(vehicle_motion, torques, step, commands.steer, *vehicle_parts)
         simulated_time += used
         if status not in (FINE, AT_REST):
             break
@@ -158,71 +158,75 @@ def some_samples(commands, record, sample, braking, motion, simulated_time, vehi
     return status, simulated_time
 
 
-some: Callable[..., Any] = some_samples
-"""Placeholder of the function that advances the vehicle by some samples; ``moved`` replaces it."""
+some: Callable[..., Any] = advance_some_samples
+"""Placeholder of the function that advances the vehicle by some samples; ``samples_with_step`` replaces it."""
 
 
-def samples(subject):
-    """Generator that advances the vehicle of a ``Subject`` or a ``Reference`` by ``some_samples``.
+def sample_generator(braking_run):
+    """Generator that advances the vehicle of a ``BrakingRun`` or a ``BrakingRunReference`` by ``advance_some_samples``.
 
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
     (m/s) and the supply (bar).
     """
     status, simulated_time = FINE, 0.0
     while True:
-        rates = subject.motion.state[1]
-        yield status, simulated_time, math.hypot(rates[0], rates[1]), subject.braking.air.supply[0]
+        rates = braking_run.motion.state[1]
+        yield status, simulated_time, math.hypot(rates[0], rates[1]), braking_run.braking.air.supply[0]
         status, simulated_time = some(
-            subject.commands,
-            subject.record,
-            subject.sample,
-            subject.braking,
-            subject.motion,
+            braking_run.commands,
+            braking_run.record,
+            braking_run.sample,
+            braking_run.braking,
+            braking_run.motion,
             simulated_time,
-            subject.others,
+            braking_run.others,
         )
 
 
-def _with_globals(function: Callable[..., Any], **replacements: Any) -> Callable[..., Any]:
+def _function_with_globals(plain_function: Callable[..., Any], **new_globals: Any) -> Callable[..., Any]:
     """A copy of the function with other globals and without closure cells. numba identifies functions by the contents
     of these cells, which differ between processes if they hold compiled functions."""
-    return FunctionType(function.__code__, globals() | replacements, function.__name__)
+    return FunctionType(plain_function.__code__, globals() | new_globals, plain_function.__name__)
 
 
 MoveSamples = Callable[..., Iterator[tuple[int, float, float, float]]]
-"""Type of a function that begins the generator ``samples``, from commands, record, sample, braking, motion and all
-others of a ``Subject``.
+"""Type of a function that begins the generator ``sample_generator``, from commands, record, sample, braking, motion and
+all others of a ``BrakingRun``.
 """
 
 
-def moved(step_function: Callable[..., Any]) -> MoveSamples:
-    """Generator function ``samples`` that advances its vehicle by the given ``step_function``."""
-    march = _with_globals(samples, some=_with_globals(some_samples, go=step_function))
+def samples_with_step(step_function: Callable[..., Any]) -> MoveSamples:
+    """Generator function ``sample_generator`` that advances its vehicle by the given ``step_function``."""
+    march = _function_with_globals(
+        sample_generator, some=_function_with_globals(advance_some_samples, go=step_function)
+    )
 
-    def begun(commands, record, sample, braking, motion, *vehicle_parts):
-        return march(Subject(commands, record, sample, braking, motion, vehicle_parts))
+    def begun(commands, record, sampling_period, braking, vehicle_motion, *vehicle_parts):
+        return march(BrakingRun(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts))
 
     return begun
 
 
 @dataclass(frozen=True)
 class CompiledSamples:
-    """Compiled version of the generator ``samples``; march takes a ``Reference``."""
+    """Compiled version of the generator ``sample_generator``; march takes a ``BrakingRunReference``."""
 
-    march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
+    march: Callable[[BrakingRunReference], Iterator[tuple[int, float, float, float]]]
 
-    def __call__(self, commands, record, sample, braking, motion, *vehicle_parts):
-        """Generator of ``samples``, from the fields of a ``Subject``."""
-        return self.march(by_reference(commands, record, sample, braking, motion, vehicle_parts))
+    def __call__(self, commands, record, sampling_period, braking, vehicle_motion, *vehicle_parts):
+        """Generator of ``sample_generator``, from the fields of a ``BrakingRun``."""
+        return self.march(reference_to_run(commands, record, sampling_period, braking, vehicle_motion, vehicle_parts))
 
 
-def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
+def compiled_samples(step_function: Callable[..., Any], cache_name: str) -> CompiledSamples:
     """Compiled samples that advance the vehicle by a compiled step function."""
-    compiled_some = inlined(named_closure(_with_globals(some_samples, go=step_function), name))
+    compiled_some = inlined(named_closure(_function_with_globals(advance_some_samples, go=step_function), cache_name))
     return CompiledSamples(
-        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), name))
+        njit(cache=True, error_model="numpy")(
+            named_closure(_function_with_globals(sample_generator, some=compiled_some), cache_name)
+        )
     )
 
 
-by_steps = compiled(advance, "by_steps")
+compiled_plane_samples = compiled_samples(advance, "by_steps")
 """Compiled samples of the vehicle in the plane with the step function ``advance``."""

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.brake.plane_vehicle import Axle, Plane, Truck, plane_of_truck
+from models.brake.plane_vehicle import PlaneVehicle, Truck, TruckAxle, plane_of_truck
 from models.core.errors import InputError
 from models.multibody.numbers import Handling, Tyres
 from models.vehicles.free_vehicle import CARRIER, SWAY, spinning
@@ -23,9 +23,9 @@ from models.vehicles.spatial import Body, Freedom, SpatialVehicle, Tyre, Vector,
 
 ROLL, PITCH = 4, 5
 """Indices of the chassis' roll and pitch among the coordinates."""
-FOLD = math.pi / 2.0
+LARGEST_HINGE_ANGLE = math.pi / 2.0
 """Yaw angle (rad) of a towed body relative to what tows it, beyond which a train jackknifes."""
-MOST_WHEELS = 8
+WHEEL_LIMIT = 8
 """Largest number of wheels of a train: a controller's frame has room for as many."""
 LEADING_COORDINATES: tuple[tuple[str, Freedom], ...] = (
     (CARRIER, "x"),
@@ -38,7 +38,7 @@ LEADING_COORDINATES: tuple[tuple[str, Freedom], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class Sprung:
+class SprungVehicle:
     """A vehicle on its suspension as engines build it, and the plane vehicle with the same mass, axles and wheels,
     without trailers.
 
@@ -80,16 +80,16 @@ class Sprung:
             [known.index(coordinate) for coordinate in hitch_coordinates if coordinate in known], dtype=np.int64
         )
 
-    def in_plane(self, with_load_transfer: bool = True) -> Plane:
-        """``Plane`` of the vehicle with its trailers and wheels. In a train, loads are the static ones that its springs
-        carry.
+    def in_plane(self, with_load_transfer: bool = True) -> PlaneVehicle:
+        """``PlaneVehicle`` of the vehicle with its trailers and wheels. In a train, loads are the static ones that its
+        springs carry.
 
         Each hitch is taken to lie in the middle plane of the towing unit.
         """
         plane, free = plane_of_truck(self.plane, with_load_transfer), self.handling.vehicle
         if not free.towed:
             return plane
-        units = [_unit(free, name) for name in (None, *free.towed)]
+        units = [_unit_inertia_and_position(free, name) for name in (None, *free.towed)]
         masses, inertias, centres = (np.array(column) for column in zip(*units, strict=True))
         unit_names = [free.towed_under(tyre.body) for tyre in free.tyres]
         unit = np.array([0 if name is None else 1 + free.towed.index(name) for name in unit_names])
@@ -108,27 +108,27 @@ class Sprung:
             static=np.array([self.handling.held.tyres[tyre.name] for tyre in free.tyres]),
             by_x=zeros,
             by_y=zeros.copy(),
-            jackknife_angle=FOLD,
+            jackknife_angle=LARGEST_HINGE_ANGLE,
             units=np.arange(len(units)),
         )
 
 
-def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """Distances ``reach`` (U, U) of ``Plane``, m, from the hitches' positions (U - 1,) and the units' centres (U,),
-    both ahead of the vehicle's centre.
+def _hitch_reach(hitch_positions: np.ndarray, unit_centres: np.ndarray) -> np.ndarray:
+    """Distances ``reach`` (U, U) of ``PlaneVehicle``, m, from the hitches' positions (U - 1,) and the units' centres
+    (U,), both ahead of the vehicle's centre.
     """
-    reach = np.zeros((centres.size, centres.size))
-    for k in range(1, centres.size):
-        reach[k:, k - 1] = hitches[k - 1] - (hitches[k - 2] if k > 1 else centres[0])
-        reach[k, k] = centres[k] - hitches[k - 1]
+    reach = np.zeros((unit_centres.size, unit_centres.size))
+    for k in range(1, unit_centres.size):
+        reach[k:, k - 1] = hitch_positions[k - 1] - (hitch_positions[k - 2] if k > 1 else unit_centres[0])
+        reach[k, k] = unit_centres[k] - hitch_positions[k - 1]
     return reach
 
 
-def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
+def _unit_inertia_and_position(vehicle: SpatialVehicle, towed_body: str | None) -> tuple[float, float, float]:
     """Mass (kg), yaw inertia (kg m^2) and position ahead (m) of a unit's centre of mass. The unit is a towed body with
     all that it carries, or the vehicle without its trailers.
     """
-    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
+    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed_body]
     masses, positions = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
     x, y, _ = masses @ positions / masses.sum()
     return float(masses.sum()), _yaw_inertia(bodies, float(x), float(y)), float(x)
@@ -142,23 +142,26 @@ def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
 
 
 def suspended_vehicle(
-    vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
-) -> Sprung:
+    vehicle: SpatialVehicle,
+    spin_inertia: float,
+    front_roll_share: float = 0.5,
+    trailer_spring_code: Literal["native", "compiled"] = "native",
+) -> SprungVehicle:
     """A two-axle vehicle with two wheels per axle, and its trailers, on its suspension; spin_inertia (kg m^2): for
     wheels whose tyres name no inertia.
 
-    front : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs determine
-    it; forces : who computes the trailers' springs, see ``Handling``. Raises InputError for a vehicle with other axles,
-    with trailers that do not form a row, or without steering.
+    front_roll_share : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs
+    determine it; trailer_spring_code : who computes the trailers' springs, see ``Handling``. Raises InputError for a
+    vehicle with other axles, with trailers that do not form a row, or without steering.
     """
     tyres = _tyres_by_axle(vehicle)
-    _check_row(vehicle)
+    _check_trailer_row(vehicle)
     inertias = _wheel_inertias(vehicle.name, tyres, spin_inertia)
     centred = _displaced_vehicle(replace(vehicle, tyres=tuple(tyres)), -centre_of_mass(vehicle))
-    handling = Handling(centred, Tyres(spin_inertia=0.0), forces=forces)
+    handling = Handling(centred, Tyres(spin_inertia=0.0), forces=trailer_spring_code)
     if handling.vehicle.coordinates()[: len(LEADING_COORDINATES)] != LEADING_COORDINATES:
         raise ValueError("the carrier and the sway are not the first bodies")
-    return Sprung(handling, _plane_truck(centred, inertias, front), tuple(inertias))
+    return SprungVehicle(handling, _plane_truck(centred, inertias, front_roll_share), tuple(inertias))
 
 
 def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
@@ -178,13 +181,13 @@ def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
         raise InputError(vehicle.name, "tyres", names, f"must be two of each of two axles{of_towed}")
     if not all(on_front_unit[:4]):
         raise InputError(vehicle.name, "axles", names, "must be first those of the vehicle, then those of what it tows")
-    if len(tyres) > MOST_WHEELS:
-        allowed = f"must be at most {MOST_WHEELS} of a braked train on its suspension"
+    if len(tyres) > WHEEL_LIMIT:
+        allowed = f"must be at most {WHEEL_LIMIT} of a braked train on its suspension"
         raise InputError(vehicle.name, "tyres", names, allowed)
     return tyres
 
 
-def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
+def _wheel_inertias(vehicle_name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
     """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
     equal.
     """
@@ -192,11 +195,11 @@ def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[f
     for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
         if not inertia > 0.0 or inertia != inertias[number ^ 1]:
             allowed = "kg m^2 of its spin must be above 0, and the same for both wheels of its axle"
-            raise InputError(name, f"tyres[{tyre.name}]", inertia, allowed)
+            raise InputError(vehicle_name, f"tyres[{tyre.name}]", inertia, allowed)
     return inertias
 
 
-def _check_row(vehicle: SpatialVehicle) -> None:
+def _check_trailer_row(vehicle: SpatialVehicle) -> None:
     """Refuse trailers that are not coupled one behind the other, or have a coupling without yaw."""
     carrier: str | None = None
     for name in vehicle.towed:
@@ -210,14 +213,14 @@ def _check_row(vehicle: SpatialVehicle) -> None:
         carrier = name
 
 
-def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
+def bodies_without_trailer(vehicle: SpatialVehicle) -> list[Body]:
     """Bodies of the vehicle without the bodies that it tows."""
     return [body for body in vehicle.bodies if vehicle.towed_under(body.name) is None]
 
 
 def centre_of_mass(vehicle: SpatialVehicle) -> np.ndarray:
     """Centre of mass (3,) in m, in the design position, of a vehicle without its trailers."""
-    bodies = without_trailer(vehicle)
+    bodies = bodies_without_trailer(vehicle)
     masses = np.array([body.mass for body in bodies])
     return masses @ np.array([body.position for body in bodies]) / masses.sum()
 
@@ -226,11 +229,11 @@ POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_le
 """Names of the fields that hold positions of a vehicle's parts."""
 
 
-def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
-    """The vehicle with all positions shifted by ``distance`` (m) along and across, on the ground."""
+def _displaced_vehicle(vehicle: SpatialVehicle, displacement: np.ndarray) -> SpatialVehicle:
+    """The vehicle with all positions shifted by ``displacement`` (m) along and across, on the ground."""
 
-    def moved_position(element: Any, name: str) -> Vector:
-        x, y, z = np.add(getattr(element, name), (distance[0], distance[1], 0.0))
+    def moved_position(vehicle_element: Any, field_name: str) -> Vector:
+        x, y, z = np.add(getattr(vehicle_element, field_name), (displacement[0], displacement[1], 0.0))
         return float(x), float(y), float(z)
 
     parts: dict[str, Any] = {
@@ -242,16 +245,16 @@ def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> Spatial
         )
         for kind in ("bodies", "springs", "tyres", "bars", "side_forces")
     }
-    return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
+    return replace(vehicle, **parts, axles=tuple(float(x + displacement[0]) for x in vehicle.axles))
 
 
-def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
+def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front_roll_share: float) -> Truck:
     """``Truck`` in the plane of a vehicle centred at its mass centre, without trailers; spin_inertias (kg m^2): of its
     wheels.
     """
-    bodies = without_trailer(vehicle)
+    bodies = bodies_without_trailer(vehicle)
     front_axle, rear_axle = (
-        Axle(
+        TruckAxle(
             x=left.point[0],
             track=left.point[1] - right.point[1],
             radius=left.point[2],
@@ -259,7 +262,11 @@ def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front:
             roll_share=share,
         )
         for left, right, inertia, share in zip(
-            vehicle.tyres[:4:2], vehicle.tyres[1:4:2], spin_inertias[:4:2], (front, 1.0 - front), strict=True
+            vehicle.tyres[:4:2],
+            vehicle.tyres[1:4:2],
+            spin_inertias[:4:2],
+            (front_roll_share, 1.0 - front_roll_share),
+            strict=True,
         )
     )
     return Truck(

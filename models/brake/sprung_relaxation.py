@@ -24,11 +24,13 @@ class ContactLag(NamedTuple):
 
 
 @lean
-def relax(contacts, half, slope, lag, surfaces):
+def advance_contact_lag(wheel_contacts, half_step, cornering_coefficient, contact_lag, surfaces):
     """Advance a ``ContactLag`` to half a step (s) after the motion in ``Contacts``; put its slip angles into the
     ``Surfaces``.
     """
-    time = lag.behind[0] + half
-    for i in range(lag.angle.size):
-        advance_lagging_slip(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)
-    lag.behind[0] = half
+    time = contact_lag.behind[0] + half_step
+    for i in range(contact_lag.angle.size):
+        advance_lagging_slip(
+            i, wheel_contacts.along[i], wheel_contacts.across[i], time, cornering_coefficient, contact_lag, surfaces.lag
+        )
+    contact_lag.behind[0] = half_step

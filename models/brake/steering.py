@@ -10,7 +10,7 @@ REACHED_SHARE, HALF_SHARE = 0.9, 0.5
 """Share of the steady yaw rate at which the response time ends, and share of the final steer angle at which it
 begins.
 """
-STEADY_RANGE = 0.05
+STEADY_YAW_RATE_RANGE = 0.05
 """Largest ratio of a yaw rate's range to its mean at which it counts as steady."""
 
 
@@ -51,16 +51,18 @@ class YawResponse:
     steady_rate: float
 
 
-def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
+def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half_angle_time: float) -> YawResponse | None:
     """Response to a step of steering, from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not
     steady.
 
-    half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
-    vehicles); not checked against the text of the standard.
+    half_angle_time : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793
+    (heavy vehicles); not checked against the text of the standard.
     """
     end = yaw_rates[times >= times[-1] - 1.0]
     steady = float(end.mean())
-    if np.ptp(end) > STEADY_RANGE * abs(steady) or steady == 0.0:
+    if np.ptp(end) > STEADY_YAW_RATE_RANGE * abs(steady) or steady == 0.0:
         return None
     share = yaw_rates / steady
-    return YawResponse(crossing_time(times, -share, -REACHED_SHARE) - half, float(max(share.max() - 1.0, 0.0)), steady)
+    return YawResponse(
+        crossing_time(times, -share, -REACHED_SHARE) - half_angle_time, float(max(share.max() - 1.0, 0.0)), steady
+    )

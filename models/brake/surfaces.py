@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.plane_chain import ChainPoint, chain_point_place, velocity
-from models.brake.plane_vehicle import Plane
+from models.brake.plane_chain import ChainPoint, chain_point_position, chain_point_velocity
+from models.brake.plane_vehicle import PlaneVehicle
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean
 from models.tyre.tyre_table import Tables
 
 
-class Road(NamedTuple):
+class RoadSurfaces(NamedTuple):
     """Stretches of a road with their surfaces, for compiled functions.
 
     starts (n,): x in m at which each stretch begins, the first at minus infinity; left, right (n,): numbers of their
@@ -27,21 +27,21 @@ class Road(NamedTuple):
     kinds: int
 
 
-class OnRoad(NamedTuple):
+class VehicleOnRoad(NamedTuple):
     """A vehicle in the plane with its tyres and road: all data that stay constant during a run.
 
     kind (W,): which of the road's kinds of tyre each wheel has; slope: largest cornering coefficient of the tables
     (1/rad); tables: surface by surface and kind by kind.
     """
 
-    plane: Plane
+    plane: PlaneVehicle
     kind: np.ndarray
     slope: float
     tables: Tables
-    road: Road
+    road_of_stretches: RoadSurfaces
 
 
-class Surfaces(NamedTuple):
+class WheelSurfaces(NamedTuple):
     """Surface under each wheel, arrays (W,): indices of two tyre tables, and the share of the second; lag: tan of the
     slip angle that lags behind the motion of the wheel, NaN for a tyre without lag.
     """
@@ -52,20 +52,22 @@ class Surfaces(NamedTuple):
     lag: np.ndarray
 
 
-def surfaces(wheels: int) -> Surfaces:
-    """``Surfaces`` for this number of wheels, with the first table under each and without lag of the tyres."""
-    return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
+def new_wheel_surfaces(wheel_count: int) -> WheelSurfaces:
+    """``WheelSurfaces`` for this number of wheels, with the first table under each and without lag of the tyres."""
+    return WheelSurfaces(
+        np.zeros(wheel_count), np.zeros(wheel_count), np.zeros(wheel_count), np.full(wheel_count, math.nan)
+    )
 
 
 @inlined
-def surfaces_of(rows):
-    """``Surfaces`` as views of rows (4, W); for compiled functions only, as Python would free the rows twice."""
+def surfaces_of_rows(rows):
+    """``WheelSurfaces`` as views of rows (4, W); for compiled functions only, as Python would free the rows twice."""
     rows[3, :] = math.nan
-    return Surfaces(rows[0], rows[1], rows[2], rows[3])
+    return WheelSurfaces(rows[0], rows[1], rows[2], rows[3])
 
 
 @dataclass(frozen=True)
-class Stretch:
+class RoadStretch:
     """A stretch of road that begins at x (m): indices of the surfaces left and right of the line."""
 
     x: float
@@ -73,7 +75,9 @@ class Stretch:
     right: int
 
 
-def road(stretches: list[Stretch], line: float = 0.0, kind_count: int = 1) -> Road:
+def road_of_stretches(
+    stretches: list[RoadStretch], dividing_line: float = 0.0, tyre_kind_count: int = 1
+) -> RoadSurfaces:
     """Road of stretches in ascending order of x; the first one also extends to minus infinity.
 
     Another level of friction on a stretch is a surface of its own, ``TyreTable.scaled``.
@@ -85,24 +89,25 @@ def road(stretches: list[Stretch], line: float = 0.0, kind_count: int = 1) -> Ro
     left, right = (np.array([getattr(s, side) for s in stretches], dtype=np.int64) for side in ("left", "right"))
     if min(left.min(), right.min()) < 0:
         raise InputError("", "stretches", int(min(left.min(), right.min())), "numbers of surfaces count from 0")
-    return Road(starts, left, right, line, kind_count)
+    return RoadSurfaces(starts, left, right, dividing_line, tyre_kind_count)
 
 
-UNIFORM_ROAD = road([Stretch(0.0, 0, 0)])
+UNIFORM_ROAD = road_of_stretches([RoadStretch(0.0, 0, 0)])
 """Road with the same surface everywhere."""
 
 
-def check_way(road: Road, distance: float) -> None:
+def check_step_distance(braking_road: RoadSurfaces, step_distance: float) -> None:
     """Refuse time steps in which a wheel may travel a distance (m) longer than the shortest inner stretch of the
     road.
     """
-    shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
-    if distance > shortest:
+    shortest = float(np.diff(braking_road.starts[1:]).min()) if braking_road.starts.size > 2 else np.inf
+    if step_distance > shortest:
         raise InputError(
             "",
             "stretches",
             shortest,
-            f"must be at least as long as the way in a step, {distance:.3g} m: take longer stretches or more substeps",
+            f"must be at least as long as the way in a step, {step_distance:.3g} m: "
+            "take longer stretches or more substeps",
         )
 
 
@@ -113,31 +118,31 @@ def is_uniform(road):
 
 
 @lean
-def under_wheels(state, step, vehicle, surfaces):
-    """Fill table indices and shares of the ``Surfaces`` under the wheels of an ``OnRoad`` for a step (s).
+def fill_surfaces_under_wheels(vehicle_state, time_step, vehicle_on_road, wheel_surfaces):
+    """Fill table indices and shares of the ``WheelSurfaces`` under the wheels of an ``VehicleOnRoad`` for a step (s).
 
-    state (2, 2 + U): positions and rates, by which wheels are taken to move over the step. Of two stretches that a
-    wheel passes in the step, or of the two sides of the line, each has the share of the way on it, forwards or
+    vehicle_state (2, 2 + U): positions and rates, by which wheels are taken to move over the step. Of two stretches
+    that a wheel passes in the step, or of the two sides of the line, each has the share of the way on it, forwards or
     backwards, so that no place of the road counts by how steps fall on it. A wheel that passes both in one step is on
     the side where it is in the middle of the step.
     """
-    plane, kind, road = vehicle.plane, vehicle.kind, vehicle.road
+    plane, kind, road = vehicle_on_road.plane, vehicle_on_road.kind, vehicle_on_road.road
     if is_uniform(road):
         for i in range(kind.size):
-            surfaces.first[i] = surfaces.second[i] = road.left[0] * road.kinds + kind[i]
-            surfaces.share[i] = 0.0
+            wheel_surfaces.first[i] = wheel_surfaces.second[i] = road.left[0] * road.kinds + kind[i]
+            wheel_surfaces.share[i] = 0.0
         return
     for i in range(plane.unit.size):
         centre = ChainPoint(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
-        px, py = chain_point_place(centre, state[0], plane.reach)
-        vx, vy = velocity(centre, state[0], state[1], plane.reach)
-        low, high = min(px, px + step * vx), max(px, px + step * vx)
-        right, left = min(py, py + step * vy), max(py, py + step * vy)
+        px, py = chain_point_position(centre, vehicle_state[0], plane.reach)
+        vx, vy = chain_point_velocity(centre, vehicle_state[0], vehicle_state[1], plane.reach)
+        low, high = min(px, px + time_step * vx), max(px, px + time_step * vx)
+        right, left = min(py, py + time_step * vy), max(py, py + time_step * vy)
         first_stretch = max(np.searchsorted(road.starts, low, side="right") - 1, 0)
         last_stretch = max(np.searchsorted(road.starts, high, side="right") - 1, 0)
         share = 0.0
         if last_stretch > first_stretch:
-            side = road.left if py + 0.5 * step * vy >= road.line else road.right
+            side = road.left if py + 0.5 * time_step * vy >= road.line else road.right
             first, second = side[first_stretch], side[last_stretch]
             share = (high - road.starts[last_stretch]) / (high - low)
         elif right < road.line <= left:
@@ -145,6 +150,6 @@ def under_wheels(state, step, vehicle, surfaces):
             share = (left - road.line) / (left - right)
         else:
             first = second = road.left[first_stretch] if right >= road.line else road.right[first_stretch]
-        surfaces.first[i] = first * road.kinds + kind[i]
-        surfaces.second[i] = second * road.kinds + kind[i]
-        surfaces.share[i] = share if first != second else 0.0
+        wheel_surfaces.first[i] = first * road.kinds + kind[i]
+        wheel_surfaces.second[i] = second * road.kinds + kind[i]
+        wheel_surfaces.share[i] = share if first != second else 0.0

@@ -12,11 +12,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from models.brake.plane_chain import fill_headings, inertia
+from models.brake.plane_chain import fill_headings, fill_mass_matrix
 from models.brake.plane_records import motion_of, report_of
-from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, plane_of_truck, wheels
-from models.brake.surfaces import UNIFORM_ROAD, OnRoad, surfaces_of, under_wheels
+from models.brake.plane_step import advance_one_step
+from models.brake.plane_vehicle import (
+    GRAVITY,
+    PlaneVehicle,
+    Truck,
+    TruckAxle,
+    check_wheels,
+    plane_of_truck,
+    wheel_fields_of_plane,
+)
+from models.brake.surfaces import UNIFORM_ROAD, VehicleOnRoad, fill_surfaces_under_wheels, surfaces_of_rows
 from models.core.errors import InputError
 from models.core.strict import quantity
 from models.machine.compiled import njit
@@ -39,31 +47,33 @@ class Trailer(Truck):
     )
 
 
-def plane_of_trailer(trailer: Trailer, with_load_transfer: bool = True) -> Plane:
-    """``Plane`` of a trailer whose hook has a prescribed motion; the hook's position is the first two coordinates."""
+def plane_of_trailer(trailer: Trailer, with_load_transfer: bool = True) -> PlaneVehicle:
+    """``PlaneVehicle`` of a trailer whose hook has a prescribed motion; the hook's position is the first two
+    coordinates.
+    """
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
     parts: list[Any] = [
         *_units_of_train(trailer),
         reach,
-        *_wheels(trailer, 0, with_load_transfer),
+        *_trailer_wheels(trailer, 0, with_load_transfer),
         1,
         trailer.fold,
         np.arange(2),
     ]
-    return Plane(*parts)
+    return PlaneVehicle(*parts)
 
 
-def plane_of_train(vehicle: Truck, trailer: Trailer, with_load_transfer: bool = True) -> Plane:
-    """``Plane`` of a truck with a drawbar trailer on its hook: eight wheels."""
-    truck_records, reach = plane_of_truck(vehicle, with_load_transfer), np.zeros((3, 3))
+def plane_of_train(truck: Truck, trailer: Trailer, with_load_transfer: bool = True) -> PlaneVehicle:
+    """``PlaneVehicle`` of a truck with a drawbar trailer on its hook: eight wheels."""
+    truck_records, reach = plane_of_truck(truck, with_load_transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units_of_train(trailer), strict=True))
     wheel_fields = (
         np.concatenate((a, b))
-        for a, b in zip(truck_records[3:11], _wheels(trailer, 1, with_load_transfer), strict=True)
+        for a, b in zip(truck_records[3:11], _trailer_wheels(trailer, 1, with_load_transfer), strict=True)
     )
     parts: list[Any] = [*units, reach, *wheel_fields, 0, trailer.fold, np.arange(3)]
-    return Plane(*parts)
+    return PlaneVehicle(*parts)
 
 
 def _units_of_train(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
@@ -71,19 +81,19 @@ def _units_of_train(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
     return (np.array([trailer.drawbar_mass, trailer.mass]), np.array([trailer.drawbar_inertia, trailer.yaw_inertia]))
 
 
-def _wheels(trailer: Trailer, first: int, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
-    """Unit and group of each wheel of a trailer, then the results of ``wheels``; the front wheels belong to the
-    drawbar, which is unit ``first``.
+def _trailer_wheels(trailer: Trailer, drawbar_unit: int, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
+    """Unit and group of each wheel of a trailer, then the results of ``wheel_fields_of_plane``; the front wheels belong
+    to the drawbar, which is unit ``drawbar_unit``.
     """
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
-    wheel_positions, radius, spin, static, by_x, by_y = wheels(trailer, with_load_transfer)
+    wheel_positions, radius, spin, static, by_x, by_y = wheel_fields_of_plane(trailer, with_load_transfer)
     wheel_positions[:2, 0] = 0.0
     static[:2] += trailer.drawbar_mass * GRAVITY / 2.0
-    unit = np.array([first, first, first + 1, first + 1])
-    return unit, np.full(4, first + 1), wheel_positions, radius, spin, static, by_x, by_y
+    unit = np.array([drawbar_unit, drawbar_unit, drawbar_unit + 1, drawbar_unit + 1])
+    return unit, np.full(4, drawbar_unit + 1), wheel_positions, radius, spin, static, by_x, by_y
 
 
-class Pull(NamedTuple):
+class HookPull(NamedTuple):
     """Motion of a trailer behind its hook: states (n + 1, 2, 2 + U), positions and rates at the steps' ends, and the
     mean forces (n, 2) in N on the hook from the vehicle, in the ground's axes.
     """
@@ -92,41 +102,71 @@ class Pull(NamedTuple):
     forces: np.ndarray
 
 
-def follow_hook(
-    plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float, torques: np.ndarray
-) -> Pull:
+def trailer_behind_hook(
+    plane_trailer: PlaneVehicle,
+    tyre_tables: Tables,
+    start_state: np.ndarray,
+    hook_velocities: np.ndarray,
+    time_step: float,
+    cornering_coefficient: float,
+    brake_torques: np.ndarray,
+) -> HookPull:
     """Motion of a trailer behind a hook with prescribed velocities (n + 1, 2) in m/s at the steps' ends; step (s).
 
-    state (2, 2 + U) : positions and rates at the start; slope : see ``OnRoad``; torques (W,) : of its brakes, N m.
-    Raises InputError.
+    start_state (2, 2 + U) : positions and rates at the start; cornering_coefficient : see ``VehicleOnRoad``;
+    brake_torques
+    (W,) : of its brakes, N m. Raises InputError.
     """
-    if not plane.has_prescribed_hook:
+    if not plane_trailer.has_prescribed_hook:
         raise InputError("", "plane", "no hook", "must be of a trailer whose hook is prescribed")
-    pull = Pull(np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2)))
-    turning = np.hypot(*state[1, :2]) / plane.radius
-    motion = motion_of(state.copy(), turning)
-    vehicle = OnRoad(plane, np.zeros(plane.wheels, dtype=np.int64), slope, tables, UNIFORM_ROAD)
-    constant = np.tile(np.asarray(torques, float), (2, 1))
-    if not _march_trailer(motion, np.ascontiguousarray(hook), step, constant, vehicle, pull):
+    pull = HookPull(np.empty((len(hook_velocities), *start_state.shape)), np.empty((len(hook_velocities) - 1, 2)))
+    turning = np.hypot(*start_state[1, :2]) / plane_trailer.radius
+    motion = motion_of(start_state.copy(), turning)
+    vehicle = VehicleOnRoad(
+        plane_trailer, np.zeros(plane_trailer.wheels, dtype=np.int64), cornering_coefficient, tyre_tables, UNIFORM_ROAD
+    )
+    constant = np.tile(np.asarray(brake_torques, float), (2, 1))
+    if not _march_trailer(motion, np.ascontiguousarray(hook_velocities), time_step, constant, vehicle, pull):
         raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")
     return pull
 
 
 @njit(cache=True, error_model="numpy")
-def _march_trailer(motion, hook, step, torques, vehicle, pull):
-    """Integrate the trailer's motion into ``pull``; returns whether wheel loads were solved in every step."""
-    plane, state, report, accelerations = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
-    size, straight, states, forces = accelerations.size, np.zeros(motion.turning.size), pull.states, pull.forces
+def _march_trailer(trailer_motion, hook_velocities, time_step, brake_torques, vehicle, hook_pull):
+    """Integrate the trailer's motion into ``hook_pull``; returns whether wheel loads were solved in every step."""
+    plane, state, report, accelerations = (
+        vehicle.plane,
+        trailer_motion.state,
+        report_of(trailer_motion.report),
+        trailer_motion.accelerations,
+    )
+    size, straight, states, forces = (
+        accelerations.size,
+        np.zeros(trailer_motion.turning.size),
+        hook_pull.states,
+        hook_pull.forces,
+    )
     mass, (right, row_along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
-    states[0], surfaces = state, surfaces_of(np.empty((4, motion.turning.size)))
-    under_wheels(state, step, vehicle, surfaces)
-    for n in range(hook.shape[0] - 1):
-        accelerations[:2] = (hook[n + 1] - hook[n]) / step
-        if step_on(motion, torques, step, straight, vehicle.slope * GRAVITY * step, vehicle, surfaces) < 0.0:
+    states[0], surfaces = state, surfaces_of_rows(np.empty((4, trailer_motion.turning.size)))
+    fill_surfaces_under_wheels(state, time_step, vehicle, surfaces)
+    for n in range(hook_velocities.shape[0] - 1):
+        accelerations[:2] = (hook_velocities[n + 1] - hook_velocities[n]) / time_step
+        if (
+            advance_one_step(
+                trailer_motion,
+                brake_torques,
+                time_step,
+                straight,
+                vehicle.slope * GRAVITY * time_step,
+                vehicle,
+                surfaces,
+            )
+            < 0.0
+        ):
             return False
         states[n + 1] = state
         fill_headings(0.5 * (states[n, 0] + state[0]), units)
-        inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, row_along, across)
+        fill_mass_matrix(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, row_along, across)
         forces[n] = (mass @ accelerations - right)[:2]
         for i in range(plane.unit.size):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])
@@ -144,7 +184,7 @@ CHOSEN_TRAILER = Trailer(
     drawbar_mass=700.0,
     drawbar_inertia=500.0,
     hook=-3.5,
-    front=Axle(x=2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
-    rear=Axle(x=-2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
+    front=TruckAxle(x=2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
+    rear=TruckAxle(x=-2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
 )
 """An unladen trailer of two axles behind the paper's truck. All of it is chosen: the paper prints no trailer data."""

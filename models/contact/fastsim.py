@@ -28,10 +28,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, nets, strips_of
+from models.contact.fastsim_grid import POWERS, BoundShape, FastsimGrid, count_of_strips, ellipse_grid, grids_of_ratios
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
 from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBILITIES, ellipse_forces
-from models.contact.fastsim_many import forces as march_all
+from models.contact.fastsim_many import fill_contact_forces as march_all
 from models.contact.fastsim_records import CONTACT, FORCES
 from models.contact.hertz import LEAST_AXIS
 from models.contact.inputs import (
@@ -39,20 +39,20 @@ from models.contact.inputs import (
     NEGLIGIBLE_BOUND,
     Array,
     broadcast_together,
-    creepages,
-    number,
-    quantity,
-    whole_number,
+    checked_creepages,
+    checked_number,
+    checked_quantity,
+    checked_whole_number,
 )
-from models.contact.linear_theory import flexibilities as linear_flexibilities
-from models.contact.material import Falling, MaterialPair
+from models.contact.linear_theory import fastsim_flexibilities as linear_flexibilities
+from models.contact.material import FallingFriction, MaterialPair
 from models.core.errors import InputError
 
-Flexibilities = Literal["blended", "one", "three"]
-March = Literal["second-order", "plain"]
-KINDS = {"blended": BLENDED, "one": ONE_FLEXIBILITY, "three": THREE_FLEXIBILITIES}
-MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
-FLEXIBILITIES = ("l1", "l2", "l3")
+FlexibilityChoice = Literal["blended", "one", "three"]
+MarchChoice = Literal["second-order", "plain"]
+FLEXIBILITY_KINDS = {"blended": BLENDED, "one": ONE_FLEXIBILITY, "three": THREE_FLEXIBILITIES}
+MARCH_KINDS = {"second-order": SECOND_ORDER, "plain": PLAIN}
+FLEXIBILITY_FIELDS = ("l1", "l2", "l3")
 """Names of the flexibilities among the fields of CONTACT."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
 
@@ -75,7 +75,7 @@ class RollingEllipse:
 
 
 @dataclass(frozen=True)
-class Creep:
+class CreepForces:
     """Creep forces on the wheel; every field has the common shape of the inputs.
 
     fx, fy : N. mz : N m, about the centre. stick : share of the area that sticks. dissipation : -(fx xi_x + fy xi_y +
@@ -97,11 +97,11 @@ def fastsim(
     material_pair: MaterialPair,
     *,
     cells: int = 21,
-    bound: Bound = "intermediate",
-    flexibilities: Flexibilities = "blended",
-    march: March = "second-order",
-    falling: Falling | None = None,
-) -> Creep:
+    bound: BoundShape = "intermediate",
+    flexibilities: FlexibilityChoice = "blended",
+    march: MarchChoice = "second-order",
+    falling: FallingFriction | None = None,
+) -> CreepForces:
     """Creep forces on one elliptic contact or on many, by FASTSIM.
 
     Parameters
@@ -114,26 +114,29 @@ def fastsim(
     ------
     InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
     """
-    check_choices(cells, bound, flexibilities, march, falling)
-    contacts, shape = contacts_of(ellipse, material_pair)
+    check_fastsim_choices(cells, bound, flexibilities, march, falling)
+    contacts, shape = contact_records(ellipse, material_pair)
     forces = np.zeros(len(contacts), FORCES)
-    for rows, net in nets(contacts["a"] / contacts["b"], cells, bound):
-        marched, net_forces = (contacts[rows], *net.records, KINDS[flexibilities]), np.zeros(rows.size, FORCES)
+    for rows, net in grids_of_ratios(contacts["a"] / contacts["b"], cells, bound):
+        marched, net_forces = (
+            (contacts[rows], *net.records, FLEXIBILITY_KINDS[flexibilities]),
+            np.zeros(rows.size, FORCES),
+        )
         if falling is None:
-            march_all(*marched, MARCHES[march], net_forces)
+            march_all(*marched, MARCH_KINDS[march], net_forces)
         else:
-            from models.contact.fastsim_falling import forces_falling
+            from models.contact.fastsim_falling import fill_forces_with_falling_friction
 
-            forces_falling(*marched, falling.law, net_forces)
+            fill_forces_with_falling_friction(*marched, falling.law, net_forces)
         forces[rows] = net_forces
     fx, fy, mz, stick = (forces[name] for name in ("fx", "fy", "mz", "stick"))
     along, across = fx * contacts["xi_x"], fy * contacts["xi_y"]
     lost = 0.0 - (along + across + mz * contacts["spin"])
     values = fx, fy, mz, stick, lost, np.abs(along) + np.abs(across)
-    return Creep(*(value.reshape(shape)[()] for value in values))
+    return CreepForces(*(value.reshape(shape)[()] for value in values))
 
 
-class Ellipse:
+class FastsimEllipse:
     """FASTSIM for ellipses of one axis ratio, as of a wheel on a rail; all that depends on the ratio alone is computed
     once.
 
@@ -143,21 +146,21 @@ class Ellipse:
 
     def __init__(
         self,
-        ratio: float,
+        axis_ratio: float,
         material_pair: MaterialPair,
         *,
         cells: int = 21,
-        bound: Bound = "intermediate",
-        flexibilities: Flexibilities = "blended",
-        march: March = "second-order",
+        bound: BoundShape = "intermediate",
+        flexibilities: FlexibilityChoice = "blended",
+        march: MarchChoice = "second-order",
     ) -> None:
-        check_choices(cells, bound, flexibilities, march)
-        self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
-        self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
+        check_fastsim_choices(cells, bound, flexibilities, march)
+        self.ratio = checked_number("ratio", axis_ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
+        self.net: FastsimGrid = ellipse_grid(cells, int(count_of_strips(np.array(self.ratio), cells)), bound)
         size = 1e-3
         flexible = linear_flexibilities(size, size / self.ratio, material_pair)
         unit = (1.0 / self.ratio, *(float(value) / size for value in flexible))
-        choices = self.net.middle, KINDS[flexibilities], MARCHES[march]
+        choices = self.net.middle, FLEXIBILITY_KINDS[flexibilities], MARCH_KINDS[march]
         self._fixed = unit, self.net.strips, self.net.cells, choices
 
     def __call__(
@@ -171,19 +174,21 @@ class Ellipse:
             forces = (math.nan,) * 3
         if not math.isfinite(forces[0] + forces[1] + forces[2]):
             for name, value in zip(("a", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
-                number(name, value, "finite")
-            contacts_of(RollingEllipse(a, a / self.ratio, load, mu, xi_x, xi_y, spin), MaterialPair())
+                checked_number(name, value, "finite")
+            contact_records(RollingEllipse(a, a / self.ratio, load, mu, xi_x, xi_y, spin), MaterialPair())
             raise InputError("", "a", a, "must be a semi-axis in m, above 0 where there is a load")
         return forces
 
 
-def check_choices(cells: int, bound: str, flexibilities: str, march: str, falling: Falling | None = None) -> None:
+def check_fastsim_choices(
+    cells: int, bound: str, flexibilities: str, march: str, falling: FallingFriction | None = None
+) -> None:
     """Raise InputError for an unknown option, or for falling friction with a march that does not support it."""
-    whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
+    checked_whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     for name, value, known in (
         ("bound", bound, tuple(POWERS)),
-        ("march", march, tuple(MARCHES)),
-        ("flexibilities", flexibilities, tuple(KINDS)),
+        ("march", march, tuple(MARCH_KINDS)),
+        ("flexibilities", flexibilities, tuple(FLEXIBILITY_KINDS)),
     ):
         if value not in known:
             raise InputError("", name, value, "is not known", known)
@@ -191,27 +196,27 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str, fallin
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 
 
-def contacts_of(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[Array, tuple[int, ...]]:
+def contact_records(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[Array, tuple[int, ...]]:
     """Inputs as records CONTACT (n,) for compiled functions, and their common shape. Contacts without load get
     semi-axes of 0.1 m.
     """
     axis = "a semi-axis in m, zero or more"
     given = broadcast_together(
-        a=quantity("a", ellipse.a, axis, 0.0),
-        b=quantity("b", ellipse.b, axis, 0.0),
-        load=quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD),
-        mu=quantity("mu", ellipse.mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
-        **creepages(ellipse.xi_x, ellipse.xi_y, ellipse.spin),
+        a=checked_quantity("a", ellipse.a, axis, 0.0),
+        b=checked_quantity("b", ellipse.b, axis, 0.0),
+        load=checked_quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD),
+        mu=checked_quantity("mu", ellipse.mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
+        **checked_creepages(ellipse.xi_x, ellipse.xi_y, ellipse.spin),
     )
     contacts = np.empty(given[0].size, CONTACT)
     for name, values in zip(("a", "b", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
         contacts[name] = values.ravel()
     loaded = contacts["load"] > NEGLIGIBLE_BOUND
     for name in ("a", "b"):
-        quantity(name, contacts[name][loaded], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
+        checked_quantity(name, contacts[name][loaded], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
         contacts[name][~loaded] = 0.1
     for name, value in zip(
-        FLEXIBILITIES, linear_flexibilities(contacts["a"], contacts["b"], material_pair), strict=True
+        FLEXIBILITY_FIELDS, linear_flexibilities(contacts["a"], contacts["b"], material_pair), strict=True
     ):
         contacts[name] = value
     return contacts, given[0].shape

@@ -12,7 +12,7 @@ and only strips side by side keep the processor busy meanwhile.
 
 import math
 
-from models.contact.fastsim_records import LANES
+from models.contact.fastsim_records import LANE_COUNT
 from models.machine.compiled import compiled, njit
 
 PLAIN, SECOND_ORDER = 0, 1
@@ -24,23 +24,23 @@ NEGLIGIBLE_SLIP = 1e-60
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def lateness(z):
+def turning_slip_point(step_exponent):
     """Point in a step at which a turning rigid slip is evaluated, in steps after the step's middle: a piecewise linear
     approximation, within 0.04, of coth(4 z)/2 - 1/(8 z).
 
     A traction that forgets as exp(-8 z) follows the slip at the end of a long step and at the middle of a short one;
     with it the step is right for a slip that turns evenly, however stiff. A concave function, so the least of lines.
     """
-    return min(min(0.5 * z, 0.12 + 0.2 * z), 0.47)
+    return min(min(0.5 * step_exponent, 0.12 + 0.2 * step_exponent), 0.47)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def advance(traction, slip, bound):
+def advance_traction(traction, slip, traction_bound):
     """Traction in the next cell by the second-order march, and 1 if the cell slips, else 0.
 
     traction : along x and y before, and whether it slips (1), being on the bound, or not (0); slip : rigid slip along x
-    and y in the middle of the step, as traction, and the change of the second over it; bound : in the next cell, where
-    the step starts, and 1 / 8 of 1 / bound in its middle
+    and y in the middle of the step, as traction, and the change of the second over it; traction_bound : in the next
+    cell, where the step starts, and 1 / 8 of 1 / bound in its middle
 
     While a strip slips, with rigid slip w and bound g constant over the step, the angle psi between traction and -w
     obeys psi' = -(|w| / g) sin psi, so tan(psi / 2) shrinks by exp(-|w| step / g). The half angle is kept as the sides
@@ -50,9 +50,9 @@ def advance(traction, slip, bound):
     """
     px, py, slips = traction
     u, v, turn = slip
-    g, before, rate = bound
+    g, before, rate = traction_bound
     x, y = px - u, py - v
-    v += turn * lateness((abs(u) + abs(v)) * rate)  # |w| well enough, without its root
+    v += turn * turning_slip_point((abs(u) + abs(v)) * rate)  # |w| well enough, without its root
     square, speed = x * x + y * y, u * u + v * v
     turns = slips * speed > NEGLIGIBLE_SLIP
     size = math.sqrt(speed if turns else square)
@@ -72,66 +72,66 @@ def advance(traction, slip, bound):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def cut_to_bound(x, y, g):
+def cut_to_bound(traction_x, traction_y, bound):
     """Traction (x, y), shortened to the bound g if it exceeds the bound, and 1 if it was shortened, else 0."""
-    size = math.sqrt(x * x + y * y)
-    sticks = size <= g
-    part = 1.0 if sticks else g / size
-    return part * x, part * y, 0.0 if sticks else 1.0
+    size = math.sqrt(traction_x * traction_x + traction_y * traction_y)
+    sticks = size <= bound
+    part = 1.0 if sticks else bound / size
+    return part * traction_x, part * traction_y, 0.0 if sticks else 1.0
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def march_second_order(block, cells):
+def march_second_order(strip_block, strip_cells):
     """March the strips of a BLOCK with half a first step and the exact rotation of a slipping traction; fills its sums
     and states.
     """
-    _clear_block(block)
-    for j in range(LANES):
-        u, v = block.u[j], block.v0[j] + block.v1[j] * cells.middle[0]
-        x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, cells.bound[0])
-        _store_traction(block, j, cells.centre[0], x, y, slips)
-    change = -2.0 / cells.centre.size
-    for i in range(1, cells.centre.size):
-        t, g, middle = cells.centre[i], cells.bound[i], cells.middle[i]
-        bound = g, cells.start_bound[i], cells.rate[i]
-        for j in range(LANES):
-            u, v1 = block.u[j], block.v1[j]
-            v = block.v0[j] + v1 * middle
-            traction = block.qx[j], block.qy[j], block.slips[j]
-            x, y, slips = advance(traction, (u, v, v1 * change), bound)
-            _store_traction(block, j, t, x, y, slips)
+    _clear_block(strip_block)
+    for j in range(LANE_COUNT):
+        u, v = strip_block.u[j], strip_block.v0[j] + strip_block.v1[j] * strip_cells.middle[0]
+        x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, strip_cells.bound[0])
+        _store_traction(strip_block, j, strip_cells.centre[0], x, y, slips)
+    change = -2.0 / strip_cells.centre.size
+    for i in range(1, strip_cells.centre.size):
+        t, g, middle = strip_cells.centre[i], strip_cells.bound[i], strip_cells.middle[i]
+        bound = g, strip_cells.start_bound[i], strip_cells.rate[i]
+        for j in range(LANE_COUNT):
+            u, v1 = strip_block.u[j], strip_block.v1[j]
+            v = strip_block.v0[j] + v1 * middle
+            traction = strip_block.qx[j], strip_block.qy[j], strip_block.slips[j]
+            x, y, slips = advance_traction(traction, (u, v, v1 * change), bound)
+            _store_traction(strip_block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def march_plain(block, cells):
+def march_plain(strip_block, strip_cells):
     """March the strips of a BLOCK as in 1982: a whole step into each cell, then the traction is cut back to the bound;
     fills its sums and states.
     """
-    _clear_block(block)
-    for i in range(cells.centre.size):
-        t, g = cells.centre[i], cells.bound[i]
-        for j in range(LANES):
-            x = block.qx[j] - block.u[j]
-            y = block.qy[j] - (block.v0[j] + block.v1[j] * t)
+    _clear_block(strip_block)
+    for i in range(strip_cells.centre.size):
+        t, g = strip_cells.centre[i], strip_cells.bound[i]
+        for j in range(LANE_COUNT):
+            x = strip_block.qx[j] - strip_block.u[j]
+            y = strip_block.qy[j] - (strip_block.v0[j] + strip_block.v1[j] * t)
             x, y, slips = cut_to_bound(x, y, g)
-            _store_traction(block, j, t, x, y, slips)
+            _store_traction(strip_block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def _store_traction(block, j, t, x, y, slips):
+def _store_traction(strip_block, lane, cell_position, traction_x, traction_y, slips):
     """Store a cell's traction as the state of lane j, and add it to the lane's sums."""
-    block.qx[j] = x
-    block.qy[j] = y
-    block.slips[j] = slips
-    block.sum_x[j] += x
-    block.sum_y[j] += y
-    block.sum_t[j] += t * y
-    block.slid[j] += slips
+    strip_block.qx[lane] = traction_x
+    strip_block.qy[lane] = traction_y
+    strip_block.slips[lane] = slips
+    strip_block.sum_x[lane] += traction_x
+    strip_block.sum_y[lane] += traction_y
+    strip_block.sum_t[lane] += cell_position * traction_y
+    strip_block.slid[lane] += slips
 
 
 @compiled
-def _clear_block(block):
+def _clear_block(strip_block):
     """Set sums and states of all lanes of a BLOCK to zero."""
-    for j in range(LANES):
-        block.sum_x[j] = block.sum_y[j] = block.sum_t[j] = block.slid[j] = 0.0
-        block.qx[j] = block.qy[j] = block.slips[j] = 0.0
+    for j in range(LANE_COUNT):
+        strip_block.sum_x[j] = strip_block.sum_y[j] = strip_block.sum_t[j] = strip_block.slid[j] = 0.0
+        strip_block.qx[j] = strip_block.qy[j] = strip_block.slips[j] = 0.0

@@ -12,7 +12,7 @@ from models.contact.inputs import Array
 from models.machine.compiled import inlined
 from models.machine.records import record
 
-LANES = 24
+LANE_COUNT = 24
 """Number of strips that are marched at the same time; the last ones may be empty."""
 CONTACT = record("a", "b", "load", "mu", "xi_x", "xi_y", "spin", "l1", "l2", "l3")
 """Record of one elliptic contact: semi-axes (m), load (N), coefficient of friction, creepages and spin (1/m),
@@ -24,7 +24,7 @@ SLIP = record("x", "y", "spin")
 """Record of a contact's rigid slip, see ``fastsim_many.rigid_slip``."""
 BLOCK = np.dtype(
     [
-        (name, np.float64, (LANES,))
+        (name, np.float64, (LANE_COUNT,))
         for name in ("u", "v0", "v1", "sum_x", "sum_y", "sum_t", "slid", "qx", "qy", "slips")
     ],
     align=True,
@@ -35,7 +35,7 @@ overlap.
 """
 
 
-class Strips(NamedTuple):
+class GridStrips(NamedTuple):
     """Strips of an ellipse, (m,) each: position y/b, ratio of half length to a, ratio of this to the bound in the
     strip's middle, and share of the load per bound.
     """
@@ -46,7 +46,7 @@ class Strips(NamedTuple):
     part: Array
 
 
-class Cells(NamedTuple):
+class StripCells(NamedTuple):
     """Cells of a strip, (n,) each, for the step that ends in the cell's centre: position t and bound g there, t in the
     middle of the step, g at its start (enlarged by a rounding), and 1/(8 g) in its middle.
 
@@ -61,7 +61,7 @@ class Cells(NamedTuple):
     peak: float
 
 
-class Workspace(NamedTuple):
+class MarchWorkspace(NamedTuple):
     """Arrays for intermediate values of a march: one SLIP per contact, and one BLOCK."""
 
     slips: Array
@@ -69,12 +69,12 @@ class Workspace(NamedTuple):
 
 
 @inlined
-def strips_in(table):
-    """``Strips`` as views of a grid's table (4, m)."""
-    return Strips(table[0], table[1], table[2], table[3])
+def strips_in(strip_table):
+    """``GridStrips`` as views of a grid's table (4, m)."""
+    return GridStrips(strip_table[0], strip_table[1], strip_table[2], strip_table[3])
 
 
 @inlined
-def cells_in(table, peak):
-    """``Cells`` as views of a grid's table (5, n)."""
-    return Cells(table[0], table[1], table[2], table[3], table[4], peak)
+def cells_in(cell_table, peak_pressure):
+    """``StripCells`` as views of a grid's table (5, n)."""
+    return StripCells(cell_table[0], cell_table[1], cell_table[2], cell_table[3], cell_table[4], peak_pressure)

@@ -16,10 +16,10 @@ from models.contact.inputs import Array
 from models.contact.material import MaterialPair
 
 X, Y, Z = 0, 1, 2
-"""Indices of the axes in the results of ``influence``."""
+"""Indices of the axes in the results of ``influence_of_rectangle``."""
 
 
-def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialPair) -> Array:
+def influence_of_rectangle(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialPair) -> Array:
     """Relative displacement (m) of the two bodies at a point, caused by a unit traction (1 Pa) on a rectangle dx by dy
     (m).
 
@@ -30,7 +30,7 @@ def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialP
     bodies.
     """
     primitives = sum(
-        sign_x * sign_y * _primitives(x + sign_x * dx / 2, y + sign_y * dy / 2)
+        sign_x * sign_y * _corner_integrals(x + sign_x * dx / 2, y + sign_y * dy / 2)
         for sign_x in (1, -1)
         for sign_y in (1, -1)
     )
@@ -46,7 +46,7 @@ def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialP
     return np.moveaxis(numbers, (0, 1), (-2, -1))
 
 
-def _primitives(x: Array, y: Array) -> Array:
+def _corner_integrals(x: Array, y: Array) -> Array:
     """Integrals from the origin to (x, y) of y^2/r^3, x^2/r^3, xy/r^3, x/r^2 and y/r^2, (..., 5).
 
     Terms that depend on x alone or on y alone are left out: they cancel between the corners.
@@ -57,16 +57,16 @@ def _primitives(x: Array, y: Array) -> Array:
         along = np.where(x == 0, 0.0, x * np.arcsinh(y / np.abs(x)))
         across = np.where(y == 0, 0.0, y * np.arcsinh(x / np.abs(y)))
         logarithm = np.where(r == 0, 0.0, np.log(r))
-    angle_x, angle_y = np.where(x == 0, 0.0, x * _angle(y, x)), np.where(y == 0, 0.0, y * _angle(x, y))
+    angle_x, angle_y = np.where(x == 0, 0.0, x * _arc_tangent(y, x)), np.where(y == 0, 0.0, y * _arc_tangent(x, y))
     return np.stack([along, across, -r, y * logarithm + angle_x, x * logarithm + angle_y], axis=-1)
 
 
-def _angle(opposite: Array, adjacent: Array) -> Array:
+def _arc_tangent(opposite: Array, adjacent: Array) -> Array:
     """Arc tangent (rad) of opposite / adjacent; pi/2 where adjacent is zero."""
     return np.arctan2(opposite * np.sign(adjacent), np.abs(adjacent))
 
 
-class Convolution:
+class CellConvolution:
     """Sum over all cells of kernel times values, for a kernel known at every offset between two cells.
 
     kernel : (2 ny - 1, 2 nx - 1, out, in), offset zero in its centre.
@@ -80,15 +80,15 @@ class Convolution:
         shifted = np.roll(shifted, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
         self._spectrum = fft.rfft2(np.moveaxis(shifted, (0, 1), (-2, -1)), workers=1)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, cell_values: Array) -> Array:
         """Sums (ny, nx, out) over all cells of kernel times values (ny, nx, in)."""
-        spectrum = fft.rfft2(np.moveaxis(values, -1, 0), self._size, workers=1)
+        spectrum = fft.rfft2(np.moveaxis(cell_values, -1, 0), self._size, workers=1)
         sums = fft.irfft2(np.einsum("ijyx,jyx->iyx", self._spectrum, spectrum), self._size, workers=1)
         return np.moveaxis(sums[:, : self.cells[0], : self.cells[1]], 0, -1)
 
 
-def offsets(cells: int, step: float) -> Array:
-    """All differences (m) between the centres of two cells in a row of ``cells`` cells of length ``step`` (m): (2 cells
-    - 1,), ascending.
+def cell_offsets(cell_count: int, cell_size: float) -> Array:
+    """All differences (m) between the centres of two cells in a row of ``cell_count`` cells of length ``cell_size``
+    (m): (2 cells - 1,), ascending.
     """
-    return np.arange(1 - cells, cells) * step
+    return np.arange(1 - cell_count, cell_count) * cell_size

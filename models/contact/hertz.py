@@ -19,19 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, broadcast_together, quantity
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, broadcast_together, checked_quantity
 from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.machine.compiled import njit
 
-FLATTEST = 0.01
+LEAST_CURVATURE = 0.01
 """Least curvature (1/m) that is accepted for the larger one, a radius of 50 m: a smaller one is usually in 1/mm."""
 LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
 """Smallest and largest semi-axis (m) that are accepted."""
 
 
 @dataclass(frozen=True)
-class Hertz:
+class HertzContact:
     """Hertzian contact of two bodies; every field has the common shape of the inputs.
 
     Where nothing touches, axes, pressure, approach and load are exactly zero.
@@ -49,38 +49,38 @@ class Hertz:
     B: Array
 
 
-def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
+def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> HertzContact:
     """Hertzian contact from curvatures under a given load.
 
     A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
     zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
     finite, magnitudes that are none in SI, or shapes that do not fit together.
     """
-    load = quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD)
-    A, B, load = broadcast_together(**_curvatures(A, B), load=np.maximum(load, 0.0))
-    ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
+    load = checked_quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD)
+    A, B, load = broadcast_together(**_checked_curvatures(A, B), load=np.maximum(load, 0.0))
+    ratio, cosine, sine = axis_ratios_and_integrals(np.minimum(A, B) / np.maximum(A, B))
     area = 1.5 * load * cosine / (math.pi * material_pair.modulus * np.maximum(A, B))  # l s^2
-    return _contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, material_pair)
+    return _hertz_contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, material_pair)
 
 
-def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> Hertz:
+def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> HertzContact:
     """Hertzian contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less
     means a gap.
 
     Otherwise as ``by_load``.
     """
     allowed = f"an approach in m, at most {LARGEST_APPROACH:g}"
-    approach = np.maximum(quantity("approach", approach, allowed, maximum=LARGEST_APPROACH), 0.0)
-    A, B, approach = broadcast_together(**_curvatures(A, B), approach=approach)
-    ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
+    approach = np.maximum(checked_quantity("approach", approach, allowed, maximum=LARGEST_APPROACH), 0.0)
+    A, B, approach = broadcast_together(**_checked_curvatures(A, B), approach=approach)
+    ratio, cosine, sine = axis_ratios_and_integrals(np.minimum(A, B) / np.maximum(A, B))
     short = np.sqrt(approach * cosine / (np.maximum(A, B) * (cosine + sine)))
     load = 2.0 / 3.0 * math.pi * material_pair.modulus * approach * short / (ratio * (cosine + sine))
-    return _contact(A, B, load, short, ratio, cosine + sine, material_pair)
+    return _hertz_contact(A, B, load, short, ratio, cosine + sine, material_pair)
 
 
 def by_axes(
     a: float, b: float, material_pair: MaterialPair, *, load: float | None = None, approach: float | None = None
-) -> Hertz:
+) -> HertzContact:
     """Hertzian contact with known semi-axes a, b (m) under a load (N) or at an approach (m), which must be above 0; all
     plain numbers.
 
@@ -88,26 +88,28 @@ def by_axes(
     Raises InputError as ``by_load`` does.
     """
     a, b = (
-        float(quantity(name, value, "a semi-axis in m, above 0", LEAST_AXIS, LARGEST_AXIS))
+        float(checked_quantity(name, value, "a semi-axis in m, above 0", LEAST_AXIS, LARGEST_AXIS))
         for name, value in (("a", a), ("b", b))
     )
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load (N) or the approach (m)")
     short, g = min(a, b), min(a, b) / max(a, b)
-    cosine, sine = integrals(g)
+    cosine, sine = elliptic_integrals(g)
     if approach is not None:
-        approach = float(quantity("approach", approach, "an approach in m, above 0", LEAST_AXIS, LARGEST_APPROACH))
+        approach = float(
+            checked_quantity("approach", approach, "an approach in m, above 0", LEAST_AXIS, LARGEST_APPROACH)
+        )
         load = 2.0 / 3.0 * math.pi * a * b * approach * material_pair.modulus / (short * (cosine + sine))
-    load = float(quantity("load", load, "a load in N, above 0", LEAST_AXIS, LARGEST_LOAD))
+    load = float(checked_quantity("load", load, "a load in N, above 0", LEAST_AXIS, LARGEST_LOAD))
     curvature = 1.5 * load / (math.pi * a * b) * cosine / (material_pair.modulus * short)
     second_curvature = curvature * g * g * sine / cosine
     return by_load(*((second_curvature, curvature) if a >= b else (curvature, second_curvature)), load, material_pair)
 
 
-def _curvatures(A: Any, B: Any) -> dict[str, Array]:
+def _checked_curvatures(A: Any, B: Any) -> dict[str, Array]:
     """Both curvatures (1/m) as arrays; raises InputError where they do not make a Hertzian contact."""
     curvatures = {
-        name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
+        name: checked_quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
     }
     for name, value in curvatures.items():
@@ -122,68 +124,79 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
             )
     A, B = broadcast_together(**curvatures)
     flattest = float(np.maximum(A, B).min(initial=np.inf))
-    if flattest < FLATTEST:
+    if flattest < LEAST_CURVATURE:
         raise InputError(
-            "", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, not in mm"
+            "",
+            "A, B",
+            flattest,
+            f"the larger of both must be {LEAST_CURVATURE:g} 1/m or more; radii are in m, not in mm",
         )
     return curvatures
 
 
-def _contact(
-    A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
-) -> Hertz:
+def _hertz_contact(
+    A: Array,
+    B: Array,
+    load: Array,
+    short_axis: Array,
+    axis_ratio: Array,
+    curvature_sum: Array,
+    material_pair: MaterialPair,
+) -> HertzContact:
     """Hertzian contact from its short semi-axis (m); all results are zero where this axis is. ``curvature_sum`` is K =
     B + D.
     """
-    long = short / ratio
-    area = math.pi * short * long
+    long = short_axis / axis_ratio
+    area = math.pi * short_axis * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
     along = A <= B  # the long axis lies along the smaller curvature
-    a, b = np.where(along, long, short), np.where(along, short, long)
-    fields = (a, b, p0, p0 * short * curvature_sum / material_pair.modulus, load, A, B)
-    return Hertz(*(field[()] for field in fields))  # numbers from numbers
+    a, b = np.where(along, long, short_axis), np.where(along, short_axis, long)
+    fields = (a, b, p0, p0 * short_axis * curvature_sum / material_pair.modulus, load, A, B)
+    return HertzContact(*(field[()] for field in fields))  # numbers from numbers
 
 
-def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
-    """Results of ``aspect`` for an array of curvature ratios: three arrays of the same shape."""
-    ratio_and_integrals = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
+def axis_ratios_and_integrals(curvature_ratios: Array) -> tuple[Array, Array, Array]:
+    """Results of ``axis_ratio_and_integrals`` for an array of curvature ratios: three arrays of the same shape."""
+    ratio_and_integrals = _axis_ratios_and_integrals(np.ascontiguousarray(curvature_ratios).ravel()).reshape(
+        3, *curvature_ratios.shape
+    )
     return ratio_and_integrals[0], ratio_and_integrals[1], ratio_and_integrals[2]
 
 
 @njit(cache=True)
-def _aspects(curvatures: Array) -> Array:
-    results = np.empty((3, curvatures.size))
-    for i in range(curvatures.size):
-        results[0, i], results[1, i], results[2, i] = aspect(curvatures[i])
+def _axis_ratios_and_integrals(curvature_ratios: Array) -> Array:
+    results = np.empty((3, curvature_ratios.size))
+    for i in range(curvature_ratios.size):
+        results[0, i], results[1, i], results[2, i] = axis_ratio_and_integrals(curvature_ratios[i])
     return results
 
 
 @njit(cache=True)
-def aspect(curvatures: float) -> tuple[float, float, float]:
+def axis_ratio_and_integrals(curvature_ratio: float) -> tuple[float, float, float]:
     """Ratio g of the short to the long semi-axis of a Hertzian ellipse, and the elliptic integrals B and D at this g.
 
-    curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
+    curvature_ratio : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
     ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.
     """
-    g = curvatures ** (2.0 / 3.0)
+    g = curvature_ratio ** (2.0 / 3.0)
     for _ in range(50):
-        cosine, sine = integrals(g)
+        cosine, sine = elliptic_integrals(g)
         e2 = (1.0 - g) * (1.0 + g)
         third = (sine - cosine) / e2 if e2 > 1e-4 else math.pi / 16.0
         slope = 1.0 + third * (1.0 / sine + g * g / cosine)
-        step = math.log(g * g * sine / cosine / curvatures) / slope
+        step = math.log(g * g * sine / cosine / curvature_ratio) / slope
         g = min(g * math.exp(-step), 1.0)
         if abs(step) < 1e-9:  # the next step would be the square of this
             break
-    return (g, *integrals(g))
+    return (g, *elliptic_integrals(g))
 
 
 @njit(cache=True)
-def integrals(g: float) -> tuple[float, float]:
+def elliptic_integrals(axis_ratio: float) -> tuple[float, float]:
     """Elliptic integrals B and D (formulas in this module's docstring) at g = sqrt(1 - e^2), 0 < g <= 1, exact to
     rounding.
     """
-    other, mean = g, 1.0
+    other, mean = axis_ratio, 1.0
     a_b, b_b, a_d, b_d = 1.0, 0.0, 0.0, 1.0  # the integrands as (a cos^2 + b sin^2) / sqrt(...)
     while True:
         a_b, b_b = a_b + b_b / mean, 2.0 * (b_b + a_b * other)

@@ -22,12 +22,14 @@ overflow.
 """
 
 
-def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> Array:
+def checked_quantity(
+    quantity_name: str, value: Any, allowed_text: str, minimum: float = -np.inf, maximum: float = np.inf
+) -> Array:
     """A user's input as a floating-point array of any shape; every element must be finite and between ``minimum`` and
     ``maximum``.
 
-    Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit. Texts, complex
-    numbers and masked elements are none, and nothing is guessed in their place.
+    Raises InputError with the first value that is not, and ``allowed_text``: what is expected, with its unit. Texts,
+    complex numbers and masked elements are none, and nothing is guessed in their place.
     """
     try:
         raw = np.asanyarray(value)
@@ -35,37 +37,43 @@ def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maxi
             raise TypeError
         numbers = np.asarray(raw, dtype=float)
     except (TypeError, ValueError):
-        raise InputError("", name, value, f"must be a number or an array of numbers: {allowed}") from None
+        raise InputError("", quantity_name, value, f"must be a number or an array of numbers: {allowed_text}") from None
     good = (numbers >= minimum) & (numbers <= maximum) & np.isfinite(numbers)
     if not good.all():
         first = np.unravel_index(int(np.argmin(good)), numbers.shape)
-        place = f"{name}[{', '.join(map(str, first))}]" if first else name
-        raise InputError("", place, float(numbers[first]), f"must be {allowed}")
+        place = f"{quantity_name}[{', '.join(map(str, first))}]" if first else quantity_name
+        raise InputError("", place, float(numbers[first]), f"must be {allowed_text}")
     return numbers
 
 
-def number(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> float:
-    """A user's input as one number; checks are those of ``quantity``, and an array is refused."""
-    numbers = quantity(name, value, allowed, minimum, maximum)
+def checked_number(
+    quantity_name: str, value: Any, allowed_text: str, minimum: float = -np.inf, maximum: float = np.inf
+) -> float:
+    """A user's input as one number; checks are those of ``checked_quantity``, and an array is refused."""
+    numbers = checked_quantity(quantity_name, value, allowed_text, minimum, maximum)
     if numbers.ndim:
-        raise InputError("", name, value, f"must be one number, not an array: {allowed}")
+        raise InputError("", quantity_name, value, f"must be one number, not an array: {allowed_text}")
     return float(numbers)
 
 
-def whole_number(name: str, value: Any, minimum: int, maximum: int) -> int:
+def checked_whole_number(quantity_name: str, value: Any, minimum: int, maximum: int) -> int:
     """A user's input if it is a whole number from ``minimum`` to ``maximum``, else InputError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not minimum <= value <= maximum:
-        raise InputError("", name, value, f"must be a whole number from {minimum} to {maximum}")
+        raise InputError("", quantity_name, value, f"must be a whole number from {minimum} to {maximum}")
     return int(value)
 
 
-def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quantity) -> dict[str, Any]:
-    """Creepages and spin (1/m) in a dict by name, each checked by ``read``, which is ``quantity`` or ``number``."""
+def checked_creepages(
+    xi_x: Any, xi_y: Any, spin: Any, read_value: Callable[..., Any] = checked_quantity
+) -> dict[str, Any]:
+    """Creepages and spin (1/m) in a dict by name, each checked by ``read_value``, which is ``checked_quantity`` or
+    ``checked_number``.
+    """
     allowed, turn = f"a creepage within +-{LARGEST_CREEPAGE:g}", f"a spin in 1/m within +-{LARGEST_SPIN:g}"
     return {
-        "xi_x": read("xi_x", xi_x, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
-        "xi_y": read("xi_y", xi_y, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
-        "spin": read("spin", spin, turn, -LARGEST_SPIN, LARGEST_SPIN),
+        "xi_x": read_value("xi_x", xi_x, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
+        "xi_y": read_value("xi_y", xi_y, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
+        "spin": read_value("spin", spin, turn, -LARGEST_SPIN, LARGEST_SPIN),
     }
 
 

@@ -25,9 +25,9 @@ class Material(Strict):
     E: float = Field(ge=1e6, le=1e13, description="Young's modulus, not in MPa", json_schema_extra={"unit": "Pa"})
     nu: float = Field(ge=0.0, le=0.5, description="Poisson's ratio")
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, **constants: Any) -> None:
         try:
-            super().__init__(**values)
+            super().__init__(**constants)
         except ValidationError as error:
             raise input_error_from_faults(error, type(self), "", "material") from None
 
@@ -102,7 +102,7 @@ class MaterialPair:
             )
 
 
-class Falling(Strict):
+class FallingFriction(Strict):
     """[falling_friction]: ``Falling(floor=0.4, decay=0.6, speed=20.0)``, friction that falls with the speed of slip.
 
     mu(s) = mu (floor + (1 - floor) exp(-decay s)), s in m/s: Polach's law (Wear 258 (2005) 992), taken point by point.

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.contact.half_space import Convolution, Z, influence, offsets
-from models.contact.inputs import Array, number, quantity
+from models.contact.half_space import CellConvolution, Z, cell_offsets, influence_of_rectangle
+from models.contact.inputs import Array, checked_number, checked_quantity
 from models.contact.material import MaterialPair
 from models.core.errors import InputError, RunFailed
 
-TOLERANCE = 1e-9
+CONTACT_TOLERANCE = 1e-9
 """Largest violation of a contact condition, as a share of the greatest elastic displacement."""
-MOST_ITERATIONS = 2000
+ITERATION_LIMIT = 2000
 LARGEST_CELL, LARGEST_APPROACH = 0.1, 0.1
 """Largest cell size and approach (m) that are accepted; larger ones are usually in mm."""
 LARGEST_UNEVENNESS = 4e-3
@@ -47,9 +47,9 @@ class PressureGrid:
                 list(np.shape(self.pressure)),
                 f"must have the shape (ny, nx) of y and x = {shape}, two cells or more each",
             )
-        quantity("pressure", self.pressure, "a pressure in Pa, zero or more", 0.0)
+        checked_quantity("pressure", self.pressure, "a pressure in Pa, zero or more", 0.0)
         for name, nodes in (("x", self.x), ("y", self.y)):
-            steps = np.diff(quantity(name, nodes, "a place in m"))
+            steps = np.diff(checked_quantity(name, nodes, "a place in m"))
             if not (steps.min() > 0.0 and np.ptp(steps) <= LARGEST_UNEVENNESS * steps.mean()):
                 raise InputError("", name, None, "must ascend in even steps (m)")
 
@@ -95,28 +95,31 @@ class NormalSolution(PressureGrid):
     iterations: int
 
 
-def centres(cells: int, step: float) -> Array:
-    """Positions (m) of the centres of ``cells`` cells of size ``step`` (m), symmetric about zero."""
-    return (np.arange(cells) - (cells - 1) / 2) * step
+def cell_centres(cell_count: int, cell_size: float) -> Array:
+    """Positions (m) of the centres of ``cell_count`` cells of size ``cell_size`` (m), symmetric about zero."""
+    return (np.arange(cell_count) - (cell_count - 1) / 2) * cell_size
 
 
 AVERAGING_POINTS = 8
 """Number of points along each axis of a cell over which Hertz' pressure is averaged."""
 
 
-def hertzian(a: float, b: float, load: float, cells: int) -> PressureGrid:
-    """Hertzian pressure on an ellipse with semi-axes a, b (m): means over ``cells`` x ``cells`` cells, scaled to the
-    load (N)."""
-    inner = (np.arange(cells * AVERAGING_POINTS) + 0.5) / (cells * AVERAGING_POINTS) * 2 - 1
+def hertzian_pressure_grid(a: float, b: float, load: float, cell_count: int) -> PressureGrid:
+    """Hertzian pressure on an ellipse with semi-axes a, b (m): means over ``cell_count`` x ``cell_count`` cells, scaled
+    to the load (N).
+    """
+    inner = (np.arange(cell_count * AVERAGING_POINTS) + 0.5) / (cell_count * AVERAGING_POINTS) * 2 - 1
     height = np.sqrt(np.maximum(1 - inner[:, None] ** 2 - inner**2, 0)).reshape(
-        cells, AVERAGING_POINTS, cells, AVERAGING_POINTS
+        cell_count, AVERAGING_POINTS, cell_count, AVERAGING_POINTS
     )
-    pressure, dx, dy = height.mean((1, 3)), 2 * a / cells, 2 * b / cells
-    return PressureGrid(pressure * load / (pressure.sum() * dx * dy), centres(cells, dx), centres(cells, dy))
+    pressure, dx, dy = height.mean((1, 3)), 2 * a / cell_count, 2 * b / cell_count
+    return PressureGrid(
+        pressure * load / (pressure.sum() * dx * dy), cell_centres(cell_count, dx), cell_centres(cell_count, dy)
+    )
 
 
 def solve_normal(
-    distance: Array,
+    undeformed_distance: Array,
     dx: float,
     dy: float,
     material_pair: MaterialPair,
@@ -128,8 +131,8 @@ def solve_normal(
 
     Parameters
     ----------
-    distance : (ny, nx) undeformed distance (m) at the cells' centres; rows are y, columns x. Its zero is where the
-        approach counts from. Several separate patches may lie in one grid.
+    undeformed_distance : (ny, nx) undeformed distance (m) at the cells' centres; rows are y, columns x. Its zero is
+        where the approach counts from. Several separate patches may lie in one grid.
     dx, dy : size of a cell (m)
     material_pair : materials of the two bodies; a mismatch is neglected here (the tractions' effect on the pressure)
     load : normal force (N), or
@@ -138,61 +141,77 @@ def solve_normal(
     Raises
     ------
     InputError : a wrong shape or value, or a contact that reaches the edge of the grid
-    RunFailed : the contact conditions were not met to ``TOLERANCE``
+    RunFailed : the contact conditions were not met to ``CONTACT_TOLERANCE``
     """
-    distance = _checked_distance(distance, dx, dy, load, approach)
-    rows, columns = distance.shape
-    x, y = centres(columns, dx), centres(rows, dy)
-    if (load is not None and load <= 0) or (approach is not None and not np.any(distance < approach)):
-        least = float(distance.min()) if approach is None else approach
-        return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
-    kernel = influence(offsets(columns, dx), offsets(rows, dy)[:, None], dx, dy, material_pair)[..., Z, Z]
-    displace = Convolution(kernel[..., None, None])
-    pressure, iterations = _conjugate_gradients(distance, displace, load, approach, dx * dy)
+    undeformed_distance = _checked_distance(undeformed_distance, dx, dy, load, approach)
+    rows, columns = undeformed_distance.shape
+    x, y = cell_centres(columns, dx), cell_centres(rows, dy)
+    if (load is not None and load <= 0) or (approach is not None and not np.any(undeformed_distance < approach)):
+        least = float(undeformed_distance.min()) if approach is None else approach
+        return NormalSolution(np.zeros(undeformed_distance.shape), x, y, least, undeformed_distance - least, 0.0, 0)
+    kernel = influence_of_rectangle(cell_offsets(columns, dx), cell_offsets(rows, dy)[:, None], dx, dy, material_pair)[
+        ..., Z, Z
+    ]
+    displace = CellConvolution(kernel[..., None, None])
+    pressure, iterations = _conjugate_gradients(undeformed_distance, displace, load, approach, dx * dy)
     contact = pressure > 0
     if contact[[0, -1]].any() or contact[:, [0, -1]].any():
         raise InputError("", "distance", None, "the contact reaches the edge of the grid: give a larger one")
     displacement = displace(pressure[..., None])[..., 0]  # the conditions are evaluated afresh
-    gap = distance + displacement
+    gap = undeformed_distance + displacement
     reached = float(gap[contact].mean()) if approach is None else approach
     gap -= reached
-    return NormalSolution(pressure, x, y, reached, gap, _violation(gap, contact, displacement), iterations)
+    return NormalSolution(pressure, x, y, reached, gap, _contact_violation(gap, contact, displacement), iterations)
 
 
-def _checked_distance(distance: Array, dx: float, dy: float, load: float | None, approach: float | None) -> Array:
+def _checked_distance(
+    undeformed_distance: Array, dx: float, dy: float, load: float | None, approach: float | None
+) -> Array:
     """The undeformed distance as a numerical array, after checks of all inputs; raises InputError."""
-    distance = quantity("distance", distance, "finite everywhere (m); use a large distance outside the bodies")
-    if distance.ndim != 2 or min(distance.shape) < 2:
-        raise InputError("", "distance", list(distance.shape), "must have the shape (ny, nx), two cells or more each")
+    undeformed_distance = checked_quantity(
+        "distance", undeformed_distance, "finite everywhere (m); use a large distance outside the bodies"
+    )
+    if undeformed_distance.ndim != 2 or min(undeformed_distance.shape) < 2:
+        raise InputError(
+            "", "distance", list(undeformed_distance.shape), "must have the shape (ny, nx), two cells or more each"
+        )
     for name, value in (("dx", dx), ("dy", dy)):
-        number(name, value, f"the size of a cell in m, above 0 and at most {LARGEST_CELL:g}", 1e-12, LARGEST_CELL)
+        checked_number(
+            name, value, f"the size of a cell in m, above 0 and at most {LARGEST_CELL:g}", 1e-12, LARGEST_CELL
+        )
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load (N) or the approach (m)")
-    number("load", 0.0 if load is None else load, "a load in N")
-    number("approach", 0.0 if approach is None else approach, "an approach in m", -LARGEST_APPROACH, LARGEST_APPROACH)
-    return distance
+    checked_number("load", 0.0 if load is None else load, "a load in N")
+    checked_number(
+        "approach", 0.0 if approach is None else approach, "an approach in m", -LARGEST_APPROACH, LARGEST_APPROACH
+    )
+    return undeformed_distance
 
 
 def _conjugate_gradients(
-    distance: Array, displace: Convolution, load: float | None, approach: float | None, cell: float
+    undeformed_distance: Array,
+    displacement_by_pressure: CellConvolution,
+    load: float | None,
+    approach: float | None,
+    cell_area: float,
 ) -> tuple[Array, int]:
     """Pressure (ny, nx) in Pa that satisfies the contact conditions, and the number of iterations."""
     if load is not None:  # even over the grid
-        pressure = np.full(distance.shape, load / (distance.size * cell))
+        pressure = np.full(undeformed_distance.shape, load / (undeformed_distance.size * cell_area))
     else:  # in proportion to the overlap
-        overlap = np.maximum(float(approach or 0.0) - distance, 0.0)
-        pressure = overlap * (overlap.max() / displace(overlap[..., None]).max())
+        overlap = np.maximum(float(approach or 0.0) - undeformed_distance, 0.0)
+        pressure = overlap * (overlap.max() / displacement_by_pressure(overlap[..., None]).max())
     direction, square, restart = np.zeros_like(pressure), 1.0, True
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, ITERATION_LIMIT + 1):
         contact = pressure > 0
-        displacement = displace(pressure[..., None])[..., 0]
-        gap = distance + displacement
+        displacement = displacement_by_pressure(pressure[..., None])[..., 0]
+        gap = undeformed_distance + displacement
         gap -= gap[contact].mean() if approach is None else approach
-        if _violation(gap, contact, displacement) < TOLERANCE:
+        if _contact_violation(gap, contact, displacement) < CONTACT_TOLERANCE:
             return pressure, iteration
         before, square = square, float(np.sum(gap[contact] ** 2))
         direction = np.where(contact, gap + (0.0 if restart else square / before) * direction, 0.0)
-        response = displace(direction[..., None])[..., 0]
+        response = displacement_by_pressure(direction[..., None])[..., 0]
         if approach is None:
             response -= response[contact].mean()
         step = np.sum(gap[contact] * direction[contact]) / np.sum(response[contact] * direction[contact])
@@ -201,11 +220,11 @@ def _conjugate_gradients(
         restart = bool(entering.any())
         pressure[entering] -= step * gap[entering]
         if load is not None:
-            pressure *= load / (pressure.sum() * cell)
-    raise RunFailed("normal problem", f"contact conditions not met in {MOST_ITERATIONS} iterations")
+            pressure *= load / (pressure.sum() * cell_area)
+    raise RunFailed("normal problem", f"contact conditions not met in {ITERATION_LIMIT} iterations")
 
 
-def _violation(gap: Array, contact: Array, displacement: Array) -> float:
+def _contact_violation(gap: Array, is_in_contact: Array, displacement: Array) -> float:
     """Largest violation of the contact conditions, as a ratio to the largest displacement."""
-    inside, outside = np.abs(gap[contact]).max(), -gap[~contact].min(initial=0.0)
+    inside, outside = np.abs(gap[is_in_contact]).max(), -gap[~is_in_contact].min(initial=0.0)
     return float(max(inside, outside) / displacement.max())

@@ -13,16 +13,16 @@ import numpy as np
 
 from models.contact.distance_kernels import valley_ends
 from models.contact.inputs import Array
-from models.contact.simplified_kernels import Surface
-from models.contact.undeformed_distance import Distance
+from models.contact.simplified_kernels import PatchSurface
+from models.contact.undeformed_distance import UndeformedDistance
 from models.core.errors import InputError
 
-RIDGE = 1e-6
+LEAST_RIDGE_HEIGHT = 1e-6
 """Height (m) of a ridge above which it separates two valleys; lower ones count as roughness of one valley."""
 NO_DEPTH = 1e-12
 """Depth (m) of a valley within its sides up to which it counts as none."""
-Table = tuple[Array, Array]
-Box = tuple[float, float, float, float]
+CutParts = tuple[Array, Array]
+Rectangle = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Patch:
     = 0 along the contour, from which distances between patches follow.
     """
 
-    distance: Distance
+    distance: UndeformedDistance
     cut: tuple[bool, bool, bool, bool] = (False, False, False, False)
     lean: float = 0.0
     contour_position: float = 0.0
@@ -46,8 +46,8 @@ class Patch:
         k = int(np.argmin(least))
         x, y = float(where[k]), float(lines[k])
         for _ in range(3):  # the parabola through three lines, in turn
-            x = _vertex(self.distance, x, y, 0)
-            y = _vertex(self.distance, x, y, 1)
+            x = _parabola_minimum(self.distance, x, y, 0)
+            y = _parabola_minimum(self.distance, x, y, 1)
         return x, y, float(self.distance.at(np.array(x), np.array(y)))
 
     @property
@@ -65,7 +65,7 @@ class Patch:
         return float(min((side for side, cut in zip(sides, self.cut, strict=True) if not cut), default=np.inf))
 
     @cached_property
-    def lines(self) -> tuple[Table, Table]:
+    def lines(self) -> tuple[CutParts, CutParts]:
         """Grid lines along x and along y, with the square root of the least height above the bottom on each, which is
         linear for a paraboloid.
         """
@@ -77,13 +77,13 @@ class Patch:
             tables.append((np.insert(lines, k, bottom), np.insert(roots, k, 0.0)))
         return tables[0], tables[1]
 
-    def surface(self, depth: float) -> Surface:
-        """``Surface`` of the patch at a depth (m), for compiled functions."""
+    def surface(self, depth: float) -> PatchSurface:
+        """``PatchSurface`` of the patch at a depth (m), for compiled functions."""
         known = self.distance
         origin = float(known.x[0]), float(known.y[0])
-        return Surface(known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low)
+        return PatchSurface(known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low)
 
-    def box(self, depth: float) -> Box:
+    def box(self, depth: float) -> Rectangle:
         """Rectangle x0, x1, y0, y1 (m) about the area {h < depth} of the patch, continuous in the depth.
 
         Each side lies as far from the bottom as the lengths of the valley below the depth add up to on that side: that
@@ -92,7 +92,7 @@ class Patch:
         """
         if depth > self.edge:
             if self.edge - self.low <= NO_DEPTH:
-                raise no_bottom()
+                raise no_bottom_error()
             raise InputError(
                 "",
                 "distance",
@@ -105,7 +105,7 @@ class Patch:
         return (*valley_ends(x, rx, self.bottom[0], root), *valley_ends(y, ry, self.bottom[1], root))
 
 
-def no_bottom() -> InputError:
+def no_bottom_error() -> InputError:
     """Error for a distance without an inner minimum: it decreases towards one side, or is flat."""
     return InputError(
         "",
@@ -115,64 +115,74 @@ def no_bottom() -> InputError:
     )
 
 
-def separate(distance: Distance) -> list[Patch]:
+def separate_patches(undeformed_distance: UndeformedDistance) -> list[Patch]:
     """The valleys of an undeformed distance as patches, in order of ascending y (then x). Every ridge higher than
-    ``RIDGE`` separates two of them.
+    ``LEAST_RIDGE_HEIGHT`` separates two of them.
     """
     return [
         Patch(part, (*along_x, *along_y))
-        for row, along_y in _parts_between_ridges(distance, 1)
+        for row, along_y in _parts_between_ridges(undeformed_distance, 1)
         for part, along_x in _parts_between_ridges(row, 0)
     ]
 
 
-def single_patch_of(distance: Distance) -> list[Patch]:
+def single_patch_of(undeformed_distance: UndeformedDistance) -> list[Patch]:
     """The undeformed distance treated as a single patch, even if it has several minima."""
-    return [Patch(distance)]
+    return [Patch(undeformed_distance)]
 
 
-def _parts_between_ridges(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
+def _parts_between_ridges(
+    undeformed_distance: UndeformedDistance, axis: int
+) -> list[tuple[UndeformedDistance, tuple[bool, bool]]]:
     """Parts of the distance, split at ridges along an axis (0: x, 1: y), each with flags on whether its two ends are
     cuts.
     """
-    lines, least, _ = distance.valley_y if axis else distance.valley_x
-    nodes, parts, everything = distance.y if axis else distance.x, [], slice(None)
-    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least)]
+    lines, least, _ = undeformed_distance.valley_y if axis else undeformed_distance.valley_x
+    nodes, parts, everything = undeformed_distance.y if axis else undeformed_distance.x, [], slice(None)
+    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridge_indices(least)]
     for a, b in pairwise([0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]):
         if b - a >= 3:
             some = slice(a, b + 1)
-            part = distance.part(everything, some) if axis else distance.part(some, everything)
+            part = undeformed_distance.part(everything, some) if axis else undeformed_distance.part(some, everything)
             parts.append((part, (a > 0, b < nodes.size - 1)))
     return parts
 
 
-def ridges(heights: Array) -> list[int]:
-    """Indices of maxima of a line of heights (m) that are more than ``RIDGE`` above the valleys on both sides."""
+def ridge_indices(heights: Array) -> list[int]:
+    """Indices of maxima of a line of heights (m) that are more than ``LEAST_RIDGE_HEIGHT`` above the valleys on both
+    sides.
+    """
     maxima: list[int] = []
     low, top, at = heights[0], heights[0], 0
     climbed = False
     for k, height in enumerate(heights):
         if not climbed:
             low = min(low, height)
-            if height > low + RIDGE:
+            if height > low + LEAST_RIDGE_HEIGHT:
                 climbed, top, at = True, height, k
         elif height > top:
             top, at = height, k
-        elif height < top - RIDGE:
+        elif height < top - LEAST_RIDGE_HEIGHT:
             if at > 0:
                 maxima.append(at)
             climbed, low = False, height
     return maxima
 
 
-def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:
+def _parabola_minimum(undeformed_distance: UndeformedDistance, x: float, y: float, axis: int) -> float:
     """Position (m) of the minimum, along an axis, of the parabola through three nearby points; the given position if
     there is none.
     """
-    nodes, here, step = (distance.y, y, distance.dy) if axis else (distance.x, x, distance.dx)
+    nodes, here, step = (
+        (undeformed_distance.y, y, undeformed_distance.dy)
+        if axis
+        else (undeformed_distance.x, x, undeformed_distance.dx)
+    )
     middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
     points = middle + np.array([-0.25, 0.0, 0.25]) * step
-    left, centre, right = distance.at(points if not axis else np.full(3, x), np.full(3, y) if not axis else points)
+    left, centre, right = undeformed_distance.at(
+        points if not axis else np.full(3, x), np.full(3, y) if not axis else points
+    )
     curvature = left - 2.0 * centre + right
     if curvature <= 0.0:
         return here

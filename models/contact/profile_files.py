@@ -18,58 +18,65 @@ from typing import Literal, get_args
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.profiles import ContactProfile, profile
+from models.contact.profiles import ContactProfile, profile_of_points
 from models.core.errors import InputError, similar_file
 
-MM = 1e-3
-Kind = Literal["wheel", "rail"]
-Points = tuple[Array, Array]
+METRES_PER_MILLIMETRE = 1e-3
+ProfileKind = Literal["wheel", "rail"]
+PointArrays = tuple[Array, Array]
 SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
 KIND_OF_ENDING = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
-COMMENTS = re.compile(r"[#!%].*")
-SEPARATORS = re.compile(r"[\s,;]+")
-DECIMAL_COMMA = re.compile(r"\d,\d.*(?<!,)[\s;]|(?<!,)[\s;].*\d,\d")
+COMMENT_PATTERN = re.compile(r"[#!%].*")
+SEPARATOR_PATTERN = re.compile(r"[\s,;]+")
+DECIMAL_COMMA_PATTERN = re.compile(r"\d,\d.*(?<!,)[\s;]|(?<!,)[\s;].*\d,\d")
 """Pattern of a decimal comma: a comma between digits where something else separates the numbers."""
-SHOWN_CHARACTERS = 40
+SHOWN_CHARACTER_LIMIT = 40
 """Largest number of characters of a file's line that an error message shows."""
 LARGEST_TAPING_OFFSET = 5e-3
 """Largest |z| (m) of a wheel profile at y = 0, where its radius is measured."""
 
 
-def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> ContactProfile:
+def read_profile(
+    profile_path: str | Path, profile_kind: ProfileKind, *, smoothing: float = 0.0, is_mirrored: bool = False
+) -> ContactProfile:
     """Wheel or rail profile read from a file, in the package's axes (m, z down, flange or gauge corner at negative y).
 
-    kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
-    Raises InputError for a file that cannot be read or understood, naming the line and its text.
+    profile_kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. is_mirrored : exchange left and
+    right. Raises InputError for a file that cannot be read or understood, naming the line and its text.
     """
-    if kind not in get_args(Kind):
-        raise InputError("", "kind", kind, "is not known", get_args(Kind))
-    path = Path(path)
-    ending = path.suffix.lower()
-    if KIND_OF_ENDING.get(ending, kind) != kind:
+    if profile_kind not in get_args(ProfileKind):
+        raise InputError("", "kind", profile_kind, "is not known", get_args(ProfileKind))
+    profile_path = Path(profile_path)
+    ending = profile_path.suffix.lower()
+    if KIND_OF_ENDING.get(ending, profile_kind) != profile_kind:
         raise InputError(
-            path, "", None, f"is a file of a {KIND_OF_ENDING[ending]} by its ending, and a {kind} is wanted"
+            profile_path,
+            "",
+            None,
+            f"is a file of a {KIND_OF_ENDING[ending]} by its ending, and a {profile_kind} is wanted",
         )
-    lines = _lines(path)
-    reader = _simpack if ending in SIMPACK else _miniprof if ending in MINIPROF else _columns
-    y, z = reader(lines, path)
+    lines = _lines_of_file(profile_path)
+    reader = (
+        _points_of_simpack if ending in SIMPACK else _points_of_miniprof if ending in MINIPROF else _points_of_columns
+    )
+    y, z = reader(lines, profile_path)
     if y.size < 10:
-        raise InputError(path, "", int(y.size), "points found; a profile needs ten or more, two numbers a line")
-    y, z = _upright_points(y, z, kind)
-    read = profile(-y if mirror else y, z, smoothing, path)
-    if kind == "wheel":
-        _check_taping(read, path)
+        raise InputError(profile_path, "", int(y.size), "points found; a profile needs ten or more, two numbers a line")
+    y, z = _upright_points(y, z, profile_kind)
+    read = profile_of_points(-y if is_mirrored else y, z, smoothing, profile_path)
+    if profile_kind == "wheel":
+        _check_taping(read, profile_path)
     return read
 
 
-def _check_taping(wheel: ContactProfile, path: Path) -> None:
+def _check_taping(wheel: ContactProfile, profile_path: Path) -> None:
     """Refuse a wheel profile whose y or z is not measured from the taping line, but from the flange's back or the
     axle.
     """
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
     if not abs(middle) <= LARGEST_TAPING_OFFSET:
         raise InputError(
-            path,
+            profile_path,
             "profile at y = 0, in m",
             middle,
             "y must count from the taping line and z from the "
@@ -77,99 +84,109 @@ def _check_taping(wheel: ContactProfile, path: Path) -> None:
         )
 
 
-def _lines(path: Path) -> list[str]:
+def _lines_of_file(profile_path: Path) -> list[str]:
     """Lines of a text file; raises InputError where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+        return profile_path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
         reason = error.strerror or "cannot be read"
-        raise InputError(path, "", None, f"{reason[0].lower()}{reason[1:]}{similar_file(path)}") from None
-
-
-def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
-    """Numbers in one line of a file; raises InputError with the line if it has too few numbers or other text."""
-    if DECIMAL_COMMA.search(text.strip()):
         raise InputError(
-            path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], "has decimal commas: write decimal points"
+            profile_path, "", None, f"{reason[0].lower()}{reason[1:]}{similar_file(profile_path)}"
+        ) from None
+
+
+def _parse_numbers(line_text: str, line_number: int, profile_path: Path, least_count: int = 2) -> list[float]:
+    """Numbers in one line of a file; raises InputError with the line if it has too few numbers or other text."""
+    if DECIMAL_COMMA_PATTERN.search(line_text.strip()):
+        raise InputError(
+            profile_path,
+            f"line {line_number}",
+            line_text.strip()[:SHOWN_CHARACTER_LIMIT],
+            "has decimal commas: write decimal points",
         )
     try:
-        numbers = [float(part) for part in SEPARATORS.split(text.strip(" \t,;"))]
+        numbers = [float(part) for part in SEPARATOR_PATTERN.split(line_text.strip(" \t,;"))]
     except ValueError:
         numbers = []
-    if len(numbers) < least or not all(math.isfinite(value) for value in numbers):
+    if len(numbers) < least_count or not all(math.isfinite(value) for value in numbers):
         raise InputError(
-            path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], f"must hold {least} or more finite numbers"
+            profile_path,
+            f"line {line_number}",
+            line_text.strip()[:SHOWN_CHARACTER_LIMIT],
+            f"must hold {least_count} or more finite numbers",
         )
     return numbers
 
 
-def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
+def _points_of_rows(table_rows: list[list[float]], first_column: int = 0, second_column: int = 1) -> PointArrays:
     """Two columns of a table of rows, as arrays (n,)."""
-    return np.array([row[first] for row in rows]), np.array([row[second] for row in rows])
+    return np.array([row[first_column] for row in table_rows]), np.array([row[second_column] for row in table_rows])
 
 
-def _columns(lines: list[str], path: Path) -> Points:
+def _points_of_columns(file_lines: list[str], profile_path: Path) -> PointArrays:
     """Points y, z (m) of a file with two columns of numbers in mm."""
-    plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
-    rows = [(k, _parse_numbers(line, k, path)) for k, line in plain if line.strip()]
+    plain = [(k, COMMENT_PATTERN.sub("", line)) for k, line in enumerate(file_lines, 1)]
+    rows = [(k, _parse_numbers(line, k, profile_path)) for k, line in plain if line.strip()]
     for k, row in rows:
         if len(row) > 2:
             raise InputError(
-                path,
+                profile_path,
                 f"line {k}",
-                lines[k - 1].strip()[:SHOWN_CHARACTERS],
+                file_lines[k - 1].strip()[:SHOWN_CHARACTER_LIMIT],
                 f"must hold y and z, found {len(row)} numbers",
             )
-    y, z = _points([row for _, row in rows])
-    return y * MM, z * MM
+    y, z = _points_of_rows([row for _, row in rows])
+    return y * METRES_PER_MILLIMETRE, z * METRES_PER_MILLIMETRE
 
 
-def _miniprof(lines: list[str], path: Path) -> Points:
+def _points_of_miniprof(file_lines: list[str], profile_path: Path) -> PointArrays:
     """Points y, z (m) of a MiniProf file: a header that ends with the first empty line, then points with y upwards."""
     rows, columns, heading = [], ["X", "Y"], True
-    for k, line in enumerate(lines, 1):
+    for k, line in enumerate(file_lines, 1):
         if heading:
             key, equals, value = line.partition("=")
             if key.strip().lower() == "columndef":
                 columns = [name.strip().upper() for name in value.split(",")]
             if line.strip() and not equals:
                 raise InputError(
-                    path,
+                    profile_path,
                     f"line {k}",
-                    line.strip()[:SHOWN_CHARACTERS],
+                    line.strip()[:SHOWN_CHARACTER_LIMIT],
                     "must be key=value: a MiniProf header ends with an empty line",
                 )
             heading = bool(line.strip())
         elif line.strip():
-            rows.append(_parse_numbers(line, k, path))
+            rows.append(_parse_numbers(line, k, profile_path))
     if not {"X", "Y"} <= set(columns[:2]):
-        raise InputError(path, "ColumnDef", ",".join(columns), "must begin with X,Y or Y,X")
-    x, y = _points(rows, columns.index("X"), columns.index("Y"))
-    return x * MM, -y * MM
+        raise InputError(profile_path, "ColumnDef", ",".join(columns), "must begin with X,Y or Y,X")
+    x, y = _points_of_rows(rows, columns.index("X"), columns.index("Y"))
+    return x * METRES_PER_MILLIMETRE, -y * METRES_PER_MILLIMETRE
 
 
-def _simpack(lines: list[str], path: Path) -> Points:
+def _points_of_simpack(file_lines: list[str], profile_path: Path) -> PointArrays:
     """Points y, z (m) of a Simpack file, transformed as its header says."""
     keys: dict[str, tuple[str, int]] = {}
     rows: list[list[float]] = []
     inside = ended = False
-    for k, line in enumerate(lines, 1):
+    for k, line in enumerate(file_lines, 1):
         text = line.partition("!")[0].strip()
         if text == "point.begin":
             inside = True
         elif text == "point.end":
             inside, ended = False, True
         elif inside and text:
-            rows.append(_parse_numbers(text, k, path))
+            rows.append(_parse_numbers(text, k, profile_path))
         elif "=" in text:
             name, _, value = text.partition("=")
             keys[name.strip()] = (value.strip(), k)
     if not ended:
-        raise InputError(path, "", None, "has no points between point.begin and point.end")
-    return _transformed(_points(rows), {name: _header_value(keys, name, path) for name in DEFAULTS})
+        raise InputError(profile_path, "", None, "has no points between point.begin and point.end")
+    return _transformed_points(
+        _points_of_rows(rows), {name: _header_value(keys, name, profile_path) for name in HEADER_DEFAULTS}
+    )
 
 
-DEFAULTS = {
+HEADER_DEFAULTS = {
     "shift.y": 0.0,
     "shift.z": 0.0,
     "rotate": 0.0,
@@ -188,34 +205,36 @@ bounds.
 """
 
 
-def _header_value(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
+def _header_value(header_keys: dict[str, tuple[str, int]], key_name: str, profile_path: Path) -> float:
     """Value of a key of a Simpack header, or its default."""
-    text, line = keys.get(name, (str(DEFAULTS[name]), 0))
-    value = _parse_numbers(text, line, path, 1)[0]
-    if name.startswith("units") and value <= 0.0:
-        raise InputError(path, f"line {line}: {name}", value, "must be above 0 (units of the file by m or rad)")
+    text, line = header_keys.get(key_name, (str(HEADER_DEFAULTS[key_name]), 0))
+    value = _parse_numbers(text, line, profile_path, 1)[0]
+    if key_name.startswith("units") and value <= 0.0:
+        raise InputError(
+            profile_path, f"line {line}: {key_name}", value, "must be above 0 (units of the file by m or rad)"
+        )
     return value
 
 
-def _transformed(points: Points, key: dict[str, float]) -> Points:
+def _transformed_points(points: PointArrays, header_values: dict[str, float]) -> PointArrays:
     """Points y, z (m) after the operations of a Simpack header: shift, rotation, bounds, mirrors, order and unit, in
     this order.
     """
-    y, z = points[0] + key["shift.y"], points[1] + key["shift.z"]
-    angle = key["rotate"] / key["units.ang.f"]
+    y, z = points[0] + header_values["shift.y"], points[1] + header_values["shift.z"]
+    angle = header_values["rotate"] / header_values["units.ang.f"]
     y, z = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
     keep = np.full(y.shape, True)
     for values, axis in ((y, "y"), (z, "z")):
-        low, high = key[f"bound.{axis}.min"], key[f"bound.{axis}.max"]
+        low, high = header_values[f"bound.{axis}.min"], header_values[f"bound.{axis}.max"]
         keep &= (low >= high) | ((values >= low) & (values <= high))
-    y, z = y[keep] * (1.0 - 2.0 * key["mirror.y"]), z[keep] * (1.0 - 2.0 * key["mirror.z"])
-    order = slice(None, None, -1 if key["inversion"] else 1)
-    return y[order] / key["units.len.f"], z[order] / key["units.len.f"]
+    y, z = y[keep] * (1.0 - 2.0 * header_values["mirror.y"]), z[keep] * (1.0 - 2.0 * header_values["mirror.z"])
+    order = slice(None, None, -1 if header_values["inversion"] else 1)
+    return y[order] / header_values["units.len.f"], z[order] / header_values["units.len.f"]
 
 
-def _upright_points(y: Array, z: Array, kind: Kind) -> Points:
+def _upright_points(y: Array, z: Array, profile_kind: ProfileKind) -> PointArrays:
     """Profile points turned so that the rail's top is up, or the wheel's flange is down and at negative y."""
-    if kind == "rail":
+    if profile_kind == "rail":
         ends = 0.5 * (z[0] + z[-1])
         return (y, z) if ends >= np.median(z) else (y, -z)
     middle = np.median(z)

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 from models.contact.inputs import Array
 from models.core.errors import InputError
 
-SPACING = 1e-4
+POINT_SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
 SPIKE_DISTANCE = 2e-4
 """Distance (m) from both neighbours above which a point that turns back counts as a measurement error."""
@@ -53,58 +53,60 @@ class ContactProfile:
         """
         y = self.y * np.cos(angle) + self.z * np.sin(angle)
         z = self.z * np.cos(angle) - self.y * np.sin(angle)
-        keep = _ascending(y)
+        keep = _longest_ascending_run(y)
         return ContactProfile(y[keep], z[keep] - z[keep].min(), self.smoothing)
 
 
-def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> ContactProfile:
+def profile_of_points(y: Array, z: Array, smoothing: float = 0.0, profile_path: object = "") -> ContactProfile:
     """Profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
 
     smoothing : wavelength (m) of which half is left (see ``ContactProfile``). Raises InputError for wrong shapes,
     values that are not finite or not a profile's size in m, and a contour that does not run along y.
     """
     y, z = np.asarray(y, float), np.asarray(z, float)
-    _check_points(y, z, smoothing, file)
+    _check_points(y, z, smoothing, profile_path)
     if y[0] > y[-1]:
         y, z = y[::-1], z[::-1]
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     apart = np.concatenate([[True], np.diff(length) > 0.0])
     length, y, z = length[apart], y[apart], z[apart]
-    even = np.linspace(0.0, length[-1], max(round(length[-1] / SPACING), 10) + 1)
-    y, z = (_smoothed(length, values, even, smoothing) for values in (y, z))
-    keep = _ascending(y)
-    _check_rough(y, keep, file)
+    even = np.linspace(0.0, length[-1], max(round(length[-1] / POINT_SPACING), 10) + 1)
+    y, z = (_smoothed_coordinate(length, values, even, smoothing) for values in (y, z))
+    keep = _longest_ascending_run(y)
+    _check_backward_steps(y, keep, profile_path)
     return ContactProfile(y[keep], z[keep], smoothing)
 
 
-def _check_points(y: Array, z: Array, smoothing: float, file: object) -> None:
+def _check_points(y: Array, z: Array, smoothing: float, profile_path: object) -> None:
     """Refuse profile points of wrong shape or size, that are not finite, or whose contour does not run along y; and a
     smoothing out of bounds.
     """
     if y.ndim != 1 or y.shape != z.shape or y.size < 10:
-        raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
+        raise InputError(
+            profile_path, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more"
+        )
     if not (np.isfinite(y).all() and np.isfinite(z).all()):
-        raise InputError(file, "profile", None, "must hold finite numbers")
+        raise InputError(profile_path, "profile", None, "must hold finite numbers")
     width = float(np.ptp(y))
     if not 0.01 <= width <= 0.5:
         raise InputError(
-            file, "profile", width, "is its width in m, which must be from 0.01 to 0.5: is the unit right?"
+            profile_path, "profile", width, "is its width in m, which must be from 0.01 to 0.5: is the unit right?"
         )
     steps = np.diff(y)
     there, back = float(steps[steps > 0.0].sum()), float(-steps[steps < 0.0].sum())
     if min(there, back) > LARGEST_BACKWARD_RATIO * max(there, back):
         raise InputError(
-            file,
+            profile_path,
             "profile",
             None,
             f"runs {there:.3g} m along y and {back:.3g} m against it: points must follow the contour, y before z",
         )
-    _check_spikes(np.column_stack((y, z)), file)
+    _check_spikes(np.column_stack((y, z)), profile_path)
     if not 0.0 <= smoothing <= 0.05:
-        raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
+        raise InputError(profile_path, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
 
 
-def _check_spikes(points: Array, file: object) -> None:
+def _check_spikes(points: Array, profile_path: object) -> None:
     """Refuse measurement errors: points far from the line between their neighbours. A contour never turns back
     sharply.
     """
@@ -113,24 +115,27 @@ def _check_spikes(points: Array, file: object) -> None:
     if spikes.any():
         y, z = points[1 + int(np.argmax(spikes))]
         raise InputError(
-            file,
+            profile_path,
             "profile",
             [float(y), float(z)],
             f"sticks out between its neighbours: {spikes.sum()} such points (m); take out what was measured wrongly",
         )
 
 
-def _check_rough(y: Array, keep: slice, file: object) -> None:
+def _check_backward_steps(y: Array, kept_points: slice, profile_path: object) -> None:
     """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data, since the points beyond would
     be lost.
     """
-    for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
+    for beyond, last in (
+        (y[kept_points.stop :], y[kept_points.stop - 1]),
+        (-y[: kept_points.start][::-1], -y[kept_points.start]),
+    ):
         highest = np.maximum.accumulate(np.append(last, beyond))[1:]
         rough = np.logical_and.accumulate(highest - beyond < LARGEST_BACKWARD_STEP)
         lost = float(np.max(beyond[rough], initial=last) - last)
         if lost > LARGEST_BACKWARD_STEP:
             raise InputError(
-                file,
+                profile_path,
                 "profile",
                 float(abs(last)),
                 f"is |y| (m) where the contour turns back by less than "
@@ -139,18 +144,18 @@ def _check_rough(y: Array, keep: slice, file: object) -> None:
             )
 
 
-def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Array:
+def _smoothed_coordinate(contour_lengths: Array, coordinate: Array, even_lengths: Array, smoothing: float) -> Array:
     """Smoothed coordinate at evenly spaced lengths along the contour: the curve that minimises error^2 + (L / 2 pi)^4
     curvature^2.
     """
-    interpolated = CubicSpline(length, values)(even)
+    interpolated = CubicSpline(contour_lengths, coordinate)(even_lengths)
     if smoothing == 0.0:
         return interpolated
-    penalty = (smoothing / (2.0 * np.pi)) ** 4 / (even[1] - even[0])
-    return make_smoothing_spline(even, interpolated, lam=penalty)(even)
+    penalty = (smoothing / (2.0 * np.pi)) ** 4 / (even_lengths[1] - even_lengths[0])
+    return make_smoothing_spline(even_lengths, interpolated, lam=penalty)(even_lengths)
 
 
-def _ascending(y: Array) -> slice:
+def _longest_ascending_run(y: Array) -> slice:
     """Longest run of consecutive profile points with ascending y."""
     breaks = np.flatnonzero(np.diff(y) <= 0.0)
     starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])

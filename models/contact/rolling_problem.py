@@ -29,30 +29,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.contact.inputs import NEGLIGIBLE_BOUND, Array, creepages, number
+from models.contact.inputs import NEGLIGIBLE_BOUND, Array, checked_creepages, checked_number
 from models.contact.material import MaterialPair
 from models.contact.normal_problem import PressureGrid
-from models.contact.rolling_kernels import sweep
-from models.contact.rolling_operator import NO_SHIFT, UPSTREAM, FreeSystem, SlipOperator
+from models.contact.rolling_kernels import gauss_seidel_sweep
+from models.contact.rolling_operator import ROLLING_WEIGHTS, SHIFT_WEIGHTS, FreeTractionSystem, SlipOperator
 from models.core.errors import RunFailed
 
-TOLERANCE = 1e-8
+STICK_SLIP_TOLERANCE = 1e-8
 """Largest residual of a rolling solution."""
 COARSEST_CELLS = 16
 """Number of cells along the shorter side below which a grid is solved from zero traction; larger grids start from a
 grid with half of them, for which the exact theory of few cells is near enough.
 """
-MOST_STEPS = 12
+NEWTON_STEP_LIMIT = 12
 """Largest number of steps of Newton's method alone; three to six are usual."""
 RELAXATION, RELAXATION_FACTOR = 0.5, 0.7
 """Relaxation of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than
 long.
 """
-SWEEPS = 3
+SWEEP_COUNT = 3
 """Number of Gauss-Seidel sweeps in each round."""
-MOST_ROUNDS = 60
+ROUND_LIMIT = 60
 """Largest number of rounds of sweeps and Newton steps before the problem is given up."""
-RigidSlip = Callable[[Array, Array, float], Array]
+RigidSlipOfGrid = Callable[[Array, Array, float], Array]
 """Function for the rigid slip (ny, nx, 2) at positions x (nx,) and y (ny,) of cells of a length (m)."""
 
 
@@ -94,11 +94,11 @@ def solve_rolling(
     Raises
     ------
     InputError : a value that is not one number in its range, too unlike materials
-    RunFailed : the conditions of stick and slip were not met to ``TOLERANCE``
+    RunFailed : the conditions of stick and slip were not met to ``STICK_SLIP_TOLERANCE``
     """
-    motion = creepages(xi_x, xi_y, spin, number).values()
+    motion = checked_creepages(xi_x, xi_y, spin, checked_number).values()
     return _stick_slip_solution(
-        normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, UPSTREAM
+        normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, ROLLING_WEIGHTS
     )
 
 
@@ -111,20 +111,28 @@ def solve_shift(
     shifts in m; in the result ``slip`` is in m and ``power`` the work of friction in J.
     """
     way_x, way_y = (
-        number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
+        checked_number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
         for name, value in (("shift_x", shift_x), ("shift_y", shift_y))
     )
     by_cell = _stick_slip_solution(
-        normal_solution, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, material_pair, NO_SHIFT
+        normal_solution,
+        mu,
+        lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length,
+        material_pair,
+        SHIFT_WEIGHTS,
     )
     return replace(by_cell, slip=by_cell.slip * normal_solution.dx, power=by_cell.power * normal_solution.dx)
 
 
 def _stick_slip_solution(
-    normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
+    normal_solution: PressureGrid,
+    mu: float,
+    rigid_slip_of_grid: RigidSlipOfGrid,
+    material_pair: MaterialPair,
+    difference_weights: tuple[float, ...],
 ) -> RollingSolution:
     """Solution of stick and slip for the given rigid slip, on the cells in contact."""
-    mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
+    mu = checked_number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     material_pair.require_likeness()
     shape = normal_solution.pressure.shape
     traction, slip = np.zeros((2, *shape, 2))
@@ -135,8 +143,10 @@ def _stick_slip_solution(
     spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
     rows, columns = box = tuple(slice(span[0], span[-1] + 1) for span in spans)
     bound = mu * normal_solution.pressure[box] / material_pair.G
-    cells = _Cells(normal_solution.x[columns], normal_solution.y[rows], normal_solution.dx, normal_solution.dy, bound)
-    state, rounds = _solve(cells, rigid, material_pair, weights)
+    cells = _CellGrid(
+        normal_solution.x[columns], normal_solution.y[rows], normal_solution.dx, normal_solution.dy, bound
+    )
+    state, rounds = _solve_on_grid(cells, rigid_slip_of_grid, material_pair, difference_weights)
     slips = ~state.stick & (state.bound > 0)
     traction[box], stick[box], slip[box] = material_pair.G * state.traction, state.stick, state.slip * slips[..., None]
     cell = normal_solution.dx * normal_solution.dy
@@ -154,23 +164,25 @@ def rigid_slip(x: Array, y: Array, xi_x: float, xi_y: float, spin: float) -> Arr
     return np.stack([along, across], axis=-1)
 
 
-class _State:
+class _TractionState:
     """State of the cells: tractions (ny, nx, 2) in units of G, their slip, and the largest residual of the stick and
     slip conditions.
     """
 
-    def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
-        self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
-        self.slip = rigid + operator(traction)
-        self.trial = traction - self.slip / operator.own_slip.max()
+    def __init__(
+        self, slip_operator: SlipOperator, rigid_slips: Array, traction_bounds: Array, traction: Array
+    ) -> None:
+        self.operator, self.rigid, self.bound, self.traction = slip_operator, rigid_slips, traction_bounds, traction
+        self.slip = rigid_slips + slip_operator(traction)
+        self.trial = traction - self.slip / slip_operator.own_slip.max()
         self.size = np.linalg.norm(self.trial, axis=-1)
-        cut = np.where(self.size > bound, bound / np.where(self.size > 0, self.size, 1.0), 1.0)
+        cut = np.where(self.size > traction_bounds, traction_bounds / np.where(self.size > 0, self.size, 1.0), 1.0)
         needed = self.trial * cut[..., None] - traction
-        self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
+        self.residual = float(np.linalg.norm(needed, axis=-1)[traction_bounds > 0].max() / traction_bounds.max())
 
-    def with_tractions(self, traction: Array) -> "_State":
+    def with_tractions(self, traction: Array) -> "_TractionState":
         """A new state of the cells with other tractions."""
-        return _State(self.operator, self.rigid, self.bound, traction)
+        return _TractionState(self.operator, self.rigid, self.bound, traction)
 
     @property
     def stick(self) -> Array:
@@ -179,7 +191,7 @@ class _State:
 
 
 @dataclass(frozen=True)
-class _Cells:
+class _CellGrid:
     """Grid of cells: centres x (nx,) and y (ny,) (m), sides dx and dy (m), and traction bounds in units of G (ny,
     nx).
     """
@@ -190,13 +202,13 @@ class _Cells:
     dy: float
     bound: Array
 
-    def coarser(self) -> "_Cells":
+    def coarser(self) -> "_CellGrid":
         """Grid of cells twice as long and wide; their bounds are means over the smaller cells. A last cell may extend
         beyond the old grid."""
         rows, columns = (count + count % 2 for count in self.bound.shape)
         bound = np.zeros((rows, columns))
         bound[: self.y.size, : self.x.size] = self.bound
-        return _Cells(
+        return _CellGrid(
             self.x[::2] + self.dx / 2,
             self.y[::2] + self.dy / 2,
             2 * self.dx,
@@ -205,87 +217,98 @@ class _Cells:
         )
 
 
-def _solve(
-    cells: _Cells, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
-) -> tuple[_State, int]:
+def _solve_on_grid(
+    cell_grid: _CellGrid,
+    rigid_slip_of_grid: RigidSlipOfGrid,
+    material_pair: MaterialPair,
+    difference_weights: tuple[float, ...],
+) -> tuple[_TractionState, int]:
     """State in which all stick and slip conditions hold, and the number of rounds on this grid; a coarser grid gives
     its start.
     """
-    bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
-    operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
-    zero_state = _State(operator, motion, bound, np.zeros_like(motion))
+    bound, motion = cell_grid.bound, rigid_slip_of_grid(cell_grid.x, cell_grid.y, cell_grid.dx)
+    operator = SlipOperator(
+        bound.shape[1], bound.shape[0], cell_grid.dx, cell_grid.dy, material_pair, difference_weights
+    )
+    zero_state = _TractionState(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST_CELLS:
         return _solve_tractions(zero_state)
-    coarse = cells.coarser()
-    coarse_tractions = _solve(coarse, rigid, material_pair, weights)[0].traction
+    coarse = cell_grid.coarser()
+    coarse_tractions = _solve_on_grid(coarse, rigid_slip_of_grid, material_pair, difference_weights)[0].traction
     relative = _at_quarter_cells(coarse_tractions / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
     state = zero_state.with_tractions(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
-    for step in range(MOST_STEPS):
-        if state.residual <= TOLERANCE:
+    for step in range(NEWTON_STEP_LIMIT):
+        if state.residual <= STICK_SLIP_TOLERANCE:
             return state, step
         state = _after_newton_step(state)
-    return _solve_tractions(_nearest(state, zero_state))
+    return _solve_tractions(_state_of_least_residual(state, zero_state))
 
 
-def _nearest(*states: _State) -> _State:
+def _state_of_least_residual(*cell_states: _TractionState) -> _TractionState:
     """The state with the smallest residual."""
-    return min(states, key=lambda state: state.residual)
+    return min(cell_states, key=lambda state: state.residual)
 
 
-def _at_quarter_cells(values: Array) -> Array:
+def _at_quarter_cells(cell_values: Array) -> Array:
     """Values (2 ny, 2 nx, 2) in the quarters of cells, linear between the cells' centres, from values (ny, nx, 2)."""
     for axis in (0, 1):
-        ends = np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
+        ends = np.pad(cell_values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
         before, here, after = (np.delete(ends, outer, axis) for outer in ([-1, -2], [0, -1], [0, 1]))
         pairs = np.stack([0.75 * here + 0.25 * before, 0.75 * here + 0.25 * after], axis=axis + 1)
-        values = pairs.reshape([2 * n if k == axis else n for k, n in enumerate(values.shape)])
-    return values
+        cell_values = pairs.reshape([2 * n if k == axis else n for k, n in enumerate(cell_values.shape)])
+    return cell_values
 
 
-def _solve_tractions(state: _State) -> tuple[_State, int]:
+def _solve_tractions(cell_state: _TractionState) -> tuple[_TractionState, int]:
     """State that satisfies all stick and slip conditions, by alternating sweeps and Newton steps, and the number of
     rounds."""
     relaxation, round_count = RELAXATION, 0
-    while state.residual > TOLERANCE:
-        if round_count == MOST_ROUNDS:
+    while cell_state.residual > STICK_SLIP_TOLERANCE:
+        if round_count == ROUND_LIMIT:
             raise RunFailed(
                 "rolling problem",
-                f"conditions of stick and slip met to {state.residual:.2g} only after {MOST_ROUNDS} rounds",
+                f"conditions of stick and slip met to {cell_state.residual:.2g} only after {ROUND_LIMIT} rounds",
             )
-        traction, motion = (np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (state.traction, state.rigid))
-        for _ in range(SWEEPS):
-            sweep(traction, motion, state.operator.reversed_kernel, state.bound, relaxation)
-        swept = state.with_tractions(np.moveaxis(traction, 0, -1))
-        nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _after_newton_step(swept))
-        relaxation *= 1.0 if nearest.residual < state.residual else RELAXATION_FACTOR
-        state, round_count = nearest, round_count + 1
-    return state, round_count
+        traction, motion = (
+            np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (cell_state.traction, cell_state.rigid)
+        )
+        for _ in range(SWEEP_COUNT):
+            gauss_seidel_sweep(traction, motion, cell_state.operator.reversed_kernel, cell_state.bound, relaxation)
+        swept = cell_state.with_tractions(np.moveaxis(traction, 0, -1))
+        nearest = (
+            swept
+            if swept.residual <= STICK_SLIP_TOLERANCE
+            else _state_of_least_residual(swept, _after_newton_step(swept))
+        )
+        relaxation *= 1.0 if nearest.residual < cell_state.residual else RELAXATION_FACTOR
+        cell_state, round_count = nearest, round_count + 1
+    return cell_state, round_count
 
 
-def _after_newton_step(state: _State) -> _State:
+def _after_newton_step(cell_state: _TractionState) -> _TractionState:
     """The state after one Newton step, or the unchanged state if the linear solver fails for rounding."""
     try:
-        return state.with_tractions(_newton(state))
+        return cell_state.with_tractions(_newton_tractions(cell_state))
     except RunFailed:
-        return state
+        return cell_state
 
 
-def _newton(state: _State) -> Array:
-    """Tractions after a Newton step in which the sets of sticking and slipping cells are those of ``state``.
+def _newton_tractions(cell_state: _TractionState) -> Array:
+    """Tractions after a Newton step in which the sets of sticking and slipping cells are those of ``cell_state``.
 
     A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is
     opposite to its slip: t.C d + (|s| / g) d = -t.s along the tangent t.
     """
-    bound, slips = state.bound, (state.size > state.bound) & (state.bound > 0)
-    opposite = state.trial / np.where(state.size > 0, state.size, 1.0)[..., None]
-    traction = np.where(slips[..., None], bound[..., None] * opposite, state.traction)
-    slip = state.rigid + state.operator(traction)
+    bound, slips = cell_state.bound, (cell_state.size > cell_state.bound) & (cell_state.bound > 0)
+    opposite = cell_state.trial / np.where(cell_state.size > 0, cell_state.size, 1.0)[..., None]
+    traction = np.where(slips[..., None], bound[..., None] * opposite, cell_state.traction)
+    slip = cell_state.rigid + cell_state.operator(traction)
     tangent = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
     free = np.where(slips[..., None, None], tangent[..., :, None] * tangent[..., None, :], np.eye(2))
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    new_tractions = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
+    new_tractions = traction + FreeTractionSystem(cell_state.operator, free, stiff).solve(-slip)
     size = np.linalg.norm(new_tractions, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
     return new_tractions * onto[..., None]

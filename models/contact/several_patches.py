@@ -24,12 +24,12 @@ from models.contact.simplified_kernels import (
     GRADIENT,
     LEAST_STIFFNESS_SHARE,
     POINTS_PER_MESH,
-    coarse_net,
+    cell_sizes,
+    coarse_cells,
     covariances,
-    displacement,
-    mesh_of,
+    normal_displacement,
     normal_displacement_sums,
-    resultant,
+    pressure_resultant,
     slope_products,
     tangential_displacement_sums,
 )
@@ -37,7 +37,7 @@ from models.core.errors import RunFailed
 
 PATCHES_TOLERANCE = 1e-11
 """Relative error of approach and load at which the iteration of several patches ends."""
-ROOT_SEARCHES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
+ROOT_SEARCH_SETTINGS = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
 """Root finder, first step and ratio of the start to the given one, tried in turn: where a patch only just touches
 beside a large one the fit has kinks, at which a single search may stop.
 """
@@ -65,8 +65,8 @@ class CoarseGrid:
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
 
-def coarse_grid(patch: Patch, depth: float, cells: int, shape: int) -> CoarseGrid:
-    """Coarse grid of a patch at a depth (m), with ``cells`` x ``cells`` cells."""
+def coarse_grid(patch: Patch, depth: float, cell_count: int, pressure_shape: int) -> CoarseGrid:
+    """Coarse grid of a patch at a depth (m), with ``cell_count`` x ``cell_count`` cells."""
     x, y, low = patch.bottom
     nothing = np.zeros((1, 1))
     empty = CoarseGrid(
@@ -75,94 +75,103 @@ def coarse_grid(patch: Patch, depth: float, cells: int, shape: int) -> CoarseGri
     if depth <= low:
         return empty
     surface, box = patch.surface(depth), patch.box(depth)
-    height, pressure, cover = coarse_net(surface, cells, shape)
-    volume = float(resultant(surface, POINTS_PER_MESH * cells, shape))
+    height, pressure, cover = coarse_cells(surface, cell_count, pressure_shape)
+    volume = float(pressure_resultant(surface, POINTS_PER_MESH * cell_count, pressure_shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
-    dx, dy = mesh_of(box, cells)
-    middles = np.arange(cells) + 0.5
+    dx, dy = cell_sizes(box, cell_count)
+    middles = np.arange(cell_count) + 0.5
     y, x = np.meshgrid(box[2] + middles * dy + patch.contour_position, box[0] + middles * dx, indexing="ij")
     return CoarseGrid(x, y, height, pressure, cover, (dx, dy), volume)
 
 
 def solve_common_approach(
-    nets: Sequence[CoarseGrid], material_pair: MaterialPair, kind: int, lows: Array, depths: Array
+    coarse_grids: Sequence[CoarseGrid],
+    material_pair: MaterialPair,
+    fit_kind: int,
+    least_distances: Array,
+    depths: Array,
 ) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m) of patches at given depths (m), zero for patches without load, and their approaches
     (m).
     """
-    loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
+    loaded = [k for k, net in enumerate(coarse_grids) if net.volume > 0.0]
     displacements = {
-        (k, m): _displacement_by(nets[m], net, material_pair) for k, net in enumerate(nets) for m in loaded
+        (k, m): _displacement_by(coarse_grids[m], net, material_pair)
+        for k, net in enumerate(coarse_grids)
+        for m in loaded
     }
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
     for i, k in enumerate(loaded):
         total = np.sum([displacements[k, m] for m in loaded], axis=0)
-        products[i] = [_product(nets[k], total, displacements[k, m], kind) for m in loaded]
-        right[i] = -_product(nets[k], total, nets[k].height, kind)
-    stiffness = np.zeros(len(nets))
+        products[i] = [_fit_product(coarse_grids[k], total, displacements[k, m], fit_kind) for m in loaded]
+        right[i] = -_fit_product(coarse_grids[k], total, coarse_grids[k].height, fit_kind)
+    stiffness = np.zeros(len(coarse_grids))
     if loaded:
-        least = LEAST_STIFFNESS_SHARE * (depths - lows)[loaded] / [np.mean(displacements[k, k]) for k in loaded]
+        least = (
+            LEAST_STIFFNESS_SHARE * (depths - least_distances)[loaded] / [np.mean(displacements[k, k]) for k in loaded]
+        )
         stiffness[loaded] = np.maximum(np.linalg.lstsq(products, right, rcond=None)[0], least)
     raised_heights = [
-        sum((stiffness[m] * displacements[k, m] for m in loaded), nets[k].height) for k in range(len(nets))
+        sum((stiffness[m] * displacements[k, m] for m in loaded), coarse_grids[k].height)
+        for k in range(len(coarse_grids))
     ]
     approach = [
         (net.pressure * u).sum() / net.pressure.sum() if net.volume > 0.0 else float(u[0, 0]) + depth - low
-        for net, u, depth, low in zip(nets, raised_heights, depths, lows, strict=True)
+        for net, u, depth, low in zip(coarse_grids, raised_heights, depths, least_distances, strict=True)
     ]
     return stiffness, np.array(approach)
 
 
-def _displacement_by(source: CoarseGrid, target: CoarseGrid, material_pair: MaterialPair) -> Array:
+def _displacement_by(loaded_grid: CoarseGrid, target_grid: CoarseGrid, material_pair: MaterialPair) -> Array:
     """Normal displacement (m) at the points of one grid caused by W times the pressure of another grid, or of
     itself.
     """
-    if source is target:
-        return displacement(source.pressure, *source.step, material_pair.modulus)
+    if loaded_grid is target_grid:
+        return normal_displacement(loaded_grid.pressure, *loaded_grid.step, material_pair.modulus)
     sums = normal_displacement_sums(
-        source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel()
+        loaded_grid.x.ravel(), loaded_grid.y.ravel(), loaded_grid.forces, target_grid.x.ravel(), target_grid.y.ravel()
     )
-    return sums.reshape(target.x.shape) / (np.pi * material_pair.modulus)
+    return sums.reshape(target_grid.x.shape) / (np.pi * material_pair.modulus)
 
 
-def _product(net: CoarseGrid, first: Array, second: Array, kind: int) -> float:
+def _fit_product(grid: CoarseGrid, first_field: Array, second_field: Array, fit_kind: int) -> float:
     """Scalar product of two displacement fields for the least-squares fit: of their slopes, or of their deviations from
     the mean.
     """
-    if kind == GRADIENT:
-        return float(slope_products(first, second, net.cover, *net.step, True)[0])
-    return float(covariances(first, second, net.cover)[1])
+    if fit_kind == GRADIENT:
+        return float(slope_products(first_field, second_field, grid.cover, *grid.step, True)[0])
+    return float(covariances(first_field, second_field, grid.cover)[1])
 
 
 def solve_depths(
     patches: Sequence[Patch],
-    start: Array,
+    start_values: Array,
     load: float | None,
     material_pair: MaterialPair,
-    options: tuple[int, int, int],
+    coded_options: tuple[int, int, int],
 ) -> tuple[Array, Array, Array]:
     """Depths (m) of patches followed by the common rigid approach (m), their stiffnesses (Pa/m) and loads (N).
 
-    start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
-    common direction. options : cells of a net, shape and kind of fit.
+    start_values : depths and approach near the answer, the approach the answer itself if there is no load. load : N
+    along the common direction. coded_options : cells of a net, shape and kind of fit.
     """
     lows, along = np.array([patch.low for patch in patches]), np.cos([patch.lean for patch in patches])
-    zero, (cells, shape, kind) = np.append(lows, lows.min()), options
-    unit = float(start[-1] - lows.min())
+    zero, (cells, shape, kind) = np.append(lows, lows.min()), coded_options
+    unit = float(start_values[-1] - lows.min())
 
-    def state(over: Array) -> tuple[Array, Array, Array, Array]:
-        *depths, approach = answer = zero + unit * over
+    def state(depths_and_approach: Array) -> tuple[Array, Array, Array, Array]:
+        *depths, approach = answer = zero + unit * depths_and_approach
         nets = [coarse_grid(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
         stiffness, reached = solve_common_approach(nets, material_pair, kind, lows, answer[:-1])
         loads = stiffness * [net.volume for net in nets]
-        last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
+        last = (approach - start_values[-1]) / unit if load is None else loads @ along / load - 1.0
         return np.append((reached - approach * along) / unit, last), answer, stiffness, loads
 
-    for method, factor, share in ROOT_SEARCHES:
+    for method, factor, share in ROOT_SEARCH_SETTINGS:
         solved = root(
             lambda over: state(over)[0],
-            share * (start - zero) / unit,
+            share * (start_values - zero) / unit,
             method=method,
             options={"xtol": 1e-14, "factor": factor},
         )
@@ -173,14 +182,14 @@ def solve_depths(
 
 
 def displacement_by_others(
-    nets: Sequence[CoarseGrid], tractions: Sequence[Array], k: int, material_pair: MaterialPair
+    coarse_grids: Sequence[CoarseGrid], tractions: Sequence[Array], grid_index: int, material_pair: MaterialPair
 ) -> Array:
     """Tangential displacement (2, cells, cells) in m of grid k caused by the tractions (2, cells, cells) in Pa on all
     other grids.
     """
-    result, target = np.zeros_like(tractions[k]), nets[k]
-    for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
-        if m != k:
+    result, target = np.zeros_like(tractions[grid_index]), coarse_grids[grid_index]
+    for m, (source, traction) in enumerate(zip(coarse_grids, tractions, strict=True)):
+        if m != grid_index:
             forces = traction.reshape(2, -1) * (source.step[0] * source.step[1])
             positions = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
             result += tangential_displacement_sums(*positions[:2], forces, *positions[2:], material_pair.nu).reshape(

@@ -18,22 +18,22 @@ POINTS_PER_MESH = 3
 LEAST_STIFFNESS_SHARE = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
 bottom leaves the fit undefined, and this bound keeps it positive."""
-Pair = tuple[float, float]
+PairOfNumbers = tuple[float, float]
 
 
-class Surface(NamedTuple):
+class PatchSurface(NamedTuple):
     """A patch at a depth: padded heights, first node and spacing along x and y, rectangle x0, x1, y0, y1 about it,
     depth and least distance (m)."""
 
     padded: Array
-    origin: Pair
-    step: Pair
+    origin: PairOfNumbers
+    step: PairOfNumbers
     box: tuple[float, float, float, float]
     depth: float
     low: float
 
 
-class FineNet(NamedTuple):
+class FineGrid(NamedTuple):
     """Strips of a patch: y, low and high end in x (s,) and width (m); pressure (s, n) in the cells from the leading
     edge back (Pa)."""
 
@@ -45,52 +45,56 @@ class FineNet(NamedTuple):
 
 
 @compiled
-def overlap_pressure(surface, height, shape):
+def overlap_pressure(surface, height, pressure_shape):
     """W times the pressure at a height: depth - height (parabolic), or the elliptic root function with the same value
     at the bottom."""
     over = surface.depth - height
     if over <= 0.0:
         return 0.0
-    return over if shape == PARABOLIC else math.sqrt(over * (surface.depth - surface.low))
+    return over if pressure_shape == PARABOLIC else math.sqrt(over * (surface.depth - surface.low))
 
 
 @compiled
-def mesh_of(box, cells):
+def cell_sizes(rectangle, cell_count):
     """Cell sizes dx, dy (m) of a grid of cells x cells over a rectangle."""
-    return (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    return (rectangle[1] - rectangle[0]) / cell_count, (rectangle[3] - rectangle[2]) / cell_count
 
 
 @compiled
-def coarse_net(surface, cells, shape):
+def coarse_cells(surface, cell_count, pressure_shape):
     """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y.
 
     The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
     """
-    height, pressure, cover = np.empty((cells, cells)), np.empty((cells, cells)), np.empty((cells, cells))
+    height, pressure, cover = (
+        np.empty((cell_count, cell_count)),
+        np.empty((cell_count, cell_count)),
+        np.empty((cell_count, cell_count)),
+    )
     padded, origin, step, box, depth, _ = surface
-    dx, dy = mesh_of(box, cells)
-    for j in range(cells):
+    dx, dy = cell_sizes(box, cell_count)
+    for j in range(cell_count):
         v = (box[2] + (j + 0.5) * dy - origin[1]) / step[1]
-        for i in range(cells):
+        for i in range(cell_count):
             u = (box[0] + (i + 0.5) * dx - origin[0]) / step[0]
             h, slope_x, slope_y = value_and_slopes(padded, u, v)
             fall = abs(slope_x) * dx / step[0] + abs(slope_y) * dy / step[1]
-            height[j, i], pressure[j, i] = h, overlap_pressure(surface, h, shape)
+            height[j, i], pressure[j, i] = h, overlap_pressure(surface, h, pressure_shape)
             share = 0.5 + (depth - h) / fall if fall > 0.0 else (1.0 if h < depth else 0.0)
             cover[j, i] = min(max(share, 0.0), 1.0)
     return height, pressure, cover
 
 
 @compiled
-def resultant(surface, points, shape):
+def pressure_resultant(surface, point_count, pressure_shape):
     """Integral of W p over the rectangle (m^3), by the midpoint rule with points x points points."""
     total, (padded, origin, step, box, _, _) = 0.0, surface
-    dx, dy = mesh_of(box, points)
-    for j in range(points):
+    dx, dy = cell_sizes(box, point_count)
+    for j in range(point_count):
         row = row_at(padded, (box[2] + (j + 0.5) * dy - origin[1]) / step[1])
-        for i in range(points):
+        for i in range(point_count):
             height = value_along_row(row, (box[0] + (i + 0.5) * dx - origin[0]) / step[0])
-            total += overlap_pressure(surface, height, shape)
+            total += overlap_pressure(surface, height, pressure_shape)
     return total * dx * dy
 
 
@@ -103,7 +107,7 @@ def corner_integral(x, y):
 
 
 @compiled
-def displacement(pressure, dx, dy, modulus):
+def normal_displacement(pressure, dx, dy, contact_modulus):
     """Normal displacement (m) of both bodies together at the centres of the grid cells, by a pressure (Pa) on each
     cell."""
     cells = pressure.shape[0]
@@ -125,68 +129,73 @@ def displacement(pressure, dx, dy, modulus):
                     k, first = abs(j - row), cells - 1 - column
                     for i in range(cells):
                         sums[j, i] += influence[k, first + i] * p
-    return sums / (math.pi * modulus)
+    return sums / (math.pi * contact_modulus)
 
 
 @compiled
-def covariances(u, h, cover):
+def covariances(displacements, heights, covered_shares):
     """Weighted mean of u; weighted sums (not divided) for the covariance of u and h and the variance of u. The covered
     shares are the weights."""
-    mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
+    mean_u, mean_h = weighted_mean(displacements, covered_shares), weighted_mean(heights, covered_shares)
     both = square = 0.0
-    for k in range(u.size):
-        du = u.flat[k] - mean_u
-        both += cover.flat[k] * du * (h.flat[k] - mean_h)
-        square += cover.flat[k] * du * du
+    for k in range(displacements.size):
+        du = displacements.flat[k] - mean_u
+        both += covered_shares.flat[k] * du * (heights.flat[k] - mean_h)
+        square += covered_shares.flat[k] * du * du
     return mean_u, both, square
 
 
 @compiled
-def weighted_mean(values, weights):
-    """Weighted mean of ``values``; weights of the same shape. Loops compile ten times as fast as array expressions."""
+def weighted_mean(cell_values, cell_weights):
+    """Weighted mean of ``cell_values``; weights of the same shape. Loops compile ten times as fast as array
+    expressions.
+    """
     total = weight = 0.0
-    for k in range(values.size):
-        total += weights.flat[k] * values.flat[k]
-        weight += weights.flat[k]
+    for k in range(cell_values.size):
+        total += cell_weights.flat[k] * cell_values.flat[k]
+        weight += cell_weights.flat[k]
     return total / weight
 
 
 @compiled
-def slope_products(u, h, cover, dx, dy, along_y):
+def slope_products(displacements, heights, covered_shares, dx, dy, along_y):
     """Weighted sums over neighbouring cells: products of the slopes of u and h, and squares of the slopes of u."""
     product = square = 0.0
     for down in range(2 if along_y else 1):
         right, step = 1 - down, dy if down else dx
-        for j in range(u.shape[0] - down):
-            for i in range(u.shape[1] - right):
-                w = cover[j, i] * cover[j + down, i + right]
-                du, dh = (u[j + down, i + right] - u[j, i]) / step, (h[j + down, i + right] - h[j, i]) / step
+        for j in range(displacements.shape[0] - down):
+            for i in range(displacements.shape[1] - right):
+                w = covered_shares[j, i] * covered_shares[j + down, i + right]
+                du, dh = (
+                    (displacements[j + down, i + right] - displacements[j, i]) / step,
+                    (heights[j + down, i + right] - heights[j, i]) / step,
+                )
                 product += w * du * dh
                 square += w * du * du
     return product, square
 
 
 @compiled
-def coarse_fit(surface, cells, shape, kind, modulus):
+def coarse_fit(surface, cell_count, pressure_shape, fit_kind, contact_modulus):
     """Stiffness 1/W (Pa/m), rigid approach (m) and integral of W p over the area, for one patch at a penetration depth.
 
     The approach is the mean of u + h weighted by the pressure: the work of the pressure by the load.
     """
-    height, pressure, cover = coarse_net(surface, cells, shape)
-    dx, dy = mesh_of(surface.box, cells)
-    u = displacement(pressure, dx, dy, modulus)
+    height, pressure, cover = coarse_cells(surface, cell_count, pressure_shape)
+    dx, dy = cell_sizes(surface.box, cell_count)
+    u = normal_displacement(pressure, dx, dy, contact_modulus)
     mean_u, both, square = covariances(u, height, cover)
-    if kind == GRADIENT:
+    if fit_kind == GRADIENT:
         both, square = slope_products(u, height, cover, dx, dy, True)
     least = LEAST_STIFFNESS_SHARE * (surface.depth - surface.low) / mean_u
     stiffness = max(-both / square, least) if square > 0.0 else least
-    total = resultant(surface, POINTS_PER_MESH * cells, shape)
+    total = pressure_resultant(surface, POINTS_PER_MESH * cell_count, pressure_shape)
     approach = stiffness * weighted_mean(u, pressure) + weighted_mean(height, pressure)
     return stiffness, approach, total
 
 
 @compiled
-def tangential(traction, dx, dy, nu):
+def tangential_displacement(traction, dx, dy, nu):
     """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction of this shape (Cerruti)."""
     cells = traction.shape[1]
     corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
@@ -218,7 +227,7 @@ def tangential(traction, dx, dy, nu):
 
 
 @compiled
-def tangential_fit(u, traction, cover, dx, dy, kind):
+def tangential_fit(displacements, traction, covered_shares, dx, dy, fit_kind):
     """Flexibility W_1 = W_2 (m/Pa) from the least-squares fit u = W p + a, u and p both (2, cells, cells); 0 if no fit
     is possible.
 
@@ -226,17 +235,17 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
     """
     both = square = 0.0
     for k in range(2):
-        if kind == GRADIENT:
-            product, size = slope_products(traction[k], u[k], cover, dx, dy, False)
+        if fit_kind == GRADIENT:
+            product, size = slope_products(traction[k], displacements[k], covered_shares, dx, dy, False)
         else:
-            _, product, size = covariances(traction[k], u[k], cover)
+            _, product, size = covariances(traction[k], displacements[k], covered_shares)
         both += product
         square += size
     return both / square if square > 0.0 and both > 0.0 else 0.0
 
 
 @compiled
-def normal_displacement_sums(x, y, force, at_x, at_y):
+def normal_displacement_sums(x, y, loads, at_x, at_y):
     """Sum of force / r at points; times 1 / (pi E*) it is the normal displacement by loads (N) of another patch.
 
     All arguments are flat: loads at x, y, points at_x, at_y (m).
@@ -244,13 +253,13 @@ def normal_displacement_sums(x, y, force, at_x, at_y):
     sums = np.zeros(at_x.size)
     for k in range(at_x.size):
         for m in range(x.size):
-            if force[m] > 0.0:
-                sums[k] += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
+            if loads[m] > 0.0:
+                sums[k] += loads[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
     return sums
 
 
 @compiled
-def tangential_displacement_sums(x, y, force, at_x, at_y, nu):
+def tangential_displacement_sums(x, y, tangential_loads, at_x, at_y, nu):
     """Tangential displacements (2, points) times pi G at points, by tangential loads (2, n) (Cerruti; Johnson, section
     3.6)."""
     sums = np.zeros((2, at_x.size))
@@ -258,27 +267,27 @@ def tangential_displacement_sums(x, y, force, at_x, at_y, nu):
         for m in range(x.size):
             u, v = at_x[k] - x[m], at_y[k] - y[m]
             r = math.hypot(u, v)
-            along = nu * (u * force[0, m] + v * force[1, m]) / r**3
-            sums[0, k] += (1.0 - nu) * force[0, m] / r + u * along
-            sums[1, k] += (1.0 - nu) * force[1, m] / r + v * along
+            along = nu * (u * tangential_loads[0, m] + v * tangential_loads[1, m]) / r**3
+            sums[0, k] += (1.0 - nu) * tangential_loads[0, m] / r + u * along
+            sums[1, k] += (1.0 - nu) * tangential_loads[1, m] / r + v * along
     return sums
 
 
 @compiled
-def strips(surface, rows, cells, shape):
-    """``FineNet`` of a patch, with the product W p in place of the pressure.
+def fine_strips(surface, line_count, cell_count, pressure_shape):
+    """``FineGrid`` of a patch, with the product W p in place of the pressure.
 
-    Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
-    depth.
+    Each of ``line_count`` lines gives one strip per interval in which h < depth, its ends where the interpolation
+    passes the depth.
     """
     (padded, origin, step, box, depth, _), looks = surface, 2
-    width = (box[3] - box[2]) / rows
+    width = (box[3] - box[2]) / line_count
     first = max(int((box[0] - origin[0]) / step[0] * looks) - 1, 0)
     last = min(int((box[1] - origin[0]) / step[0] * looks) + 2, (padded.shape[1] - 3) * looks)
-    most = rows * (1 + (last - first) // 2)
+    most = line_count * (1 + (last - first) // 2)
     y, low_x, high_x = np.empty(most), np.empty(most), np.empty(most)
     count = 0
-    for k in range(rows):
+    for k in range(line_count):
         centre = box[2] + (k + 0.5) * width
         row = row_at(padded, (centre - origin[1]) / step[1])
         inside = value_along_row(row, first / looks) < depth
@@ -286,52 +295,55 @@ def strips(surface, rows, cells, shape):
         for m in range(first + 1, last + 1):
             now = value_along_row(row, m / looks) < depth
             if now and not inside:
-                start = crossing(row, depth, m / looks, (m - 1) / looks)
+                start = depth_crossing(row, depth, m / looks, (m - 1) / looks)
             if inside and (not now or m == last):
-                end = crossing(row, depth, (m - 1) / looks, m / looks) if not now else m / looks
+                end = depth_crossing(row, depth, (m - 1) / looks, m / looks) if not now else m / looks
                 y[count], low_x[count], high_x[count] = centre, origin[0] + start * step[0], origin[0] + end * step[0]
                 count += 1
             inside = now
-    pressure = np.empty((count, cells))
+    pressure = np.empty((count, cell_count))
     for s in range(count):
         row = row_at(padded, (y[s] - origin[1]) / step[1])
-        length = (high_x[s] - low_x[s]) / cells
-        for i in range(cells):
+        length = (high_x[s] - low_x[s]) / cell_count
+        for i in range(cell_count):
             h = value_along_row(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
-            pressure[s, i] = overlap_pressure(surface, h, shape)
-    return FineNet(y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), width, pressure)
+            pressure[s, i] = overlap_pressure(surface, h, pressure_shape)
+    return FineGrid(y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), width, pressure)
 
 
 @compiled
-def crossing(row, depth, inner, outer):
+def depth_crossing(height_row, depth, inner_position, outer_position):
     """Position where the row's height equals the depth, between points below and not below it (false position, Illinois
     rule)."""
-    at_inner, at_outer = value_along_row(row, inner) - depth, value_along_row(row, outer) - depth
-    middle, kept = outer, 0
+    at_inner, at_outer = (
+        value_along_row(height_row, inner_position) - depth,
+        value_along_row(height_row, outer_position) - depth,
+    )
+    middle, kept = outer_position, 0
     for _ in range(30):
-        middle = inner - at_inner * (outer - inner) / (at_outer - at_inner)
-        height = value_along_row(row, middle) - depth
-        if abs(height) < 1e-13 * (at_outer - at_inner) or abs(outer - inner) < 1e-12:
+        middle = inner_position - at_inner * (outer_position - inner_position) / (at_outer - at_inner)
+        height = value_along_row(height_row, middle) - depth
+        if abs(height) < 1e-13 * (at_outer - at_inner) or abs(outer_position - inner_position) < 1e-12:
             break
         if height < 0.0:
-            inner, at_inner = middle, height
+            inner_position, at_inner = middle, height
             at_outer *= 0.5 if kept < 0 else 1.0
             kept = -1
         else:
-            outer, at_outer = middle, height
+            outer_position, at_outer = middle, height
             at_inner *= 0.5 if kept > 0 else 1.0
             kept = 1
     return middle
 
 
 @compiled
-def march(net, mu, flexibility, motion, traction):
-    """FASTSIM along the strips of a ``FineNet``, for creepages and spin ``motion``; fills the tractions (s, n, 2).
+def march_strips(fine_net, mu, flexibility, creepages, traction):
+    """FASTSIM along the strips of a ``FineGrid``, for creepages and spin ``creepages``; fills the tractions (s, n, 2).
 
     Returns fx, fy (N), mz (N m, about x = y = 0), the area that sticks and the whole area (m^2). The march is the
     second-order one: half a first step, and the exact turning of a slipping traction.
     """
-    (y, low_x, high_x, width, pressure), (xi_x, xi_y, spin) = net, motion
+    (y, low_x, high_x, width, pressure), (xi_x, xi_y, spin) = fine_net, creepages
     fx = fy = mz = stuck = area = 0.0
     cells = pressure.shape[1]
     for s in range(y.size):
@@ -356,44 +368,47 @@ def march(net, mu, flexibility, motion, traction):
 
 
 @compiled
-def traction_after_step(px, py, u, v, bound, middle, slips):
+def traction_after_step(traction_x, traction_y, slip_x, slip_y, traction_bound, middle_bound, is_slipping):
     """Traction after a step, and whether it slips; without slip the rigid slip would subtract (u, v) from the traction.
 
     A traction that continues to slip stays on the bound and turns towards -(u, v): with psi between the two, tan(psi/2)
-    shrinks by exp(-|(u, v)| / middle), where ``middle`` is the bound in the middle of the step.
+    shrinks by exp(-|(u, v)| / middle), where ``middle_bound`` is the bound in the middle of the step.
     """
-    x, y = px - u, py - v
+    x, y = traction_x - slip_x, traction_y - slip_y
     size = math.hypot(x, y)
-    if size <= bound:
+    if size <= traction_bound:
         return x, y, False
-    slip, before = math.hypot(u, v), math.hypot(px, py)
-    if slips and slip > 0.0 and before > 0.0 and middle > 0.0:
-        cosine, sine = -(px * u + py * v) / (before * slip), (px * v - py * u) / (before * slip)
-        shrunk = math.exp(-slip / middle)
+    slip, before = math.hypot(slip_x, slip_y), math.hypot(traction_x, traction_y)
+    if is_slipping and slip > 0.0 and before > 0.0 and middle_bound > 0.0:
+        cosine, sine = (
+            -(traction_x * slip_x + traction_y * slip_y) / (before * slip),
+            (traction_x * slip_y - traction_y * slip_x) / (before * slip),
+        )
+        shrunk = math.exp(-slip / middle_bound)
         over, aside = (1.0 + cosine, shrunk * sine) if cosine > 0.0 else (sine, shrunk * (1.0 - cosine))
         square = over * over + aside * aside
         if square > 0.0:
             cosine, sine = (over * over - aside * aside) / square, 2.0 * over * aside / square
-        x, y, size = -cosine * u + sine * v, -cosine * v - sine * u, slip
-    return bound * x / size, bound * y / size, True
+        x, y, size = -cosine * slip_x + sine * slip_y, -cosine * slip_y - sine * slip_x, slip
+    return traction_bound * x / size, traction_bound * y / size, True
 
 
 @compiled
-def coarse_tractions(net, traction, box, cells):
+def coarse_tractions(fine_net, traction, rectangle, cell_count):
     """Mean tractions (2, cells, cells) on the coarse grid; each strip cell counts by its overlap with the coarse
     cell."""
-    (y, low_x, high_x, width, _), sums = net, np.zeros((2, cells, cells))
-    dx, dy = mesh_of(box, cells)
+    (y, low_x, high_x, width, _), sums = fine_net, np.zeros((2, cell_count, cell_count))
+    dx, dy = cell_sizes(rectangle, cell_count)
     steps = traction.shape[1]
     for s in range(y.size):
         length = (high_x[s] - low_x[s]) / steps
-        bottom, top = (y[s] - 0.5 * width - box[2]) / dy, (y[s] + 0.5 * width - box[2]) / dy
-        for j in range(max(int(bottom), 0), min(int(top) + 1, cells)):
+        bottom, top = (y[s] - 0.5 * width - rectangle[2]) / dy, (y[s] + 0.5 * width - rectangle[2]) / dy
+        for j in range(max(int(bottom), 0), min(int(top) + 1, cell_count)):
             high = max(min(top, j + 1.0) - max(bottom, 1.0 * j), 0.0)
             for i in range(steps):
-                right = (high_x[s] - i * length - box[0]) / dx
+                right = (high_x[s] - i * length - rectangle[0]) / dx
                 left = right - length / dx
-                for k in range(max(int(left), 0), min(int(right) + 1, cells)):
+                for k in range(max(int(left), 0), min(int(right) + 1, cell_count)):
                     share = high * max(min(right, k + 1.0) - max(left, 1.0 * k), 0.0)
                     sums[0, j, k] += share * traction[s, i, 0]
                     sums[1, j, k] += share * traction[s, i, 1]

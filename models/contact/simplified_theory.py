@@ -36,25 +36,25 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from models.contact.fields import Fields
-from models.contact.inputs import Array, creepages, number, whole_number
+from models.contact.fields import ContactFields
+from models.contact.inputs import Array, checked_creepages, checked_number, checked_whole_number
 from models.contact.material import MaterialPair
-from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, single_patch_of
+from models.contact.patches import NO_DEPTH, Patch, Rectangle, no_bottom_error, separate_patches, single_patch_of
 from models.contact.several_patches import coarse_grid, displacement_by_others, solve_depths
 from models.contact.simplified_kernels import (
     DISPLACEMENT,
     ELLIPTIC,
     GRADIENT,
     PARABOLIC,
-    FineNet,
+    FineGrid,
     coarse_fit,
     coarse_tractions,
-    march,
-    strips,
-    tangential,
+    fine_strips,
+    march_strips,
+    tangential_displacement,
     tangential_fit,
 )
-from models.contact.undeformed_distance import Distance
+from models.contact.undeformed_distance import UndeformedDistance
 from models.core.errors import InputError
 
 COARSE_CELLS = 15
@@ -62,10 +62,10 @@ COARSE_CELLS = 15
 FINE_CELLS = 45
 """Number of strips of the fine grid, and of cells along each strip."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
-SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
+PRESSURE_SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
 DEPTH_BY_APPROACH = 0.6
 """Ratio of a patch's depth to its approach, about; the search for several patches starts there."""
-FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
+FIT_KINDS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
 
 @dataclass(frozen=True)
@@ -82,22 +82,22 @@ class SimplifiedOptions:
     net: int = COARSE_CELLS
     shape: Literal["parabolic", "elliptic"] = "elliptic"
     fit: Literal["displacement", "gradient"] = "displacement"
-    separate: bool = True
+    separate_patches: bool = True
 
     def __post_init__(self) -> None:
-        whole_number("net", self.net, 3, 100)
-        for name, allowed in (("shape", SHAPES), ("fit", FITS)):
+        checked_whole_number("net", self.net, 3, 100)
+        for name, allowed in (("shape", PRESSURE_SHAPES), ("fit", FIT_KINDS)):
             if getattr(self, name) not in allowed:
                 raise InputError("", name, getattr(self, name), "is not known", tuple(allowed))
 
     @property
     def numbers(self) -> tuple[int, int, int]:
         """Number of coarse cells, shape and kind of fit, coded as compiled functions read them."""
-        return self.net, SHAPES[self.shape], FITS[self.fit]
+        return self.net, PRESSURE_SHAPES[self.shape], FIT_KINDS[self.fit]
 
 
-PLAIN = SimplifiedOptions()
-PAPER = SimplifiedOptions(shape="parabolic")
+DEFAULT_OPTIONS = SimplifiedOptions()
+PAPER_OPTIONS = SimplifiedOptions(shape="parabolic")
 """Options with which the theory is exactly that of the paper."""
 
 
@@ -114,7 +114,7 @@ class PatchPressure:
     stiffness: float
     approach: float
     load: float
-    box: Box
+    box: Rectangle
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ class NormalContact:
 
 
 @dataclass(frozen=True, eq=False)
-class Rolling:
+class SimplifiedRolling:
     """Forces of rolling contact by the simplified theory, the sum over all patches.
 
     fx, fy : forces on the wheel (N). mz : moment on the wheel about the z axis through x = y = 0 (N m). stick_share :
@@ -150,16 +150,16 @@ class Rolling:
     stick_share: float
     power: float
     flexibilities: tuple[float, ...]
-    fields: tuple[Fields, ...]
+    fields: tuple[ContactFields, ...]
 
 
-def press(
-    bodies: Distance | Sequence[Patch],
+def solve_normal_contact(
+    bodies: UndeformedDistance | Sequence[Patch],
     material_pair: MaterialPair,
     *,
     load: float | None = None,
     approach: float | None = None,
-    options: SimplifiedOptions = PLAIN,
+    simplified_options: SimplifiedOptions = DEFAULT_OPTIONS,
 ) -> NormalContact:
     """Normal contact of two bodies under a load (N), or at a rigid approach (m): area, pressure and approach.
 
@@ -170,38 +170,42 @@ def press(
     """
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load in N or the approach in m")
-    if isinstance(bodies, Distance):
-        bodies = separate(bodies) if options.separate else single_patch_of(bodies)
+    if isinstance(bodies, UndeformedDistance):
+        bodies = separate_patches(bodies) if simplified_options.separate else single_patch_of(bodies)
     patches = list(bodies)
     if not patches:
         raise InputError("", "bodies", bodies, "must be an undeformed distance, or one patch at least")
     lowest = min(patch.low / np.cos(patch.lean) for patch in patches)
     if load is not None:
-        wanted = number("load", load, "a load in N, up to 1e9", -1e9, 1e9)
+        wanted = checked_number("load", load, "a load in N, up to 1e9", -1e9, 1e9)
         if wanted <= 0.0:
-            return _sum_of_patches(lowest, (), material_pair, options)
-        return _by_load(patches, lowest, wanted, material_pair, options)
-    reached = number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
+            return _sum_of_patches(lowest, (), material_pair, simplified_options)
+        return _contact_under_load(patches, lowest, wanted, material_pair, simplified_options)
+    reached = checked_number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
     if reached <= lowest:
-        return _sum_of_patches(reached, (), material_pair, options)
-    return _patches_at_common_approach(patches, reached, None, material_pair, options)
+        return _sum_of_patches(reached, (), material_pair, simplified_options)
+    return _patches_at_common_approach(patches, reached, None, material_pair, simplified_options)
 
 
 def load_at_depth(
-    patch: Patch, depth: float, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN
+    patch: Patch, depth: float, material_pair: MaterialPair, simplified_options: SimplifiedOptions = DEFAULT_OPTIONS
 ) -> PatchPressure:
     """Load and approach of one patch at a depth d = -a_3 (m), the paper's N(a_3); W_3 is fitted on the coarse grid."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
-    stiffness, approach, volume = coarse_fit(patch.surface(depth), *options.numbers, material_pair.modulus)
+    stiffness, approach, volume = coarse_fit(patch.surface(depth), *simplified_options.numbers, material_pair.modulus)
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
 
 
-def _by_load(
-    patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
+def _contact_under_load(
+    patches: list[Patch],
+    lowest_depth: float,
+    load: float,
+    material_pair: MaterialPair,
+    simplified_options: SimplifiedOptions,
 ) -> NormalContact:
     """Normal contact that carries a load (N): the depth of a single patch, or the depths and common approach of
     several.
@@ -209,43 +213,48 @@ def _by_load(
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
-            lambda d: along * load_at_depth(patch, d, material_pair, options).load, load, patch.low, patch.edge
+            lambda d: along * load_at_depth(patch, d, material_pair, simplified_options).load,
+            load,
+            patch.low,
+            patch.edge,
         )
-        alone = load_at_depth(patch, depth, material_pair, options)
-        return _sum_of_patches(alone.approach / along, (alone,), material_pair, options)
+        alone = load_at_depth(patch, depth, material_pair, simplified_options)
+        return _sum_of_patches(alone.approach / along, (alone,), material_pair, simplified_options)
 
-    def alone_at(reached: float) -> float:
-        depths = zip(patches, _rough_depths(patches, reached), strict=True)
-        return _total_load([load_at_depth(patch, depth, material_pair, options) for patch, depth in depths])
+    def alone_at(reached_approach: float) -> float:
+        depths = zip(patches, _rough_depths(patches, reached_approach), strict=True)
+        return _total_load([load_at_depth(patch, depth, material_pair, simplified_options) for patch, depth in depths])
 
     return _patches_at_common_approach(
-        patches, _depth_for_load(alone_at, load, lowest, np.inf), load, material_pair, options
+        patches, _depth_for_load(alone_at, load, lowest_depth, np.inf), load, material_pair, simplified_options
     )
 
 
-def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
-    """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until the load is exceeded, then
-    refined by Brent's method.
+def _depth_for_load(load_at: Callable[[float], float], load: float, lowest_depth: float, largest_depth: float) -> float:
+    """Depth or approach (m) above ``lowest_depth`` at which the load is carried: doubled until the load is exceeded,
+    then refined by Brent's method.
     """
-    if limit - lowest <= NO_DEPTH:
-        raise no_bottom()
-    low, high = 0.0, min(1e-6, limit - lowest)
-    while load_at(lowest + high) < load:
-        if lowest + high >= limit:
+    if largest_depth - lowest_depth <= NO_DEPTH:
+        raise no_bottom_error()
+    low, high = 0.0, min(1e-6, largest_depth - lowest_depth)
+    while load_at(lowest_depth + high) < load:
+        if lowest_depth + high >= largest_depth:
             raise InputError(
                 "",
                 "load",
                 load,
                 "makes contact reach the edge of the area over which the distance is "
-                f"known (there it carries {load_at(limit):.4g} N): give a larger area",
+                f"known (there it carries {load_at(largest_depth):.4g} N): give a larger area",
             )
-        low, high = high, min(2.0 * high, limit - lowest)
-    return lowest + float(brentq(lambda over: load_at(lowest + over) - load, low, high, xtol=1e-20, rtol=1e-14))
+        low, high = high, min(2.0 * high, largest_depth - lowest_depth)
+    return lowest_depth + float(
+        brentq(lambda over: load_at(lowest_depth + over) - load, low, high, xtol=1e-20, rtol=1e-14)
+    )
 
 
-def _total_load(parts: Sequence[PatchPressure]) -> float:
+def _total_load(patch_pressures: Sequence[PatchPressure]) -> float:
     """Sum of the patches' loads (N) along the common direction."""
-    return float(sum(part.load * np.cos(part.patch.lean) for part in parts))
+    return float(sum(part.load * np.cos(part.patch.lean) for part in patch_pressures))
 
 
 def _rough_depths(patches: list[Patch], approach: float) -> list[float]:
@@ -257,76 +266,95 @@ def _rough_depths(patches: list[Patch], approach: float) -> list[float]:
 
 
 def _patches_at_common_approach(
-    patches: list[Patch], approach: float, load: float | None, material_pair: MaterialPair, options: SimplifiedOptions
+    patches: list[Patch],
+    approach: float,
+    load: float | None,
+    material_pair: MaterialPair,
+    simplified_options: SimplifiedOptions,
 ) -> NormalContact:
     """Patches at their common approach (m); if a load (N) is given, the approach that carries it is found from here."""
     start = np.array([*_rough_depths(patches, approach), approach])
-    (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, material_pair, options.numbers)
+    (*depths, reached), stiffnesses, loads = solve_depths(
+        patches, start, load, material_pair, simplified_options.numbers
+    )
     parts = []
     for patch, depth, stiffness, carried in zip(patches, map(float, depths), stiffnesses, loads, strict=True):
         if carried > 0.0:
             along = float(reached * np.cos(patch.lean))
             parts.append(PatchPressure(patch, depth, float(stiffness), along, float(carried), patch.box(depth)))
-    return _sum_of_patches(float(reached), tuple(parts), material_pair, options)
+    return _sum_of_patches(float(reached), tuple(parts), material_pair, simplified_options)
 
 
 def _sum_of_patches(
-    approach: float, parts: tuple[PatchPressure, ...], material_pair: MaterialPair, options: SimplifiedOptions
+    approach: float,
+    patch_pressures: tuple[PatchPressure, ...],
+    material_pair: MaterialPair,
+    simplified_options: SimplifiedOptions,
 ) -> NormalContact:
     """Normal contact summed over the patches; area and peak pressure come from strips with exact ends."""
-    area = sum(_area(part) for part in parts)
-    peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
-    return NormalContact(approach, _total_load(parts), area, peak, parts, material_pair, options)
+    area = sum(_patch_area(part) for part in patch_pressures)
+    peak = max((part.stiffness * (part.depth - part.patch.low) for part in patch_pressures), default=0.0)
+    return NormalContact(
+        approach, _total_load(patch_pressures), area, peak, patch_pressures, material_pair, simplified_options
+    )
 
 
-def _area(patch: PatchPressure, rows: int = 100) -> float:
+def _patch_area(patch: PatchPressure, line_count: int = 100) -> float:
     """Area (m^2) of one contact patch."""
-    net = strips(patch.patch.surface(patch.depth), rows, 1, PARABOLIC)
-    return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / rows) if net.y.size else 0.0
+    net = fine_strips(patch.patch.surface(patch.depth), line_count, 1, PARABOLIC)
+    return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / line_count) if net.y.size else 0.0
 
 
-def roll(
-    normal_contact: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = FINE_CELLS
-) -> Rolling:
+def solve_rolling_contact(
+    normal_contact: NormalContact,
+    friction: float,
+    xi_x: float,
+    xi_y: float,
+    spin: float,
+    *,
+    cell_count: int = FINE_CELLS,
+) -> SimplifiedRolling:
     """Forces of steady rolling: FASTSIM twice on the fine grid of each patch, W_1 = W_2 refitted in between.
 
-    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
-    moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
+    friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cell_count : strips, and cells in each, 3 or more. Spin
+    and moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
     creepages differ. Raises InputError for what is not one finite number, a friction below zero, too few cells, or
     bodies too unlike for the slip that their pressure makes to be left out.
     """
     normal_contact.pair.require_likeness()
-    friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
-    motion = tuple(creepages(xi_x, xi_y, spin, number).values())
-    cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
-    fine = [_fine_strips(part, normal_contact.options, cells) for part in normal_contact.patches]
+    friction = checked_number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
+    motion = tuple(checked_creepages(xi_x, xi_y, spin, checked_number).values())
+    cell_count = checked_whole_number("cells", cell_count, LEAST_CELLS, MOST_CELLS)
+    fine = [_fine_strips(part, normal_contact.options, cell_count) for part in normal_contact.patches]
     tractions = [np.zeros((*net.pressure.shape, 2)) for net in fine]
     tractions_on_coarse_cells = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
     # constant over the patch.
     for part, net, traction in zip(normal_contact.patches, fine, tractions, strict=True):
-        march(net, friction, 1.0 / part.stiffness, motion, traction)
+        march_strips(net, friction, 1.0 / part.stiffness, motion, traction)
         tractions_on_coarse_cells.append(coarse_tractions(net, traction, part.box, normal_contact.options.net))
-    flexibilities = _refitted(normal_contact, tractions_on_coarse_cells)
+    flexibilities = _refitted_flexibilities(normal_contact, tractions_on_coarse_cells)
     rolled = [
-        march(net, friction, flexibility, motion, traction)
+        march_strips(net, friction, flexibility, motion, traction)
         for net, flexibility, traction in zip(fine, flexibilities, tractions, strict=True)
     ]
     fx, fy, mz, stuck, area = (float(sum(forces[k] for forces in rolled)) for k in range(5))
     power = -(fx * motion[0] + fy * motion[1] + mz * motion[2])
-    fields = tuple(_fields(net, traction, friction) for net, traction in zip(fine, tractions, strict=True))
-    return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
+    fields = tuple(_fields_of_patch(net, traction, friction) for net, traction in zip(fine, tractions, strict=True))
+    return SimplifiedRolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
-    """``FineNet`` of a patch whose pressure carries its load, as ``march`` expects it."""
-    net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
-    carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
+def _fine_strips(patch: PatchPressure, simplified_options: SimplifiedOptions, cell_count: int) -> FineGrid:
+    """``FineGrid`` of a patch whose pressure carries its load, as ``march_strips`` expects it."""
+    net = fine_strips(
+        patch.patch.surface(patch.depth), cell_count, cell_count, PRESSURE_SHAPES[simplified_options.shape]
+    )
+    carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cell_count
     net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
     return net
 
 
-def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[float]:
+def _refitted_flexibilities(normal_contact: NormalContact, tractions: list[Array]) -> list[float]:
     """Flexibility W_1 = W_2 (m/Pa) of each patch from the least-squares fit u = W p + a on the coarse grids, with
     displacements u by the tractions of all patches.
 
@@ -336,21 +364,21 @@ def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[flo
     nets = [coarse_grid(part.patch, part.depth, options.net, PARABOLIC) for part in normal_contact.patches]
     flexibilities = []
     for k, (part, net, traction) in enumerate(zip(normal_contact.patches, nets, tractions, strict=True)):
-        u = tangential(traction, *net.step, pair.nu) / (np.pi * pair.G) + displacement_by_others(
+        u = tangential_displacement(traction, *net.step, pair.nu) / (np.pi * pair.G) + displacement_by_others(
             nets, tractions, k, pair
         )
-        fitted = float(tangential_fit(u, traction, net.cover, *net.step, FITS[options.fit]))
+        fitted = float(tangential_fit(u, traction, net.cover, *net.step, FIT_KINDS[options.fit]))
         flexibilities.append(fitted if fitted > 0.0 else 1.0 / part.stiffness)
     return flexibilities
 
 
-def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
+def _fields_of_patch(fine_net: FineGrid, traction: Array, friction: float) -> ContactFields:
     """Pressure, tractions and slip in each cell of each strip of a patch."""
-    y, low, high, width, pressure = net
+    y, low, high, width, pressure = fine_net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]
     x = high[:, None] - (np.arange(shape[1]) + 0.5) * length
     px, py = traction[..., 0], traction[..., 1]
     slips = np.hypot(px, py) >= friction * pressure * (1.0 - 1e-9)
     lines, lengths = np.broadcast_to(y[:, None], shape), np.broadcast_to(length, shape)
-    return Fields(x, lines, lengths, np.full(shape, width), pressure, px, py, slips, np.full(shape, True))
+    return ContactFields(x, lines, lengths, np.full(shape, width), pressure, px, py, slips, np.full(shape, True))

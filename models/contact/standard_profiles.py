@@ -15,12 +15,12 @@ from functools import cache
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.profiles import SPACING, ContactProfile
+from models.contact.profiles import POINT_SPACING, ContactProfile
 from models.core.errors import InputError
 
-MM = 1e-3
+METRES_PER_MILLIMETRE = 1e-3
 
-TREAD = (
+TREAD_COEFFICIENTS = (
     0.0,
     -3.358537058e-2,
     1.565681624e-3,
@@ -31,7 +31,7 @@ TREAD = (
     -5.957839843e-12,
     2.646656573e-13,
 )
-THROAT = (
+THROAT_COEFFICIENTS = (
     -4.320221063e3,
     -1.038384026e3,
     -1.065501873e2,
@@ -49,16 +49,16 @@ SECTIONS: tuple[Callable[[Array], Array], ...] = (
     lambda y: 8.834924130 + np.sqrt(20.0**2 - (y + 58.558326413) ** 2),
     lambda y: -93.576667419 - 2.747477419 * y,
     lambda y: 16.446 - np.sqrt(13.0**2 - (y + 26.210665) ** 2),
-    lambda y: np.polynomial.polynomial.polyval(y, THROAT),
-    lambda y: np.polynomial.polynomial.polyval(y, TREAD),
+    lambda y: np.polynomial.polynomial.polyval(y, THROAT_COEFFICIENTS),
+    lambda y: np.polynomial.polynomial.polyval(y, TREAD_COEFFICIENTS),
     lambda y: 1.364323640 - 0.066666667 * y,
 )
 """Height over y (mm) in each section of the wheel profile S1002, from the flange's back to the outer end of the
 tread.
 """
 
-RADII = (300.0, 80.0, 13.0)
-RADIUS_CHANGES = (10.49975, 25.98806)
+RAIL_HEAD_RADII = (300.0, 80.0, 13.0)
+RAIL_RADIUS_CHANGES = (10.49975, 25.98806)
 """Distance (mm) from the rail's axis at which the head's radius changes from 300 to 80 mm, and from 80 to 13 mm."""
 SIDE_SLOPE = 20.0
 """Slope of the rail head's side: height over width."""
@@ -75,23 +75,23 @@ def s1002_height(y: Array) -> Array:
 
 
 @cache
-def s1002() -> ContactProfile:
+def s1002_profile() -> ContactProfile:
     """The wheel profile S1002 from 0.5 mm inside its flange's back to 60 mm outside the taping line."""
     y = np.linspace(-69.5, 60.0, 20001)
     return _evenly_spaced(y, s1002_height(y))
 
 
 @cache
-def uic60() -> ContactProfile:
+def uic60_profile() -> ContactProfile:
     """The head of an upright UIC 60 rail as a profile, to 37 mm below its top."""
-    y, z = _half_head()
+    y, z = _half_rail_head()
     return _evenly_spaced(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
 
 
-def _half_head() -> tuple[Array, Array]:
+def _half_rail_head() -> tuple[Array, Array]:
     """Right half of the rail head (mm) from the axis: arcs that continue one another's tangent, then the side."""
     y, z, angle = [np.zeros(1)], [np.zeros(1)], 0.0
-    for radius, end in zip(RADII, (*RADIUS_CHANGES, None), strict=True):
+    for radius, end in zip(RAIL_HEAD_RADII, (*RAIL_RADIUS_CHANGES, None), strict=True):
         centre_y, centre_z = y[-1][-1] - radius * np.sin(angle), z[-1][-1] + radius * np.cos(angle)
         last = np.arctan(SIDE_SLOPE) if end is None else np.arcsin((end - centre_y) / radius)
         angles = np.linspace(angle, last, 2001)[1:]
@@ -106,17 +106,19 @@ def _half_head() -> tuple[Array, Array]:
 def _evenly_spaced(y: Array, z: Array) -> ContactProfile:
     """Profile in m of points (mm), at even distances along the contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
-    even = np.linspace(0.0, length[-1], round(length[-1] * MM / SPACING) + 1)
-    return ContactProfile(np.interp(even, length, y) * MM, np.interp(even, length, z) * MM)
+    even = np.linspace(0.0, length[-1], round(length[-1] * METRES_PER_MILLIMETRE / POINT_SPACING) + 1)
+    return ContactProfile(
+        np.interp(even, length, y) * METRES_PER_MILLIMETRE, np.interp(even, length, z) * METRES_PER_MILLIMETRE
+    )
 
 
-WHEELS = {"S1002": s1002}
-RAILS = {"UIC60": uic60}
+BUILT_IN_WHEELS = {"S1002": s1002_profile}
+BUILT_IN_RAILS = {"UIC60": uic60_profile}
 
 
-def built_in(name: str) -> ContactProfile:
+def built_in_profile(profile_name: str) -> ContactProfile:
     """The built-in wheel or rail profile of this name; raises InputError that lists the names."""
-    known = WHEELS | RAILS
-    if name not in known:
-        raise InputError("", "profile", name, "is not built in", tuple(known))
-    return known[name]()
+    known = BUILT_IN_WHEELS | BUILT_IN_RAILS
+    if profile_name not in known:
+        raise InputError("", "profile", profile_name, "is not built in", tuple(known))
+    return known[profile_name]()

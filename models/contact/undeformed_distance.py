@@ -11,11 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
-from models.contact.distance_kernels import valley, values
-from models.contact.inputs import Array, quantity
+from models.contact.distance_kernels import interpolated_values, valley_course
+from models.contact.inputs import Array, checked_quantity
 from models.core.errors import InputError
 
-NODES = 97
+NODE_COUNT = 97
 """Number of nodes along each axis of a computed distance: 48 spacings on each side of the centre."""
 LARGEST_UNEVENNESS = 2e-3
 """Largest deviation of a node from its even position, as a share of a step, at which nodes count as even; rounding in a
@@ -26,7 +26,7 @@ LARGEST_CONTACT = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Distance:
+class UndeformedDistance:
     """Undeformed distance of two surfaces on evenly spaced nodes.
 
     x : (nx,) and y : (ny,) nodes (m), ascending, the axes of the package. height : (ny, nx) distance (m), rows along y.
@@ -61,7 +61,7 @@ class Distance:
     @cached_property
     def padded(self) -> Array:
         """Heights (m) with an extra node on every side, extrapolated by the parabola through the three outermost."""
-        return _extrapolated(_extrapolated(self.height).T).T.copy()
+        return _extrapolated_rows(_extrapolated_rows(self.height).T).T.copy()
 
     def at(self, x: Array, y: Array) -> Array:
         """Distance (m) at points x, y (m), broadcast; raises InputError outside the nodes."""
@@ -70,7 +70,7 @@ class Distance:
             if points.size and not (nodes[0] <= points.min() and points.max() <= nodes[-1]):
                 raise InputError("", name, None, f"must lie from {nodes[0]:g} to {nodes[-1]:g} m, where h is known")
         u, v = (x.ravel() - self.x[0]) / self.dx, (y.ravel() - self.y[0]) / self.dy
-        return values(self.padded, u, v).reshape(x.shape)
+        return interpolated_values(self.padded, u, v).reshape(x.shape)
 
     @cached_property
     def valley_y(self) -> tuple[Array, Array, Array]:
@@ -87,47 +87,58 @@ class Distance:
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod
-    def _valley(padded: Array, along: Array, across: Array, step: float) -> tuple[Array, Array, Array]:
+    def _valley(
+        padded_heights: Array, valley_coordinates: Array, other_coordinates: Array, node_spacing: float
+    ) -> tuple[Array, Array, Array]:
         """Lines along one axis (m), the least height on each (m), and its position (m) on the other axis."""
         finer = 2
-        least, where = valley(padded, finer)
-        return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
+        least, where = valley_course(padded_heights, finer)
+        return (
+            np.linspace(valley_coordinates[0], valley_coordinates[-1], least.size),
+            least,
+            other_coordinates[0] + where * node_spacing,
+        )
 
-    def part(self, x: slice, y: slice) -> "Distance":
+    def part(self, x_nodes: slice, y_nodes: slice) -> "UndeformedDistance":
         """The undeformed distance restricted to some of its nodes."""
-        return Distance(self.x[x], self.y[y], self.height[y, x])
+        return UndeformedDistance(self.x[x_nodes], self.y[y_nodes], self.height[y_nodes, x_nodes])
 
 
 def from_function(
-    height: Callable[[Array, Array], Array], x: tuple[float, float], y: tuple[float, float], nodes: int = NODES
-) -> Distance:
+    height_formula: Callable[[Array, Array], Array],
+    x_range: tuple[float, float],
+    y_range: tuple[float, float],
+    node_count: int = NODE_COUNT,
+) -> UndeformedDistance:
     """Undeformed distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1],
     y[0]..y[1].
 
     Raises InputError for an empty rectangle and for a formula without a finite answer of the right shape.
     """
-    for name, (first, last) in (("x", x), ("y", y)):
+    for name, (first, last) in (("x", x_range), ("y", y_range)):
         if not (np.isfinite([first, last]).all() and first < last):
             raise InputError("", name, [first, last], "must be two finite bounds in m, the lower first")
-    nodes_x, nodes_y = np.linspace(*x, nodes), np.linspace(*y, nodes)
-    heights = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
+    nodes_x, nodes_y = np.linspace(*x_range, node_count), np.linspace(*y_range, node_count)
+    heights = checked_quantity("height", height_formula(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
     try:
-        heights = np.broadcast_to(heights, (nodes, nodes))
+        heights = np.broadcast_to(heights, (node_count, node_count))
     except ValueError:
         raise InputError("", "height", list(heights.shape), "must give one distance per point") from None
     return from_arrays(nodes_x, nodes_y, heights)
 
 
-def from_arrays(x: Array, y: Array, height: Array) -> Distance:
+def from_arrays(x: Array, y: Array, height: Array) -> UndeformedDistance:
     """Undeformed distance from values: x (nx,), y (ny,) even ascending nodes (m), height (ny, nx) (m), rows along y.
 
     Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
     """
     nodes = {
-        name: quantity(name, array, f"places in m within +-{LARGEST_CONTACT:g}", -LARGEST_CONTACT, LARGEST_CONTACT)
+        name: checked_quantity(
+            name, array, f"places in m within +-{LARGEST_CONTACT:g}", -LARGEST_CONTACT, LARGEST_CONTACT
+        )
         for name, array in (("x", x), ("y", y))
     }
-    height = quantity(
+    height = checked_quantity(
         "height", height, f"finite everywhere, in m within +-{LARGEST_CONTACT:g}", -LARGEST_CONTACT, LARGEST_CONTACT
     )
     for name, array in nodes.items():
@@ -139,16 +150,20 @@ def from_arrays(x: Array, y: Array, height: Array) -> Distance:
     shape = (nodes["y"].size, nodes["x"].size)
     if height.shape != shape:
         raise InputError("", "height", list(height.shape), f"must have the shape (ny, nx) = {shape}, rows along y")
-    return Distance(nodes["x"], nodes["y"], height.copy())
+    return UndeformedDistance(nodes["x"], nodes["y"], height.copy())
 
 
-def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Distance:
+def quadratic(
+    A: float, B: float, x_half_length: float, y_half_length: float, node_count: int = NODE_COUNT
+) -> UndeformedDistance:
     """Undeformed distance of Hertz' theory, A x^2 + B y^2 (A and B in 1/m), over -x..x and -y..y (m)."""
-    return from_function(lambda u, v: A * u**2 + B * v**2, (-x, x), (-y, y), nodes)
+    return from_function(
+        lambda u, v: A * u**2 + B * v**2, (-x_half_length, x_half_length), (-y_half_length, y_half_length), node_count
+    )
 
 
-def _extrapolated(rows: Array) -> Array:
+def _extrapolated_rows(table_rows: Array) -> Array:
     """The rows of a table with one more at each end, extrapolated by the parabola through the three nearest rows."""
-    first = 3.0 * (rows[0] - rows[1]) + rows[2]
-    last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]
-    return np.vstack([first, rows, last])
+    first = 3.0 * (table_rows[0] - table_rows[1]) + table_rows[2]
+    last = 3.0 * (table_rows[-1] - table_rows[-2]) + table_rows[-3]
+    return np.vstack([first, table_rows, last])

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import FINE, advance
-from models.brake.plane_records import PlaneMotion, Report
-from models.brake.plane_vehicle import Plane
-from models.brake.samples import moved
-from models.brake.surfaces import OnRoad
+from models.brake.plane_records import PlaneMotion, WheelReport
+from models.brake.plane_vehicle import PlaneVehicle
+from models.brake.samples import samples_with_step
+from models.brake.surfaces import VehicleOnRoad
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond
@@ -77,7 +77,7 @@ def set_held(block_address, t, coordinate_count):
     held(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
 
 
-def bodies(plane_vehicle: Plane) -> SpatialVehicle:
+def bodies(plane_vehicle: PlaneVehicle) -> SpatialVehicle:
     """The units of a plane vehicle (tractor, trailers) as bodies of an engine. Each unit after the first turns about
     its hinge.
 
@@ -100,7 +100,7 @@ class EngineChassis:
     """The chassis of a plane vehicle in an engine. Its ``advance`` replaces the compiled function
     ``models.brake.advance.advance``."""
 
-    def __init__(self, engine: str, plane_vehicle: Plane) -> None:
+    def __init__(self, engine: str, plane_vehicle: PlaneVehicle) -> None:
         units, none = plane_vehicle.masses.size, np.zeros((3, plane_vehicle.wheels))
         wheels = np.vstack((plane_vehicle.unit, plane_vehicle.place.T, none))
         numbers = np.concatenate(([units, plane_vehicle.wheels], plane_vehicle.reach.ravel(), wheels.ravel()))
@@ -109,11 +109,17 @@ class EngineChassis:
         self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane_vehicle.wheels))
 
     def advance(
-        self, motion: PlaneMotion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
+        self,
+        motion: PlaneMotion,
+        torques: np.ndarray,
+        step: float,
+        steer: np.ndarray,
+        vehicle: VehicleOnRoad,
+        *lag: Any,
     ) -> tuple[int, float]:
         """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``Lag``); the
         engine computes the motion in each step (s). Returns the status and the time (s)."""
-        time, report, go = 0.0, Report(*motion.report), advance
+        time, report, go = 0.0, WheelReport(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go
         for n in range(len(torques) - 1):
@@ -128,9 +134,10 @@ class EngineChassis:
         return FINE, time
 
     def moving(self, *arguments: Any) -> Iterator[tuple[int, float, float, float]]:
-        """Generator that marches a braked vehicle as ``models.brake.samples.samples`` does; the engine computes the
-        motion in each step."""
-        return moved(self.advance)(*arguments)
+        """Generator that marches a braked vehicle as ``models.brake.samples.sample_generator`` does; the engine
+        computes the motion in each step.
+        """
+        return samples_with_step(self.advance)(*arguments)
 
     def _state_after_step(self, state_before: np.ndarray, time_step: float) -> np.ndarray:
         """Positions and rates (2, 2 + U) of the U units after a step (s) of the engine."""

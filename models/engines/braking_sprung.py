@@ -10,30 +10,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from models.brake.advance import FOLDED
-from models.brake.plane_records import KNOWN, PlaneMotion, Wheels, motion_of
-from models.brake.samples import moved
-from models.brake.sprung import FOLD, Sprung
+from models.brake.plane_records import WHEEL_QUANTITY_COUNT, PlaneMotion, WheelStates, motion_of
+from models.brake.samples import samples_with_step
+from models.brake.sprung import LARGEST_HINGE_ANGLE, SprungVehicle
 from models.brake.sprung_step import (
     GAVE_UP,
+    LARGEST_LEAN,
     OVER,
-    PLANE,
-    UPRIGHT,
+    PLANE_COORDINATE_COUNT,
     VALUES_PER_WHEEL,
-    AtWheels,
-    Contacts,
-    OnEngine,
-    Units,
-    WheelForces,
+    SprungStepData,
+    SprungWheelForces,
+    TrainUnits,
+    WheelContacts,
+    WheelData,
     advance,
     advance_with,
+    fill_unit_values,
     forces_and_contacts,
     forces_from_pointers,
     set_forces_from_block,
     set_slip_angles,
     store_mean_forces,
-    to_units,
 )
-from models.brake.surfaces import OnRoad, surfaces, under_wheels
+from models.brake.surfaces import VehicleOnRoad, fill_surfaces_under_wheels, new_wheel_surfaces
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
@@ -44,14 +44,14 @@ from models.engines.towed_springs import shared_numbers, towed_division
 from models.vehicles.spatial_linear import linearise, mass
 
 if TYPE_CHECKING:
-    from models.brake.relaxation import Lag
+    from models.brake.relaxation import TyreLag
     from models.brake.sprung_relaxation import ContactLag
 
 BLINK = 1e-5
 """Duration (s) of the short step from which the accelerations of a freely rolling vehicle are computed."""
 
 
-def driven_vehicle(sprung_vehicle: Sprung, engine: str) -> Driven:
+def driven_vehicle(sprung_vehicle: SprungVehicle, engine: str) -> Driven:
     """The free vehicle for "exudyn" or "mujoco": springs that the engine itself computes, and the table of all other
     forces."""
     handling = sprung_vehicle.handling
@@ -66,12 +66,14 @@ class EngineSprungVehicle:
     """A braked vehicle on its suspension in an engine. Its ``advance`` replaces the compiled function
     ``models.brake.advance.advance``, for all coordinates."""
 
-    def __init__(self, engine: str, sprung_vehicle: Sprung) -> None:
+    def __init__(self, engine: str, sprung_vehicle: SprungVehicle) -> None:
         self.engine, self.vehicle, self.size = engine, sprung_vehicle, sprung_vehicle.size
         self.wheels = len(sprung_vehicle.handling.vehicle.tyres)
         self._driven = driven_vehicle(sprung_vehicle, engine)
-        self._units = Units(
-            sprung_vehicle.turns, sprung_vehicle.leans, np.zeros((2, PLANE + sprung_vehicle.turns.size))
+        self._units = TrainUnits(
+            sprung_vehicle.turns,
+            sprung_vehicle.leans,
+            np.zeros((2, PLANE_COORDINATE_COUNT + sprung_vehicle.turns.size)),
         )
         self._allowed = set[float]()
 
@@ -83,7 +85,7 @@ class EngineSprungVehicle:
         A body that rolls lets its contacts go sideways more easily than its mass would.
         """
         handling, size = self.vehicle.handling, self.size
-        contacts, across = Contacts(*np.empty((3, self.wheels))), np.empty((self.wheels, size))
+        contacts, across = WheelContacts(*np.empty((3, self.wheels))), np.empty((self.wheels, size))
         for j, rate in enumerate(np.eye(size)):
             forces_and_contacts(self._driven.numbers, np.zeros(size), rate, np.zeros(size), contacts)
             across[:, j] = contacts.across
@@ -104,20 +106,20 @@ class EngineSprungVehicle:
 
             return native.lagging() if has_lag else (native.advance, native.by_steps)
         if not has_lag:
-            return advance, moved(advance)
-        from models.brake.sprung_relaxation import relax
+            return advance, samples_with_step(advance)
+        from models.brake.sprung_relaxation import advance_contact_lag
 
-        go = advance_with(relax=relax)
-        return go, moved(go)
+        go = advance_with(relax=advance_contact_lag)
+        return go, samples_with_step(go)
 
     @cached_property
-    def _on_engine(self) -> OnEngine:
+    def _on_engine(self) -> SprungStepData:
         """Data that time steps in the engine need for a vehicle whose tyres respond without lag."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
-        return OnEngine(
+        return SprungStepData(
             table,
             self._at_wheels(table),
-            Contacts(*np.zeros((3, self.wheels))),
+            WheelContacts(*np.zeros((3, self.wheels))),
             np.zeros(size),
             np.zeros((2, size)),
             np.zeros(size),
@@ -126,13 +128,15 @@ class EngineSprungVehicle:
             self._units,
         )
 
-    def _at_wheels(self, parameter_table: np.ndarray) -> AtWheels:
-        """``AtWheels``: the wheel quantities at the end of a table, whose memory they share."""
-        wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
-        return AtWheels(
-            WheelForces(*parameter_table[-VALUES_PER_WHEEL * self.wheels :].reshape(VALUES_PER_WHEEL, self.wheels)),
+    def _at_wheels(self, parameter_table: np.ndarray) -> WheelData:
+        """``WheelData``: the wheel quantities at the end of a table, whose memory they share."""
+        wheels = WheelStates(*np.zeros((WHEEL_QUANTITY_COUNT, self.wheels)))
+        return WheelData(
+            SprungWheelForces(
+                *parameter_table[-VALUES_PER_WHEEL * self.wheels :].reshape(VALUES_PER_WHEEL, self.wheels)
+            ),
             wheels,
-            surfaces(self.wheels),
+            new_wheel_surfaces(self.wheels),
         )
 
     def advance(
@@ -141,7 +145,7 @@ class EngineSprungVehicle:
         torques: np.ndarray,
         step: float,
         steer: np.ndarray,
-        vehicle: OnRoad,
+        vehicle: VehicleOnRoad,
         lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
         """Advance the vehicle as ``models.brake.advance.advance`` does; the state (2, n) has all coordinates and their
@@ -164,11 +168,12 @@ class EngineSprungVehicle:
         sample: float,
         braking: Any,
         motion: PlaneMotion,
-        vehicle: OnRoad,
-        lag: "Lag | None" = None,
+        vehicle: VehicleOnRoad,
+        lag: "TyreLag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """Generator that marches the vehicle as ``models.brake.samples.samples`` does; ``lag`` is the slip lag of the
-        tyres. Raises Refused for a step that is too long, and RunFailed as ``advance`` does."""
+        """Generator that marches the vehicle as ``models.brake.samples.sample_generator`` does; ``lag`` is the slip lag
+        of the tyres. Raises Refused for a step that is too long, and RunFailed as ``advance`` does.
+        """
         _, by_steps = self._march_functions(lag is not None)
         step, on_engine = sample / (braking.torques.shape[0] - 1), self._on_engine
         self.check_step(step)
@@ -197,15 +202,17 @@ class EngineSprungVehicle:
         """The status of a march, unchanged; raises RunFailed if the vehicle turned over, jackknifed, or the engine gave
         up."""
         if march_status == OVER:
-            raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
+            raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {LARGEST_LEAN} rad", time)
         if march_status == FOLDED:
-            raise RunFailed(self.engine, f"the train jackknifes: a hitch yaws by more than {FOLD:.2f} rad", time)
+            raise RunFailed(
+                self.engine, f"the train jackknifes: a hitch yaws by more than {LARGEST_HINGE_ANGLE:.2f} rad", time
+            )
         if march_status == GAVE_UP:
             reason = "the engine gave up, since the motion grew without bound: raise run.substeps"
             raise RunFailed(self.engine, reason, time)
         return march_status
 
-    def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
+    def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: VehicleOnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' rotational
         speeds (W,) in rad/s."""
         on_engine, none = self._on_engine, np.zeros(steer.size)
@@ -216,15 +223,15 @@ class EngineSprungVehicle:
         forces_and_contacts(on_engine.numbers, *state, np.zeros(self.size), on_engine.contacts)
         turning = on_engine.contacts.along / vehicle.plane.radius
         for whole, of_units in zip(state, on_engine.units.motion, strict=True):
-            to_units(whole, on_engine.units.turns, of_units)
-        under_wheels(on_engine.units.motion, 0.0, _without_unit_count(vehicle), known.surfaces)
+            fill_unit_values(whole, on_engine.units.turns, of_units)
+        fill_surfaces_under_wheels(on_engine.units.motion, 0.0, _without_unit_count(vehicle), known.surfaces)
         known.wheels.start[:] = on_engine.contacts.along
         set_slip_angles(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
         store_mean_forces(known, none, none, BLINK, motion_of(state, turning), _without_unit_count(vehicle))
         return self._model.acceleration(0.0, *state), turning
 
 
-def _without_unit_count(vehicle: OnRoad) -> OnRoad:
+def _without_unit_count(vehicle: VehicleOnRoad) -> VehicleOnRoad:
     """The vehicle with the number of its units cleared, so that steps are compiled for one type whatever the vehicle
     tows."""
     return vehicle._replace(plane=vehicle.plane._replace(units=(0,)))

@@ -9,13 +9,13 @@ from models.brake.sprung_step import compiled
 from models.engines.mujoco_native import accelerate, march
 
 advance = compiled("in_mujoco", accelerate=accelerate, march=march)
-by_steps = samples.compiled(advance, "by_steps_in_mujoco")
+by_steps = samples.compiled_samples(advance, "by_steps_in_mujoco")
 
 
 @cache
 def lagging() -> tuple[Callable[..., Any], Callable[..., Any]]:
     """The compiled functions that advance the vehicle and that generate samples, with tyres whose slip lags."""
-    from models.brake.sprung_relaxation import relax
+    from models.brake.sprung_relaxation import advance_contact_lag
 
-    go = compiled("lagging_in_mujoco", accelerate=accelerate, march=march, relax=relax)
-    return go, samples.compiled(go, "by_lagging_steps_in_mujoco")
+    go = compiled("lagging_in_mujoco", accelerate=accelerate, march=march, relax=advance_contact_lag)
+    return go, samples.compiled_samples(go, "by_lagging_steps_in_mujoco")

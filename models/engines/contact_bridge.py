@@ -26,11 +26,19 @@ import numpy as np
 
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
-from models.contact.kernel import BY_APPROACH, INPUT, INPUTS, OUTPUT, OUTPUTS, contact, net
-from models.contact.kernel_simplified import table
+from models.contact.kernel import (
+    BY_APPROACH,
+    INPUT_COUNT,
+    INPUT_RECORD,
+    OUTPUT_COUNT,
+    OUTPUT_RECORD,
+    grid_table,
+    solve_contact,
+)
+from models.contact.kernel_simplified import distance_table
 from models.contact.material import MaterialPair
-from models.contact.simplified_theory import press
-from models.contact.undeformed_distance import Distance, quadratic
+from models.contact.simplified_theory import solve_normal_contact
+from models.contact.undeformed_distance import UndeformedDistance, quadratic
 from models.core.errors import InputError, Refused
 from models.engines.stability import ALLOWED_GROWTH, LONG_RUN, LinearMatrices, log_growth, longest_stable_step
 from models.machine.compiled import njit
@@ -74,7 +82,7 @@ class Wheels:
     load: float = 8e4
     mu: float = 0.3
     curvatures: tuple[float, float] = (1.1, 1.7)
-    distance: Distance | None = None
+    distance: UndeformedDistance | None = None
     mass: float = 600.0
     inertia: float = 100.0
     stiffness: tuple[float, float, float, float] = (5e6, 5e6, 1e6, 2e6)
@@ -112,9 +120,9 @@ class Wheels:
     def numbers(self) -> Array:
         """The table that ``forces`` reads: the header, then the numbers of the contact theory."""
         if self.theory == "simplified":
-            law = table(self.bodies, self.cells)
+            law = distance_table(self.bodies, self.cells)
         else:
-            law = net(self.cells if self.theory == "fastsim" else 0)
+            law = grid_table(self.cells if self.theory == "fastsim" else 0)
         head = [self.count, self.speed, self.load, self.sunk, self.mu, self.pair.G, self.pair.nu, *self.curvatures]
         return np.concatenate((head, law))
 
@@ -122,11 +130,11 @@ class Wheels:
     def sunk(self) -> float:
         """Approach (m) of a wheel and its rail under the load at rest."""
         if self.theory == "simplified":
-            return press(self.bodies, self.pair, load=self.load).approach
+            return solve_normal_contact(self.bodies, self.pair, load=self.load).approach
         return float(by_load(*self.curvatures, self.load, self.pair).approach)
 
     @cached_property
-    def bodies(self) -> Distance:
+    def bodies(self) -> UndeformedDistance:
         """Undeformed distance between a wheel and its rail."""
         return self.distance if self.distance is not None else quadratic(*self.curvatures, HALF_WIDTH, HALF_WIDTH)
 
@@ -158,8 +166,8 @@ def forces(parameter_table, t, q, v, generalised_forces):
         records(v, wheels, FREEDOM),
         records(generalised_forces, wheels, FREEDOM),
     )
-    inputs, outputs = doubles(INPUTS), doubles(OUTPUTS)
-    given, answer = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0]
+    inputs, outputs = doubles(INPUT_COUNT), doubles(OUTPUT_COUNT)
+    given, answer = records(inputs, 1, INPUT_RECORD)[0], records(outputs, 1, OUTPUT_RECORD)[0]
     given.shape_x, given.shape_y, given.mu = head.curved_x, head.curved_y, head.mu
     given.G, given.nu = head.G, head.nu
     speed = max(abs(head.speed), REGULARISED_SPEED)
@@ -174,7 +182,7 @@ def forces(parameter_table, t, q, v, generalised_forces):
             given.xi_x = way * rate.x / speed
             given.xi_y = (rate.y - head.speed * place.yaw) / speed
             given.spin = way * rate.yaw / speed
-            contact(BY_APPROACH, inputs, beyond(parameter_table, HEADER), outputs)
+            solve_contact(BY_APPROACH, inputs, beyond(parameter_table, HEADER), outputs)
             force.x += share * way * answer.fx
             force.y += share * answer.fy
             force.z += share * (head.weight - answer.load)

@@ -67,16 +67,16 @@ class EngineWheelset(Equations):
         """The wheelset in its engine, with joint coordinates."""
         return free_model(self.ENGINE, driven_wheelset(self))
 
-    def rates(self, state: Array) -> Array:
+    def rates(self, wheelset_state: Array) -> Array:
         """Time derivatives (10,) of a state (10,), computed by the engine."""
-        joints = joints_from_states(np.asarray(state, float))
+        joints = joints_from_states(np.asarray(wheelset_state, float))
         return state_rates(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
     def _states_and_contacts(
-        self, state: Array, row_count: int, time_step: float, steps_per_row: int
+        self, wheelset_state: Array, row_count: int, time_step: float, steps_per_row: int
     ) -> tuple[Array, Array]:
         """States (m, 10) by the engine's RK4, every ``steps_per_row``-th of them, and the contacts in these states."""
-        joints = joints_from_states(state)
+        joints = joints_from_states(wheelset_state)
         states = states_from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], row_count, time_step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < DERAILED_LIMIT)
         if away.any():

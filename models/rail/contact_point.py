@@ -25,14 +25,14 @@ class Cone(NamedTuple):
 
 
 @inlined
-def cone_on_rail(wheel_side, pose, cone):
+def cone_on_rail(wheel_side, wheelset_pose, cone):
     """Contact of one conical wheel with its rail: (penetration, rolling radius, n_y, n_z, x, y, z).
 
-    wheel_side : RIGHT or LEFT; pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
+    wheel_side : RIGHT or LEFT; wheelset_pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
     The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in the track's axes
     (m). Penetration is negative where there is a gap. Yaw and roll must be less than a right angle less the cone's.
     """
-    (y, z, roll, yaw), (radius, half_gauge, conicity, head) = pose, cone
+    (y, z, roll, yaw), (radius, half_gauge, conicity, head) = wheelset_pose, cone
     cosine = 1.0 / math.sqrt(1.0 + conicity * conicity)
     sine = conicity * cosine
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)

@@ -22,10 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from models.contact.inputs import Array, quantity
+from models.contact.inputs import Array, checked_quantity
 from models.contact.material import MaterialPair
-from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.wheel_on_rail import Pose, TouchingPlace, WheelAndRail, touches_of, touching_pose
+from models.contact.simplified_theory import NormalContact, PatchPressure, solve_normal_contact, solve_rolling_contact
+from models.contact.wheel_on_rail import TouchingPlace, WheelAndRail, WheelsetPose, touching_places, touching_pose
 from models.core.errors import RunFailed
 from models.rail.joined_patches import PatchShare, exact_patch_shares
 
@@ -115,7 +115,7 @@ class WheelsetPlacement:
 
     shift: float
     yaw: float
-    roll: float
+    solve_rolling_contact: float
     spin_speed: float
     right: tuple[PatchReport, ...]
     left: tuple[PatchReport, ...]
@@ -130,7 +130,7 @@ class LoadedWheel:
     known. approach : vertical (m). creep_lift : vertical part of the creep forces, upwards on the rail (N).
     normal_force : that of the normal forces (N). moment : of the creep forces about the axle (N m)."""
 
-    pose: Pose
+    pose: WheelsetPose
     touches: list[TouchingPlace]
     creepages: list[ForceOrCreepage]
     normal_contact: NormalContact
@@ -151,10 +151,14 @@ class LoadedWheel:
             for patch_pressure in map(self.pressure_at, self.touches)
         ]
 
-    def pressure_at(self, touch: TouchingPlace) -> PatchPressure | None:
+    def pressure_at(self, touching_place: TouchingPlace) -> PatchPressure | None:
         """Pressure of the patch at a touch by the simplified theory; None if the theory finds no contact there."""
         return next(
-            (patch_pressure for patch_pressure in self.normal_contact.patches if patch_pressure.patch is touch.patch),
+            (
+                patch_pressure
+                for patch_pressure in self.normal_contact.patches
+                if patch_pressure.patch is touching_place.patch
+            ),
             None,
         )
 
@@ -178,8 +182,8 @@ class WheelsetContact:
         Raises InputError as wheel_on_rail, and RunFailed where the load presses the bodies into each other beyond all
         measure, where no normal force carries the load, or where a wheel has climbed its flange.
         """
-        quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
-        quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
+        checked_quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
+        checked_quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
         pose = touching_pose(self.side, lateral_shift, yaw)
         level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
         for _ in range(ROLL_ITERATIONS):
@@ -199,43 +203,46 @@ class WheelsetContact:
             WheelsetPlacement(lateral_shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels))
         )
 
-    def _both_wheels(self, pose: Pose, spin_speed: float) -> list[LoadedWheel]:
+    def _both_wheels(self, wheelset_pose: WheelsetPose, spin_speed: float) -> list[LoadedWheel]:
         """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
         return [
-            self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin_speed)
+            self._wheel(
+                WheelsetPose(sign * wheelset_pose.shift, sign * wheelset_pose.yaw, sign * wheelset_pose.roll, 0.0),
+                spin_speed,
+            )
             for sign in SIDE_SIGNS
         ]
 
-    def _wheel(self, wheel_pose: Pose, spin_speed: float) -> LoadedWheel:
+    def _wheel(self, wheel_pose: WheelsetPose, spin_speed: float) -> LoadedWheel:
         pose = replace(wheel_pose, fall=self.side.clearance(wheel_pose))
-        touches = touches_of(self.side, pose)
+        touches = touching_places(self.side, pose)
         creepages = [self._creepage(pose, touch, spin_speed) for touch in touches]
 
-        def by_normal(normal: float) -> LoadedWheel:
-            pressed = press([touch.patch for touch in touches], self.material_pair, load=normal)
-            return LoadedWheel(pose, touches, creepages, pressed, pressed.approach, normal)
+        def by_normal(vertical_force: float) -> LoadedWheel:
+            pressed = solve_normal_contact([touch.patch for touch in touches], self.material_pair, load=vertical_force)
+            return LoadedWheel(pose, touches, creepages, pressed, pressed.approach, vertical_force)
 
         return self._in_vertical_equilibrium(by_normal, self.load)
 
-    def _with_exact_normal(self, approximate: LoadedWheel) -> LoadedWheel:
+    def _with_exact_normal(self, approximate_wheel: LoadedWheel) -> LoadedWheel:
         """The loaded wheel with its normal contact solved exactly instead of by the simplified theory."""
-        patches = [touch.patch for touch in approximate.touches]
+        patches = [touch.patch for touch in approximate_wheel.touches]
 
-        def by_normal(normal: float) -> LoadedWheel:
+        def by_normal(vertical_force: float) -> LoadedWheel:
             shares, approach = exact_patch_shares(
                 patches,
-                approximate.normal_contact.patches,
-                normal,
-                approximate.approach,
+                approximate_wheel.normal_contact.patches,
+                vertical_force,
+                approximate_wheel.approach,
                 self.material_pair,
                 self.cell_factor,
             )
-            return replace(approximate, shares=shares, approach=approach, normal_force=normal)
+            return replace(approximate_wheel, shares=shares, approach=approach, normal_force=vertical_force)
 
-        return self._in_vertical_equilibrium(by_normal, approximate.normal_force)
+        return self._in_vertical_equilibrium(by_normal, approximate_wheel.normal_force)
 
     def _in_vertical_equilibrium(
         self, wheel_by_normal: Callable[[float], LoadedWheel], normal_force: float
@@ -249,85 +256,100 @@ class WheelsetContact:
             normal_force *= self.load / (normal_force - wheel.creep_lift)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
-    def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
+    def _free_spin(self, loaded_wheels: Sequence[LoadedWheel]) -> float:
         """Speed of spin (rad/s) of a freely rolling wheelset, whose creep forces have no moment about the axle under
         the present normal forces."""
 
-        def moment(spin: float) -> float:
-            return sum(self._with_spin_speed(wheel, spin).moment for wheel in wheels)
+        def moment(spin_speed: float) -> float:
+            return sum(self._with_spin_speed(wheel, spin_speed).moment for wheel in loaded_wheels)
 
         rolling = -self.speed / self.side.wheelset.radius
         return float(
             brentq(moment, rolling * (1.0 - SPIN_SEARCH_SHARE), rolling * (1.0 + SPIN_SEARCH_SHARE), xtol=1e-9)
         )
 
-    def _with_spin_speed(self, wheel: LoadedWheel, spin_speed: float) -> LoadedWheel:
+    def _with_spin_speed(self, loaded_wheel: LoadedWheel, spin_speed: float) -> LoadedWheel:
         """The wheel with unchanged normal contact at another speed of spin (rad/s)."""
-        creepages = [self._creepage(wheel.pose, touch, spin_speed) for touch in wheel.touches]
-        return self._with_creep_forces(replace(wheel, creepages=creepages))
+        creepages = [self._creepage(loaded_wheel.pose, touch, spin_speed) for touch in loaded_wheel.touches]
+        return self._with_creep_forces(replace(loaded_wheel, creepages=creepages))
 
-    def _with_creep_forces(self, wheel: LoadedWheel) -> LoadedWheel:
+    def _with_creep_forces(self, loaded_wheel: LoadedWheel) -> LoadedWheel:
         """The wheel with the creep forces of each patch; patches without contact get zero forces."""
         forces = []
-        for touch, creepage, load in zip(wheel.touches, wheel.creepages, wheel.loads, strict=True):
-            patch_pressure = wheel.pressure_at(touch)
+        for touch, creepage, load in zip(loaded_wheel.touches, loaded_wheel.creepages, loaded_wheel.loads, strict=True):
+            patch_pressure = loaded_wheel.pressure_at(touch)
             if patch_pressure is None or load == 0.0 or self.friction == 0.0:
                 forces.append((0.0, 0.0, 0.0))
                 continue
-            single_patch = replace(wheel.normal_contact, patches=(replace(patch_pressure, load=load),))
-            creep = roll(single_patch, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
+            single_patch = replace(loaded_wheel.normal_contact, patches=(replace(patch_pressure, load=load),))
+            creep = solve_rolling_contact(
+                single_patch, self.friction, *creepage, cell_count=round(CELLS_PER_STRIP / self.cell_factor)
+            )
             forces.append((creep.fx, creep.fy, creep.mz))
-        pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.rotation[:, 1]
+        pairs, axle = list(zip(loaded_wheel.touches, forces, strict=True)), loaded_wheel.pose.rotation[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
-        moment = sum(float(axle @ _patch_moment(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
-        return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
+        moment = sum(
+            float(axle @ _patch_moment(self._arm(loaded_wheel.pose, touch), touch, force)) for touch, force in pairs
+        )
+        return replace(loaded_wheel, forces=forces, creep_lift=lifted, moment=moment)
 
-    def _creepage(self, pose: Pose, touch: TouchingPlace, spin_speed: float) -> ForceOrCreepage:
+    def _creepage(
+        self, wheelset_pose: WheelsetPose, touching_place: TouchingPlace, spin_speed: float
+    ) -> ForceOrCreepage:
         """Longitudinal and lateral creepage, and spin (1/m), at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
-        axle, arm = pose.rotation[:, 1], self._arm(pose, touch)
+        axle, arm = wheelset_pose.rotation[:, 1], self._arm(wheelset_pose, touching_place)
         velocity = spin_speed * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
-        across, into = _surface_axes(touch)
+        across, into = _surface_axes(touching_place)
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin_speed * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
 
-    def _radius(self, touch: TouchingPlace) -> float:
-        return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
+    def _radius(self, touching_place: TouchingPlace) -> float:
+        return self.side.wheelset.radius + float(self.side.wheel.curve(touching_place.wheel_y))
 
-    def _arm(self, pose: Pose, touch: TouchingPlace) -> Array:
+    def _arm(self, wheelset_pose: WheelsetPose, touching_place: TouchingPlace) -> Array:
         """Vector from the wheelset's centre to a point of first touch, in the track's axes (m)."""
-        height_below = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
-        return pose.rotation @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, height_below])
+        height_below = math.sqrt(self._radius(touching_place) ** 2 - touching_place.x**2)
+        return wheelset_pose.rotation @ np.array(
+            [touching_place.x, self.side.wheelset.arm + touching_place.wheel_y, height_below]
+        )
 
-    def _patch_reports(self, wheel: LoadedWheel) -> tuple[PatchReport, ...]:
+    def _patch_reports(self, loaded_wheel: LoadedWheel) -> tuple[PatchReport, ...]:
         """Reports of all patches of a wheel that carry load; patches that have grown together get one common report."""
         rows = [
             row
-            for row in zip(wheel.touches, wheel.creepages, wheel.forces, wheel.shares, strict=True)
+            for row in zip(
+                loaded_wheel.touches, loaded_wheel.creepages, loaded_wheel.forces, loaded_wheel.shares, strict=True
+            )
             if row[-1].load > 0.0
         ]
         pieces = dict.fromkeys(share.piece for *_, share in rows)
-        return tuple(self._joined_report(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
+        return tuple(
+            self._joined_report(loaded_wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces
+        )
 
     def _joined_report(
-        self, wheel: LoadedWheel, rows: list[tuple[TouchingPlace, ForceOrCreepage, ForceOrCreepage, PatchShare]]
+        self,
+        loaded_wheel: LoadedWheel,
+        patch_rows: list[tuple[TouchingPlace, ForceOrCreepage, ForceOrCreepage, PatchShare]],
     ) -> PatchReport:
         """Report of one connected piece of the contact area; its first touch and creepages are those of the patch with
         the largest load."""
-        side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
-        top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
-        loads = np.array([share.load for *_, share in rows])
+        side, (touch, creepage, _, _) = self.side, max(patch_rows, key=lambda row: row[-1].load)
+        top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(loaded_wheel.pose, touch)
+        loads = np.array([share.load for *_, share in patch_rows])
         centres = [
-            (patch.rail_y + top + share.y * math.cos(patch.angle), patch.x + share.x) for patch, _, _, share in rows
+            (patch.rail_y + top + share.y * math.cos(patch.angle), patch.x + share.x)
+            for patch, _, _, share in patch_rows
         ]
         y, x = (float(np.average(values, weights=loads)) for values in zip(*centres, strict=True))
-        fx, fy = (float(sum(force[k] for _, _, force, _ in rows)) for k in (0, 1))
+        fx, fy = (float(sum(force[k] for _, _, force, _ in patch_rows)) for k in (0, 1))
         mz = sum(
-            float(_surface_axes(touch)[1] @ _patch_moment(self._arm(wheel.pose, patch) - start, patch, force))
-            for patch, _, force, _ in rows
+            float(_surface_axes(touch)[1] @ _patch_moment(self._arm(loaded_wheel.pose, patch) - start, patch, force))
+            for patch, _, force, _ in patch_rows
         )
-        boxes = np.array([share.box for *_, share in rows])
+        boxes = np.array([share.box for *_, share in patch_rows])
         length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
         return PatchReport(
             touch.x,
@@ -342,16 +364,16 @@ class WheelsetContact:
             float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y)),
             *touch.patch.distance.curvatures,
             float(loads.sum()),
-            sum(share.load * math.cos(patch.angle) for patch, _, _, share in rows),
+            sum(share.load * math.cos(patch.angle) for patch, _, _, share in patch_rows),
             fx,
             fy,
             mz,
             *creepage,
-            max(share.peak for *_, share in rows),
-            sum(share.area for *_, share in rows),
+            max(share.peak for *_, share in patch_rows),
+            sum(share.area for *_, share in patch_rows),
             length,
             width,
-            wheel.approach,
+            loaded_wheel.approach,
         )
 
 
@@ -376,14 +398,14 @@ def rolling_radius_difference(placement: WheelsetPlacement) -> float:
     return right.rolling_radius - left.rolling_radius
 
 
-def _surface_axes(touch: TouchingPlace) -> tuple[Array, Array]:
+def _surface_axes(touching_place: TouchingPlace) -> tuple[Array, Array]:
     """Unit vectors along the rail's surface and along its inward normal, in the track's axes."""
-    cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
+    cosine, sine = math.cos(touching_place.angle), math.sin(touching_place.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _patch_moment(lever: Array, touch: TouchingPlace, force: ForceOrCreepage) -> Array:
+def _patch_moment(lever: Array, touching_place: TouchingPlace, creep_force: ForceOrCreepage) -> Array:
     """Moment (3,) of a patch's creep forces and spin moment about a point; ``lever`` is the vector (m) from that point
     to the patch."""
-    across, into = _surface_axes(touch)
-    return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into
+    across, into = _surface_axes(touching_place)
+    return np.cross(lever, creep_force[0] * np.array([1.0, 0.0, 0.0]) + creep_force[1] * across) + creep_force[2] * into

@@ -48,9 +48,9 @@ def root_locus(equations_type: type[Equations], wheelset: Wheelset, speeds: Iter
     return np.array([eigenvalues(equations_type, wheelset, float(speed)) for speed in speeds])
 
 
-def hunting_eigenvalue(roots: np.ndarray) -> np.ndarray:
+def hunting_eigenvalue(eigenvalues_of_wheelset: np.ndarray) -> np.ndarray:
     """Eigenvalue of the hunting mode: among eigenvalues (..., 9) with positive imaginary part, the least damped one;
     NaN if there is none."""
-    oscillates = np.where(roots.imag > 0.0, roots.real, -math.inf)
-    root = np.take_along_axis(roots, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
+    oscillates = np.where(eigenvalues_of_wheelset.imag > 0.0, eigenvalues_of_wheelset.real, -math.inf)
+    root = np.take_along_axis(eigenvalues_of_wheelset, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
     return np.where(np.isfinite(oscillates.max(axis=-1)), root, math.nan)

@@ -52,50 +52,57 @@ class Ledger:
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 
 
-def energy_ledger(equations: Equations, path: WheelsetPath) -> Ledger:
+def energy_ledger(wheelset_equations: Equations, wheelset_path: WheelsetPath) -> Ledger:
     """Energy balance along a path computed by RK4, of which every step must be stored."""
-    start, step = path.states[:-1], np.diff(path.times)[:, None]
-    works, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
+    start, step = wheelset_path.states[:-1], np.diff(wheelset_path.times)[:, None]
+    works, rates = np.zeros((len(wheelset_path.times), 5)), np.zeros_like(start)
     for stage_fraction, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
-        rates, powers = rates_and_powers(equations, start + stage_fraction * step * rates)
+        rates, powers = rates_and_powers(wheelset_equations, start + stage_fraction * step * rates)
         works[1:] += weight / 6.0 * step * powers
-    return Ledger(path.times, *energies_at_states(equations, path.states), *works.cumsum(axis=0).T)
-
-
-def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
-    """Rates (n, 10) of the states, and powers (n, 5) in W whose integrals are the works, in the order of the ledger."""
-    rates, contacts = equations.at(states)
-    names = "elastic_power", "fx", "damping_power", "power"
-    elastic, forward_force, damping, creep = (-contacts[name].sum(axis=1) for name in names)
-    drive, dampers = equations.speed * forward_force, _spring_energy_and_damping(equations.body, states)[1]
-    return rates, np.column_stack([elastic, drive, dampers, damping, creep])
-
-
-def energies_at_states(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
-    """Energies (n,) in J at states (n, 10): kinetic energy, energy of the springs, and potential energy of gravity."""
-    w, body = equations.wheelset, equations.body
-    across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
-    squared_speed = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
-    kinetic = 0.5 * (w.mass * squared_speed + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
-    return (
-        kinetic,
-        _spring_energy_and_damping(body, states)[0],
-        -(w.mass * GRAVITY + 2.0 * body.carried_weight) * states[:, Z],
+    return Ledger(
+        wheelset_path.times, *energies_at_states(wheelset_equations, wheelset_path.states), *works.cumsum(axis=0).T
     )
 
 
-def _spring_energy_and_damping(body: Body, states: Array) -> tuple[Array, Array]:
+def rates_and_powers(wheelset_equations: Equations, wheelset_states: Array) -> tuple[Array, Array]:
+    """Rates (n, 10) of the states, and powers (n, 5) in W whose integrals are the works, in the order of the ledger."""
+    rates, contacts = wheelset_equations.at(wheelset_states)
+    names = "elastic_power", "fx", "damping_power", "power"
+    elastic, forward_force, damping, creep = (-contacts[name].sum(axis=1) for name in names)
+    drive, dampers = (
+        wheelset_equations.speed * forward_force,
+        _spring_energy_and_damping(wheelset_equations.body, wheelset_states)[1],
+    )
+    return rates, np.column_stack([elastic, drive, dampers, damping, creep])
+
+
+def energies_at_states(wheelset_equations: Equations, wheelset_states: Array) -> tuple[Array, Array, Array]:
+    """Energies (n,) in J at wheelset_states (n, 10): kinetic energy, energy of the springs, and potential energy of gravity."""
+    w, body = wheelset_equations.wheelset, wheelset_equations.body
+    across = wheelset_states[:, ROLL_RATE] ** 2 + (wheelset_states[:, YAW_RATE] * np.cos(wheelset_states[:, ROLL])) ** 2
+    squared_speed = wheelset_states[:, Y_RATE] ** 2 + wheelset_states[:, Z_RATE] ** 2
+    kinetic = 0.5 * (w.mass * squared_speed + w.yaw_inertia * across + w.spin_inertia * wheelset_states[:, SPIN] ** 2)
+    return (
+        kinetic,
+        _spring_energy_and_damping(body, wheelset_states)[0],
+        -(w.mass * GRAVITY + 2.0 * body.carried_weight) * wheelset_states[:, Z],
+    )
+
+
+def _spring_energy_and_damping(wheelset_body: Body, wheelset_states: Array) -> tuple[Array, Array]:
     """Energy stored in the suspension springs (n,) in J, and power dissipated in the dampers (n,) in W."""
-    (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
+    (cr, sr), (cy, sy) = ((np.cos(wheelset_states[:, k]), np.sin(wheelset_states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])
-    turning = np.array([cy * states[:, ROLL_RATE], sy * states[:, ROLL_RATE], states[:, YAW_RATE]])
-    energy = power = np.zeros(len(states))
-    for arm in (body.half_spacing, -body.half_spacing):
+    turning = np.array(
+        [cy * wheelset_states[:, ROLL_RATE], sy * wheelset_states[:, ROLL_RATE], wheelset_states[:, YAW_RATE]]
+    )
+    energy = power = np.zeros(len(wheelset_states))
+    for arm in (wheelset_body.half_spacing, -wheelset_body.half_spacing):
         spring_travel, rate = arm * axle, np.cross(turning, arm * axle, axis=0)
-        spring_travel[1] += states[:, Y] - arm
-        spring_travel[2] += states[:, Z] - body.rest_height
-        rate[1] += states[:, Y_RATE]
-        rate[2] += states[:, Z_RATE]
-        energy = energy + 0.5 * np.array(body.stiffness) @ spring_travel**2
-        power = power + np.array(body.damping) @ rate**2
+        spring_travel[1] += wheelset_states[:, Y] - arm
+        spring_travel[2] += wheelset_states[:, Z] - wheelset_body.rest_height
+        rate[1] += wheelset_states[:, Y_RATE]
+        rate[2] += wheelset_states[:, Z_RATE]
+        energy = energy + 0.5 * np.array(wheelset_body.stiffness) @ spring_travel**2
+        power = power + np.array(wheelset_body.damping) @ rate**2
     return energy, power

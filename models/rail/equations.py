@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from scipy.optimize import brentq, root
 
-from models.contact.inputs import Array, number, quantity
+from models.contact.inputs import Array, checked_number, checked_quantity
 from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
 from models.core.steps import divides
@@ -95,63 +95,76 @@ class Stages(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def rates(state, speed, body, rails, state_rate, report):
-    """Fill ``state_rate`` with the time derivative of a state (10,), and ``report``, REPORT (patches,), with the
+def rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_report):
+    """Fill ``state_rate`` with the time derivative of a state (10,), and ``contact_report``, REPORT (patches,), with the
     contacts.
 
-    speed, body, rails : ``parameters`` of ``Equations``.
+    speed, wheelset_body, rails : ``parameters`` of ``Equations``.
     """
     rails_record = rails_from_tuples(rails)
-    set_rates(state, speed, Body(*body), rails_record, state_rate, report, workspace_for(rails_record.profile))
+    set_rates(
+        wheelset_state,
+        speed,
+        Body(*wheelset_body),
+        rails_record,
+        state_rate,
+        contact_report,
+        workspace_for(rails_record.profile),
+    )
 
 
 @lean
-def set_rates(state, speed, body, rails, state_rate, report, workspace):
-    """Fill ``state_rate`` with the time derivative of a state (10,). workspace : ``Workspace``, written over; report :
+def set_rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_report, contact_workspace):
+    """Fill ``state_rate`` with the time derivative of a state (10,). contact_workspace : ``Workspace``, written over; contact_report :
     has no rows where no contact report is wanted."""
-    y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
-    roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
+    y, z, roll, yaw = wheelset_state[Y], wheelset_state[Z], wheelset_state[ROLL], wheelset_state[YAW]
+    roll_rate, yaw_rate, spin = wheelset_state[ROLL_RATE], wheelset_state[YAW_RATE], wheelset_state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    wheelset = workspace.wheelset[0]
+    wheelset = contact_workspace.wheelset[0]
     force, moment, velocity, turning = wheelset.force, wheelset.moment, wheelset.velocity, wheelset.turning
     for k in range(3):
         force[k] = moment[k] = 0.0
-    velocity[0], velocity[1], velocity[2] = speed, state[Y_RATE], state[Z_RATE]
+    velocity[0], velocity[1], velocity[2] = speed, wheelset_state[Y_RATE], wheelset_state[Z_RATE]
     axle = axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
     rolling = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
     turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
     turning[2] = yaw_rate + axle_z * rolling
-    wheel_forces(Pose(y, z, roll, yaw), rails, report, workspace)
-    force[1] += 2.0 * body.carried_weight * body.lean
-    force[2] += 2.0 * body.carried_weight
-    if body.has_suspension:
-        _add_suspension_forces(state, body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
+    wheel_forces(Pose(y, z, roll, yaw), rails, contact_report, contact_workspace)
+    force[1] += 2.0 * wheelset_body.carried_weight * wheelset_body.lean
+    force[2] += 2.0 * wheelset_body.carried_weight
+    if wheelset_body.has_suspension:
+        _add_suspension_forces(wheelset_state, wheelset_body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
-    state_rate[Y], state_rate[Z], state_rate[ROLL], state_rate[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
+    state_rate[Y], state_rate[Z], state_rate[ROLL], state_rate[YAW] = (
+        wheelset_state[Y_RATE],
+        wheelset_state[Z_RATE],
+        roll_rate,
+        yaw_rate,
+    )
     state_rate[ANGLE] = rolling
-    state_rate[Y_RATE] = force[1] / body.mass + GRAVITY * body.lean
-    state_rate[Z_RATE] = force[2] / body.mass + GRAVITY
-    whirl = body.spin_inertia * spin
-    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.yaw_inertia - yaw_rate**2 * sr * cr
-    state_rate[SPIN] = m2 / body.spin_inertia
-    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / body.yaw_inertia + 2.0 * roll_rate * yaw_rate * sr) / cr
+    state_rate[Y_RATE] = force[1] / wheelset_body.mass + GRAVITY * wheelset_body.lean
+    state_rate[Z_RATE] = force[2] / wheelset_body.mass + GRAVITY
+    whirl = wheelset_body.spin_inertia * spin
+    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / wheelset_body.yaw_inertia - yaw_rate**2 * sr * cr
+    state_rate[SPIN] = m2 / wheelset_body.spin_inertia
+    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / wheelset_body.yaw_inertia + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @lean
-def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
+def _add_suspension_forces(wheelset_state, wheelset_body, angular_velocity, axle, force, moment):
     """Add the forces of springs and dampers at both ends of the axle; angular_velocity : angular velocity about the x
     and y of the axle's own axes (rad/s).
     """
-    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = angular_velocity, body.stiffness, body.damping
+    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = angular_velocity, wheelset_body.stiffness, wheelset_body.damping
     for side in (1.0, -1.0):
-        arm, turn_z = side * body.half_spacing, state[YAW_RATE]
+        arm, turn_z = side * wheelset_body.half_spacing, wheelset_state[YAW_RATE]
         ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
         vx, vy, vz = turn_y * az - turn_z * ay, turn_z * ax - turn_x * az, turn_x * ay - turn_y * ax
         fx = -kx * ax - dx * vx
-        fy = -ky * (state[Y] + ay - arm) - dy * (state[Y_RATE] + vy)
-        fz = -kz * (state[Z] + az - body.rest_height) - dz * (state[Z_RATE] + vz)
+        fy = -ky * (wheelset_state[Y] + ay - arm) - dy * (wheelset_state[Y_RATE] + vy)
+        fz = -kz * (wheelset_state[Z] + az - wheelset_body.rest_height) - dz * (wheelset_state[Z_RATE] + vz)
         force[0] += fx
         force[1] += fy
         force[2] += fz
@@ -161,8 +174,8 @@ def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
-def march(state, parameters, time_steps, path, reports, workspace, stages):
-    """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
+def march(wheelset_state, parameters, time_steps, path_states, contact_reports, workspace, stages):
+    """Integrate from ``wheelset_state`` by RK4; the wheelset_state is modified. Returns the number of steps made.
 
     parameters : of ``Equations``; time_steps : length (s) of a step, count of steps, and after how many steps one
     goes into path and reports; workspace, stages : arrays of the caller, to which no reference is held, which saves
@@ -170,28 +183,31 @@ def march(state, parameters, time_steps, path, reports, workspace, stages):
     (speed, plain_body, plain_tuples), (step, count, stride), (total, rate, stage_state, no_report) = (
         parameters,
         time_steps,
-        stages,
+        runge_kutta_arrays,
     )
     body, rails = Body(*plain_body), rails_from_tuples(plain_tuples)
     for i in range(count + 1):
         row = i // stride
         for stage in range(4):  # one call of the rates, or it is compiled four times
             is_recorded = stage == 0 and row * stride == i
-            report = reports[row] if is_recorded else no_report
+            report = contact_reports[row] if is_recorded else no_report
             stage_step = step if stage == 3 else 0.5 * step
             for k in range(STATE_COUNT):  # a sum of whole arrays would make one
-                stage_state[k] = state[k] + stage_step * rate[k] if stage > 0 else state[k]
-            set_rates(stage_state, speed, body, rails, rate, report, workspace)
+                stage_state[k] = wheelset_state[k] + stage_step * rate[k] if stage > 0 else wheelset_state[k]
+            set_rates(stage_state, speed, body, rails, rate, report, contact_workspace)
             for k in range(STATE_COUNT):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
             if is_recorded:
                 for k in range(STATE_COUNT):
-                    path[row, k] = state[k]
+                    path_states[row, k] = wheelset_state[k]
             if stage == 0 and i == count:
                 return i
         for k in range(STATE_COUNT):
-            state[k] += step / 6.0 * total[k]
-        if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < DERAILED_LIMIT:
+            wheelset_state[k] += step / 6.0 * total[k]
+        if (
+            not abs(wheelset_state[Y]) + abs(wheelset_state[YAW]) + abs(wheelset_state[ROLL]) + abs(wheelset_state[Z])
+            < DERAILED_LIMIT
+        ):
             return i
     return count
 
@@ -224,8 +240,8 @@ class Equations:
     def __post_init__(self) -> None:
         if self.law not in LAW_NUMBERS:
             raise InputError("", "law", self.law, "is not known", tuple(LAW_NUMBERS))
-        number("speed", self.speed, "a speed in m/s from -200 to 200", -LARGEST_SPEED, LARGEST_SPEED)
-        number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
+        checked_number("speed", self.speed, "a speed in m/s from -200 to 200", -LARGEST_SPEED, LARGEST_SPEED)
+        checked_number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
     def body(self) -> Body:
@@ -259,24 +275,24 @@ class Equations:
         """Largest possible number of contacts of both wheels together."""
         return int(count_of_patches(self.rails.profile))
 
-    def empty_contacts(self, *record_shape: int) -> Array:
+    def empty_contacts(self, *array_shape: int) -> Array:
         """Contact records REPORT (*shape, patches) filled with NaN.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
-        return np.full((*record_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
+        return np.full((*array_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
-    def rates(self, state: Array) -> Array:
+    def rates(self, wheelset_state: Array) -> Array:
         """Time derivative (10,) of a wheelset's state (10,)."""
         state_rate = np.empty(STATE_COUNT)
-        rates(np.asarray(state, float), *self.parameters, state_rate, NO_REPORT)
+        rates(np.asarray(wheelset_state, float), *self.parameters, state_rate, NO_REPORT)
         return state_rate
 
-    def at(self, states: Array) -> tuple[Array, Array]:
+    def at(self, wheelset_states: Array) -> tuple[Array, Array]:
         """Time derivatives (n, 10) of states (n, 10) by the hand-written equations, and their contacts, REPORT (n,
         patches)."""
-        state_rates, contacts = np.empty_like(states), self.empty_contacts(len(states))
-        for state, rate, contact in zip(states, state_rates, contacts, strict=True):
+        state_rates, contacts = np.empty_like(wheelset_states), self.empty_contacts(len(wheelset_states))
+        for state, rate, contact in zip(wheelset_states, state_rates, contacts, strict=True):
             rates(state, *self.parameters, rate, contact)
         return state_rates, contacts
 
@@ -299,10 +315,10 @@ class Equations:
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
     def _state_in_balance(
-        self, start_state: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]
+        self, start_state: Array, free_coordinates: tuple[int, int], vanishing_accelerations: tuple[int, int]
     ) -> Array:
         """State in which two coordinates are solved for so that two accelerations vanish."""
-        state_indices = list(coordinates)
+        state_indices = list(free_coordinates)
         scale = np.maximum(np.abs(start_state[state_indices]), self.body.rest_height)
 
         def displaced(unknowns: Array) -> Array:
@@ -310,7 +326,9 @@ class Equations:
             state[state_indices] += unknowns * scale
             return state
 
-        solution = root(lambda unknown: self.rates(displaced(unknown))[list(accelerations)], np.zeros(2), tol=1e-15)
+        solution = root(
+            lambda unknown: self.rates(displaced(unknown))[list(vanishing_accelerations)], np.zeros(2), tol=1e-15
+        )
         if np.abs(solution.fun).max() > 1e-6:
             w = self.wheelset
             raise RunFailed(
@@ -330,26 +348,28 @@ class Equations:
         """Largest magnitude (1/s) of the eigenvalues of the motion about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
-    def run(self, state: Array, duration: float, step: float, stride: int = 1) -> WheelsetPath:
-        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``stride``-th step is stored.
+    def run(self, wheelset_state: Array, duration: float, time_step: float, storing_stride: int = 1) -> WheelsetPath:
+        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``storing_stride``-th step is stored.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
         contacts' largest loads among the states that are kept or, where all are, for the motion.
         """
-        count = self._checked_step_count(state, duration, step, stride)
-        states, contacts = self._states_and_contacts(np.array(state, float), count, step, stride)
-        path = WheelsetPath(np.arange(len(states)) * step * stride, states, contacts=contacts)
-        self.check(path, step, stride)
+        count = self._checked_step_count(wheelset_state, duration, time_step, storing_stride)
+        states, contacts = self._states_and_contacts(np.array(wheelset_state, float), count, time_step, storing_stride)
+        path = WheelsetPath(np.arange(len(states)) * time_step * storing_stride, states, contacts=contacts)
+        self.check(path, time_step, storing_stride)
         return path
 
-    def _states_and_contacts(self, state: Array, step_count: int, step: float, stride: int) -> tuple[Array, Array]:
-        """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
-        row_count = step_count // stride + 1
+    def _states_and_contacts(
+        self, wheelset_state: Array, step_count: int, time_step: float, storing_stride: int
+    ) -> tuple[Array, Array]:
+        """States and contacts at every ``storing_stride``-th step of a path; ``wheelset_state`` (10,) is modified."""
+        row_count = step_count // storing_stride + 1
         states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
-        steps_done = self.march(state, (step, step_count, stride), states, contacts)
+        steps_done = self.march(wheelset_state, (time_step, step_count, storing_stride), states, contacts)
         if steps_done < step_count:
-            raise RunFailed("wheelset", "leaves the track", steps_done * step)
+            raise RunFailed("wheelset", "leaves the track", steps_done * time_step)
         return states, contacts
 
     def march(self, state: Array, time_steps: tuple[float, int, int], states: Array, contacts: Array) -> int:
@@ -360,55 +380,67 @@ class Equations:
             march(state, self.parameters, time_steps, states, contacts, workspace_for(self.rails.profile), stages)
         )
 
-    def check(self, path: WheelsetPath, step: float, stride: int) -> None:
+    def check(self, path_states: WheelsetPath, time_step: float, storing_stride: int) -> None:
         """Raise RunFailed if the step was too large for the contact loads or, where every step is stored, for the
         motion."""
-        self.check_loads(path, step)
-        if stride == 1:
+        self.check_loads(path_states, time_step)
+        if storing_stride == 1:
             w = self.wheelset
             inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
-            check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
+            check_resolved(
+                self.ENGINE, path_states.times, path_states.states[:, :ANGLE], path_states.states[:, Y_RATE:SPIN], inert
+            )
 
-    def check_loads(self, path: WheelsetPath, step: float) -> None:
+    def check_loads(self, path_states: WheelsetPath, time_step: float) -> None:
         """Raise RunFailed if the step was too large for a patch with more than its load at rest, since the whole path
         is then wrong."""
-        for k in sorted(set(path.contacts["load"].argmax(axis=0))):
-            rate = float(np.abs(np.linalg.eigvals(rate_jacobian(partial(Equations.rates, self), path.states[k]))).max())
-            if not step * rate <= LIMIT_OF_RK4:
+        for k in sorted(set(path_states.contacts["load"].argmax(axis=0))):
+            rate = float(
+                np.abs(np.linalg.eigvals(rate_jacobian(partial(Equations.rates, self), path_states.states[k]))).max()
+            )
+            if not time_step * rate <= LIMIT_OF_RK4:
                 raise RunFailed(
                     self.ENGINE,
-                    f"the step of {step:g} s is too large for contacts that carry "
-                    f"{path.contacts[k]['load'].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
-                    path.times[k],
+                    f"the step of {time_step:g} s is too large for contacts that carry "
+                    f"{path_states.contacts[k]['load'].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
+                    path_states.times[k],
                 )
 
-    def _checked_step_count(self, state: Array, duration: float, step: float, stride: int) -> int:
+    def _checked_step_count(self, wheelset_state: Array, duration: float, time_step: float, storing_stride: int) -> int:
         """Number of steps of a run, after checks of state, duration, step and stride."""
-        if quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
+        if checked_quantity("state", wheelset_state, "ten finite numbers").shape != (STATE_COUNT,):
             raise InputError("", "state", None, f"must be {STATE_COUNT} finite numbers")
-        if not 0.0 < number("step", step, "a step in s") * self._fastest_rate <= ALLOWED_STEP_RATE:
+        if not 0.0 < checked_number("step", time_step, "a step in s") * self._fastest_rate <= ALLOWED_STEP_RATE:
             raise InputError(
                 "",
                 "step",
-                step,
+                time_step,
                 f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest_rate:.3g} s: the "
                 f"fastest motion has a rate of {self._fastest_rate:.4g} 1/s",
             )
-        if not divides(step, number("duration", duration, "a time in s")):
-            raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
-        count = round(duration / step)
-        if isinstance(stride, bool) or not isinstance(stride, int) or not 1 <= stride <= count or count % stride:
-            raise InputError("", "every", stride, f"must be a whole number that divides the {count} steps")
+        if not divides(time_step, checked_number("duration", duration, "a time in s")):
+            raise InputError("", "duration", duration, f"must be a whole number of steps of {time_step:g} s, 1 or more")
+        count = round(duration / time_step)
+        if (
+            isinstance(storing_stride, bool)
+            or not isinstance(storing_stride, int)
+            or not 1 <= storing_stride <= count
+            or count % storing_stride
+        ):
+            raise InputError("", "every", storing_stride, f"must be a whole number that divides the {count} steps")
         return count
 
 
-def rate_jacobian(rates: Callable[[Array], Array], state: Array, step_factor: float = 1.0) -> Array:
+def rate_jacobian(
+    state_rates: Callable[[Array], Array], wheelset_state: Array, difference_factor: float = 1.0
+) -> Array:
     """Jacobian (9, 9) of the rates at a state, without the angle of spin, by fourth-order central differences over
-    ``step_factor`` times the usual distance."""
-    columns, steps = [], step_factor * DIFFERENCE_STEPS
+    ``difference_factor`` times the usual distance."""
+    columns, steps = [], difference_factor * DIFFERENCE_STEPS
     for k in range(STATE_COUNT):
         a, b, c, d = (
-            rates(state + multiple * steps[k] * np.eye(STATE_COUNT)[k]) for multiple in (-2.0, -1.0, 1.0, 2.0)
+            state_rates(wheelset_state + multiple * steps[k] * np.eye(STATE_COUNT)[k])
+            for multiple in (-2.0, -1.0, 1.0, 2.0)
         )
         columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * steps[k]))
     return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)

@@ -28,7 +28,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.contact.inputs import Array, number, quantity
+from models.contact.inputs import Array, checked_number, checked_quantity
 from models.core.errors import InputError
 from models.rail.rolling_radius_table import RollingRadiusTable
 
@@ -68,23 +68,27 @@ class KlingelWave:
         """Equivalent conicity by EN 15302."""
         return 0.5 * (2.0 * math.pi / self.period) ** 2
 
-    def wavelength(self, radius: float, spacing: float) -> float:
+    def wavelength(self, rolling_radius: float, contact_spacing: float) -> float:
         """Wavelength (m) along the track, for a rolling radius and a distance between the contact points (m)."""
-        return self.period * math.sqrt(radius * spacing)
+        return self.period * math.sqrt(rolling_radius * contact_spacing)
 
 
 def equivalent_conicity(
-    displacements: Array, differences: Array, amplitude: float, *, centre_guess: float | None = None
+    displacements: Array, radius_differences: Array, amplitude: float, *, centre_guess: float | None = None
 ) -> float:
     """Equivalent conicity by EN 15302 at an amplitude (half of peak to peak); see ``klingel_wave``.
 
-    displacements : (n,) lateral, to the right, rising; differences : (n,) of the rolling radii, right less left;
+    displacements : (n,) lateral, to the right, rising; radius_differences : (n,) of the rolling radii, right less left;
     amplitude : above 0. All in one unit of length.
     """
-    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, centre_guess=centre_guess).conicity
+    return klingel_wave(
+        RollingRadiusTable(displacements, radius_differences), amplitude, centre_guess=centre_guess
+    ).conicity
 
 
-def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> KlingelWave:
+def klingel_wave(
+    radius_table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None
+) -> KlingelWave:
     """Klingel's wave of an amplitude (in the table's unit, half of peak to peak) from a table of rolling radius
     differences.
 
@@ -92,41 +96,42 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: f
     is no wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the
     table; or where there are several and ``centre_guess`` is not given.
     """
-    amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
-    first_displacement, last_displacement = table.displacement_range
+    amplitude = checked_number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
+    first_displacement, last_displacement = radius_table.displacement_range
     if 0.0 <= 2.0 * amplitude - (last_displacement - first_displacement) <= AMPLITUDE_TOLERANCE * amplitude:
         amplitude = (last_displacement - first_displacement) / 2.0
     if 2.0 * amplitude > last_displacement - first_displacement:
         table_range = f"the table goes from {first_displacement:g} to {last_displacement:g}"
         allowed = f"is half of peak to peak, and {table_range}: it cannot hold the wave"
-        raise InputError(table.source, "amplitude", amplitude, allowed)
+        raise InputError(radius_table.source, "amplitude", amplitude, allowed)
     waves = [
         wave
-        for low in _turning_points(table, amplitude)
-        if (wave := _wave_from_turning_point(table, low, amplitude)) is not None
+        for low in _turning_points(radius_table, amplitude)
+        if (wave := _wave_from_turning_point(radius_table, low, amplitude)) is not None
     ]
     if not waves:
-        return _without_wave(table, amplitude)
+        return _without_wave(radius_table, amplitude)
     if len(waves) > 1 and centre_guess is None:
         centres = ", ".join(f"{wave.centre:.6g}" for wave in waves)
         allowed = f"has {len(waves)} waves, about {centres}: smooth the table, or choose one by near"
-        raise InputError(table.source, "amplitude", amplitude, allowed)
+        raise InputError(radius_table.source, "amplitude", amplitude, allowed)
     return min(waves, key=lambda wave: abs(wave.centre - (centre_guess or 0.0)))
 
 
-def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
+def _turning_points(radius_table: RollingRadiusTable, amplitude: float) -> list[float]:
     """Possible left turning points of waves of an amplitude: the potential there equals the potential at the right
     turning point.
 
     Between the rows of the table, the difference of both potentials is a parabola in the left turning point.
     """
-    y, width = table.displacements, 2.0 * amplitude
+    y, width = radius_table.displacements, 2.0 * amplitude
     candidates = np.unique(np.concatenate([y, y - width, [y[-1] - width]]))
     candidates = candidates[(candidates >= y[0]) & (candidates <= y[-1] - width)]
     points: list[float] = []
     for low, high in pairwise(candidates.tolist()):
         begin, middle, end = (
-            table.integral(low + share * (high - low) + width) - table.integral(low + share * (high - low))
+            radius_table.integral(low + share * (high - low) + width)
+            - radius_table.integral(low + share * (high - low))
             for share in (0.0, 0.5, 1.0)
         )
         points += [float(low + share * (high - low)) for share in _parabola_roots(begin, middle, end)]
@@ -155,15 +160,21 @@ def _parabola_roots(begin_value: float, middle_value: float, end_value: float) -
     return sorted(min(max(root, 0.0), 1.0) for root in roots if -1e-12 <= root <= 1.0 + 1e-12)
 
 
-def _wave_from_turning_point(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
-    """The wave whose left turning point is ``low``; None if the motion would stop before the other turning point."""
-    y, dr = table.section(low, low + 2.0 * amplitude)
+def _wave_from_turning_point(
+    radius_table: RollingRadiusTable, left_turning_point: float, amplitude: float
+) -> KlingelWave | None:
+    """The wave whose left turning point is ``left_turning_point``; None if the motion would stop before the other turning point."""
+    y, dr = radius_table.section(left_turning_point, left_turning_point + 2.0 * amplitude)
     if dr[0] > 0.0 or dr[-1] < 0.0:
         return None
     length = np.diff(y)
     if y.size == 2:  # within one straight piece, which makes a sine
         slope = float(dr[1] - dr[0]) / (2.0 * amplitude)
-        return KlingelWave(amplitude, low + amplitude, 2.0 * math.pi / math.sqrt(slope)) if slope > 0.0 else None
+        return (
+            KlingelWave(amplitude, left_turning_point + amplitude, 2.0 * math.pi / math.sqrt(slope))
+            if slope > 0.0
+            else None
+        )
     energy = _swing_energy(dr, length)
     if not ((energy[1:-1] > 0.0).all() and (_lowest_energy(dr, length, energy) > 0.0).all()):
         return None
@@ -173,46 +184,48 @@ def _wave_from_turning_point(table: RollingRadiusTable, low: float, amplitude: f
     path_by_speed = length[moving] / (speed[1:] + speed[:-1])[moving]
     return KlingelWave(
         amplitude,
-        low + amplitude,
+        left_turning_point + amplitude,
         2.0 * float(_crossing_times(path_by_speed, np.diff(dr)[moving] / length[moving]).sum()),
     )
 
 
-def _swing_energy(dr: Array, length: Array) -> Array:
+def _swing_energy(radius_difference: Array, swing_lengths: Array) -> Array:
     """Energy v^2 / 2 (n,) at the rows of a swing. Each is summed from the nearer turning point, where it is small, to
     limit rounding."""
-    work = length * (dr[1:] + dr[:-1]) / 2.0
+    work = swing_lengths * (radius_difference[1:] + radius_difference[:-1]) / 2.0
     from_left, from_right = -np.append(0.0, np.cumsum(work)), np.append(np.cumsum(work[::-1])[::-1], 0.0)
-    return np.where(np.arange(len(dr)) <= np.argmax(from_left), from_left, from_right)
+    return np.where(np.arange(len(radius_difference)) <= np.argmax(from_left), from_left, from_right)
 
 
-def _lowest_energy(dr: Array, length: Array, energy: Array) -> Array:
-    """Energies at the maxima of the potential inside pieces of the table, where a falling difference ``dr`` passes
+def _lowest_energy(radius_difference: Array, swing_lengths: Array, swing_energy: Array) -> Array:
+    """Energies at the maxima of the potential inside pieces of the table, where a falling difference ``radius_difference`` passes
     zero."""
-    falls = (dr[:-1] > 0.0) & (dr[1:] < 0.0) & (length > 0.0)
-    distance_to_zero = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
-    return energy[:-1][falls] - 0.5 * distance_to_zero * dr[:-1][falls]
+    falls = (radius_difference[:-1] > 0.0) & (radius_difference[1:] < 0.0) & (swing_lengths > 0.0)
+    distance_to_zero = (
+        swing_lengths[falls] * radius_difference[:-1][falls] / (radius_difference[:-1] - radius_difference[1:])[falls]
+    )
+    return swing_energy[:-1][falls] - 0.5 * distance_to_zero * radius_difference[:-1][falls]
 
 
-def _crossing_times(length_by_speeds: Array, slope: Array) -> Array:
+def _crossing_times(length_by_speeds: Array, difference_slope: Array) -> Array:
     """Times (n,) to cross each straight piece of the table; ``length_by_speeds`` : ratio of the piece's length to the
-    sum of the speeds at both ends; slope : of the rolling radius difference."""
-    root = np.sqrt(np.abs(slope))
+    sum of the speeds at both ends; difference_slope : of the rolling radius difference."""
+    root = np.sqrt(np.abs(difference_slope))
     angle = root * length_by_speeds
-    small, rising = angle < SERIES_LIMIT, slope > 0.0
+    small, rising = angle < SERIES_LIMIT, difference_slope > 0.0
     safe = np.where(small, 1.0, root)
     across = np.where(rising, np.arctan(angle), np.arctanh(np.where(rising, 0.0, np.minimum(angle, 1.0 - 1e-16))))
     return 2.0 * np.where(small, length_by_speeds, across / safe)
 
 
-def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
+def _without_wave(radius_table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     """A wave of zero conicity if the wheels do not steer over the whole swing; otherwise raises the InputError that
     explains why there is no wave."""
-    idle = _idle_centre(table, amplitude)
+    idle = _idle_centre(radius_table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
-    dr, (first_displacement, last_displacement) = table.differences, table.displacement_range
-    rises = table.difference(last_displacement, "left") - table.difference(first_displacement)
+    dr, (first_displacement, last_displacement) = radius_table.differences, radius_table.displacement_range
+    rises = radius_table.difference(last_displacement, "left") - radius_table.difference(first_displacement)
     if (dr >= 0.0).all() or (dr <= 0.0).all():
         why = (
             f"has no wave: dr does not change its sign from {first_displacement:g} to {last_displacement:g}, "
@@ -223,13 +236,13 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     else:
         table_range = f"from {first_displacement:g} to {last_displacement:g}"
         why = f"has no wave within the table, {table_range}: it would swing beyond, or not come across"
-    raise InputError(table.source, "amplitude", amplitude, why)
+    raise InputError(radius_table.source, "amplitude", amplitude, why)
 
 
-def _idle_centre(table: RollingRadiusTable, amplitude: float) -> float | None:
+def _idle_centre(radius_table: RollingRadiusTable, amplitude: float) -> float | None:
     """Centre of an interval, the nearest to y = 0, in which the difference of rolling radii is zero and which is at
     least as wide as the swing; None if there is none."""
-    y, zero = table.displacements, table.differences == 0.0
+    y, zero = radius_table.displacements, radius_table.differences == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[0], zero.astype(int), [0]])))
     stretches = [(float(y[a]), float(y[b - 1])) for a, b in edges.reshape(-1, 2)]
     wide = [
@@ -239,20 +252,20 @@ def _idle_centre(table: RollingRadiusTable, amplitude: float) -> float | None:
 
 
 def harmonic_linearised_conicity(
-    displacements: Array, differences: Array, amplitude: float, centre: float = 0.0
+    displacements: Array, radius_differences: Array, amplitude: float, swing_centre: float = 0.0
 ) -> float:
     """Conicity of the cones whose rolling radius difference has the same first harmonic as the wheels', for lateral
     motion as ``amplitude`` times a sine.
 
-    displacements : (n,) ascending, over the whole of the swing about ``centre``, or from 0 on for wheels that are alike
-    and a swing about 0; differences : (n,) of the rolling radii, right less left. All in one unit of length.
+    displacements : (n,) ascending, over the whole of the swing about ``swing_centre``, or from 0 on for wheels that are alike
+    and a swing about 0; radius_differences : (n,) of the rolling radii, right less left. All in one unit of length.
     """
-    displacements, differences = np.asarray(displacements, float), np.asarray(differences, float)
+    displacements, radius_differences = np.asarray(displacements, float), np.asarray(radius_differences, float)
     if displacements[0] == 0.0:
         displacements = np.concatenate([-displacements[:0:-1], displacements])
-        differences = np.concatenate([-differences[:0:-1], differences])
-    largest_amplitude = min(displacements[-1] - centre, centre - displacements[0])
-    quantity(
+        radius_differences = np.concatenate([-radius_differences[:0:-1], radius_differences])
+    largest_amplitude = min(displacements[-1] - swing_centre, swing_centre - displacements[0])
+    checked_quantity(
         "amplitude",
         amplitude,
         f"an amplitude above 0 and up to {largest_amplitude:g}, the table's",
@@ -260,7 +273,7 @@ def harmonic_linearised_conicity(
         largest_amplitude,
     )
     phase = 2.0 * math.pi * (np.arange(HARMONIC_PHASES) + 0.5) / HARMONIC_PHASES
-    values = np.interp(centre + amplitude * np.sin(phase), displacements, differences)
+    values = np.interp(swing_centre + amplitude * np.sin(phase), displacements, radius_differences)
     return float((values * np.sin(phase)).mean() / amplitude)
 
 
@@ -281,15 +294,17 @@ class ConicityRow:
     spacing_error: float
 
 
-def conicity_row(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> ConicityRow:
+def conicity_row(
+    radius_table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None
+) -> ConicityRow:
     """Equivalent conicity of a table at an amplitude, by the standard and by the first harmonic. Raises InputError as
     ``klingel_wave`` does."""
-    wave = klingel_wave(table, amplitude, centre_guess=centre_guess)
+    wave = klingel_wave(radius_table, amplitude, centre_guess=centre_guess)
     harmonic = harmonic_linearised_conicity(
-        table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
+        radius_table.displacements, radius_table.differences, amplitude * (1.0 - 1e-12), wave.centre
     )
     try:
-        coarse = klingel_wave(table.without_every_second_row(), amplitude, centre_guess=wave.centre).conicity
+        coarse = klingel_wave(radius_table.without_every_second_row(), amplitude, centre_guess=wave.centre).conicity
     except InputError:
         coarse = math.nan
     return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

@@ -13,15 +13,15 @@ FLANGE_ANGLE = math.radians(70.0)
 """Angle (rad) of a usual flange: the spring that models the flange of a cone has no angle."""
 
 
-def nadal_limit(friction: float, angle: float = FLANGE_ANGLE) -> float:
+def nadal_limit(friction: float, flange_angle: float = FLANGE_ANGLE) -> float:
     """Limit of the ratio Y / Q of lateral to vertical wheel force below which a flange at an angle (rad) does not
     climb, by Nadal's formula."""
-    return (math.tan(angle) - friction) / (1.0 + friction * math.tan(angle))
+    return (math.tan(flange_angle) - friction) / (1.0 + friction * math.tan(flange_angle))
 
 
-def bound_shares(force: np.ndarray, bound: np.ndarray) -> np.ndarray:
+def bound_shares(forces: np.ndarray, force_bounds: np.ndarray) -> np.ndarray:
     """Ratios of the magnitudes of forces to their bounds, arrays of equal shape: 0 where there is no force, infinite
     where the bound is zero."""
-    force = np.abs(force)
+    forces = np.abs(forces)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(force > 0.0, force / bound, 0.0)
+        return np.where(forces > 0.0, forces / force_bounds, 0.0)

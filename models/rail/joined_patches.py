@@ -13,8 +13,8 @@ from scipy.ndimage import label
 
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
-from models.contact.normal_problem import centres, solve_normal
-from models.contact.patches import Box, Patch
+from models.contact.normal_problem import cell_centres, solve_normal
+from models.contact.patches import Patch, Rectangle
 from models.contact.simplified_theory import PatchPressure
 from models.core.errors import InputError, RunFailed
 
@@ -41,7 +41,7 @@ class PatchShare:
     x: float
     y: float
     area: float
-    box: Box
+    box: Rectangle
     peak: float
     piece: int
 
@@ -77,10 +77,10 @@ def _patch_shares_on_grid(
     load: float,
     approach: float,
     material_pair: MaterialPair,
-    margin: float,
+    grid_margin: float,
     cell_factor: float,
 ) -> tuple[list[PatchShare], float]:
-    x, y = _grid_around(approximate_patches, margin, cell_factor)
+    x, y = _grid_around(approximate_patches, grid_margin, cell_factor)
     cosines = np.cos([patch.lean for patch in patches])
     heights = np.array([_heights_on_grid(patch, x, y) for patch in patches])
     leading = float(np.cos(max(approximate_patches, key=lambda pressure_of_patch: pressure_of_patch.load).patch.lean))
@@ -106,18 +106,18 @@ def _patch_shares_on_grid(
 
 
 def _grid_around(
-    approximate_patches: Sequence[PatchPressure], margin: float, cell_factor: float
+    approximate_patches: Sequence[PatchPressure], grid_margin: float, cell_factor: float
 ) -> tuple[Array, Array]:
     """Cell centres (m) of a grid around all patches, along x and along the contour."""
     x0, x1 = min(patch.box[0] for patch in approximate_patches), max(patch.box[1] for patch in approximate_patches)
     y0 = min(patch.box[2] + patch.patch.contour_position for patch in approximate_patches)
     y1 = max(patch.box[3] + patch.patch.contour_position for patch in approximate_patches)
-    high = margin * (y1 - y0)
+    high = grid_margin * (y1 - y0)
     narrowest = min(patch.box[3] - patch.box[2] for patch in approximate_patches)
     rows = round(min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y) / cell_factor)
     columns = round(CELLS_X / cell_factor)
-    x_centres = (x0 + x1) / 2.0 + centres(columns, margin * (x1 - x0) / columns)
-    return x_centres, (y0 + y1) / 2.0 + centres(rows, high / rows)
+    x_centres = (x0 + x1) / 2.0 + cell_centres(columns, grid_margin * (x1 - x0) / columns)
+    return x_centres, (y0 + y1) / 2.0 + cell_centres(rows, high / rows)
 
 
 def _heights_on_grid(patch: Patch, x: Array, y: Array) -> Array:
@@ -130,7 +130,7 @@ def _heights_on_grid(patch: Patch, x: Array, y: Array) -> Array:
 
 
 def _pressure_share(
-    pressure: Array, x: Array, y: Array, contour_position: float, cell: float, piece_labels: Array
+    pressure: Array, x: Array, y: Array, contour_position: float, cell_area: float, piece_labels: Array
 ) -> PatchShare:
     """``PatchShare`` of a patch whose origin is at a position on the contour (m); ``pressure`` (Pa) is zero outside
     this patch."""
@@ -139,17 +139,17 @@ def _pressure_share(
         return PatchShare(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)
     box = (*_outer_edges(x, pressure.sum(axis=0) > 0.0), *_outer_edges(y, pressure.sum(axis=1) > 0.0))
     return PatchShare(
-        total * cell,
+        total * cell_area,
         float((pressure.sum(axis=0) @ x) / total),
         float((pressure.sum(axis=1) @ y) / total) - contour_position,
-        float(np.count_nonzero(pressure) * cell),
+        float(np.count_nonzero(pressure) * cell_area),
         box,
         float(pressure.max()),
         int(piece_labels.flat[np.argmax(pressure)]),
     )
 
 
-def _outer_edges(cells: Array, is_inside: Array) -> tuple[float, float]:
+def _outer_edges(cell_positions: Array, is_inside: Array) -> tuple[float, float]:
     """Positions (m) of the outer edges of the first and the last cell that are inside."""
-    half = (cells[1] - cells[0]) / 2.0
-    return float(cells[is_inside][0] - half), float(cells[is_inside][-1] + half)
+    half = (cell_positions[1] - cell_positions[0]) / 2.0
+    return float(cell_positions[is_inside][0] - half), float(cell_positions[is_inside][-1] + half)

@@ -77,28 +77,28 @@ def rails_from_table(table_pointer):
     )
 
 
-def joints_from_states(states: Array) -> Array:
+def joints_from_states(wheelset_states: Array) -> Array:
     """Joint positions and rates (..., 10) from a wheelset's states (..., 10)."""
-    of_joints = states[..., _POSITIONS + _RATES]
-    of_joints[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
+    of_joints = wheelset_states[..., _POSITIONS + _RATES]
+    of_joints[..., -1] -= wheelset_states[..., YAW_RATE] * np.sin(wheelset_states[..., ROLL])
     return of_joints
 
 
-def states_from_joints(joints: Array) -> Array:
+def states_from_joints(joint_states: Array) -> Array:
     """States (..., 10) of a wheelset from joint positions and rates (..., 10)."""
-    states = np.empty(joints.shape)
-    states[..., _POSITIONS + _RATES] = joints
+    states = np.empty(joint_states.shape)
+    states[..., _POSITIONS + _RATES] = joint_states
     states[..., SPIN] += states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return states
 
 
-def state_rates(joints: Array, accelerations: Array) -> Array:
+def state_rates(joint_states: Array, joint_accelerations: Array) -> Array:
     """Time derivative (10,) of a wheelset's state, from positions and rates (10,) and accelerations (5,) of the
     joints."""
     state_rate = np.empty(STATE_COUNT)
-    state_rate[_POSITIONS], state_rate[_RATES] = joints[JOINTS:], accelerations
-    roll, yaw_rate, roll_rate = joints[3], joints[JOINTS + 2], joints[JOINTS + 3]
-    state_rate[SPIN] += accelerations[2] * math.sin(roll) + yaw_rate * roll_rate * math.cos(roll)
+    state_rate[_POSITIONS], state_rate[_RATES] = joint_states[JOINTS:], joint_accelerations
+    roll, yaw_rate, roll_rate = joint_states[3], joint_states[JOINTS + 2], joint_states[JOINTS + 3]
+    state_rate[SPIN] += joint_accelerations[2] * math.sin(roll) + yaw_rate * roll_rate * math.cos(roll)
     return state_rate
 
 
@@ -135,9 +135,9 @@ def joint_forces(table_pointer, t, q, v, forces_out):
 
 
 @njit(cache=True, error_model="numpy")
-def set_joint_forces(block, t, n):
+def set_joint_forces(memory_block, t, coordinate_count):
     """Set ``f`` to the forces of ``joint_forces``. All data lie in one block of doubles at a memory address: f, q and v
     (n,), then the table."""
-    f = at(block)
-    array(f, (n,))[:] = 0.0
-    joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
+    f = at(memory_block)
+    array(f, (coordinate_count,))[:] = 0.0
+    joint_forces(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)

@@ -9,16 +9,23 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.inputs import Array
-from models.contact.profile_files import Kind, read_profile
+from models.contact.profile_files import ProfileKind, read_profile
 from models.contact.profiles import ContactProfile
-from models.contact.standard_profiles import RAILS, WHEELS
-from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, rail_in_track, touching_pose
+from models.contact.standard_profiles import BUILT_IN_RAILS, BUILT_IN_WHEELS
+from models.contact.wheel_on_rail import (
+    TrackGeometry,
+    WheelAndRail,
+    WheelsetGeometry,
+    WheelsetPose,
+    rail_in_track,
+    touching_pose,
+)
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
 from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile
 
-BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
+BUILT_IN = {"wheel": BUILT_IN_WHEELS, "rail": BUILT_IN_RAILS}
 NODE_SPACING, KNOT_SPACING = 1e-4, 2.5e-4
 """Spacing (m) of the nodes along the wheel's contour and of the knots along the rail's."""
 LATERAL_SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
@@ -61,38 +68,38 @@ class Profiles(Strict):
                 raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(known))
         return self.model_copy(update=files)
 
-    def wheel_on_rail(self, radius: float) -> WheelAndRail:
+    def wheel_on_rail(self, wheel_radius: float) -> WheelAndRail:
         """The right wheel with a radius (m) on its rail. Raises InputError for files that contain no profile."""
         rail = _contact_profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _contact_profile(self.wheel, "wheel", self.smoothing),
-            rail_in_track(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
-            Wheelset(radius, self.back_to_back, self.taping),
+            rail_in_track(rail, TrackGeometry(self.gauge, self.gauge_depth, self.inclination)),
+            WheelsetGeometry(wheel_radius, self.back_to_back, self.taping),
         )
 
-    def first_touch_pose(self, radius: float, lateral_shift: float) -> tuple[float, float]:
+    def first_touch_pose(self, wheel_radius: float, lateral_shift: float) -> tuple[float, float]:
         """Fall (m, downwards) of the wheelset from its height in the middle of the track, and roll (rad), at which both
         wheels just touch at a lateral displacement (m). Raises InputError if they cannot."""
-        wheel_on_rail = self.wheel_on_rail(radius)
+        wheel_on_rail = self.wheel_on_rail(wheel_radius)
         pose = touching_pose(wheel_on_rail, lateral_shift, 0.0)
-        return pose.fall - wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
+        return pose.fall - wheel_on_rail.clearance(WheelsetPose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
-def _contact_profile(name: str, profile_kind: Kind, smoothing: float) -> ContactProfile:
+def _contact_profile(profile_name: str, profile_kind: ProfileKind, smoothing: float) -> ContactProfile:
     known = BUILT_IN[profile_kind]
-    if name in known:
-        return known[name]()
-    if not Path(name).suffix:
-        raise InputError("", profile_kind, name, "is neither built in nor a file", tuple(known))
-    return read_profile(name, profile_kind, smoothing=smoothing)
+    if profile_name in known:
+        return known[profile_name]()
+    if not Path(profile_name).suffix:
+        raise InputError("", profile_kind, profile_name, "is neither built in nor a file", tuple(known))
+    return read_profile(profile_name, profile_kind, smoothing=smoothing)
 
 
 @cache
-def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
+def laid_profile(profiles: Profiles, wheel_radius: float) -> LaidProfile:
     """``LaidProfile`` that ``profile_on_rail`` reads, for wheels with a radius (m) at the taping line."""
     from scipy.interpolate import CubicSpline
 
-    wheel_on_rail = profiles.wheel_on_rail(radius)
+    wheel_on_rail = profiles.wheel_on_rail(wheel_radius)
     tip = int(np.argmax(wheel_on_rail.wheel.z))
     y = _evenly_spaced(wheel_on_rail.wheel.y[tip:], wheel_on_rail.wheel.z[tip:], NODE_SPACING)
     curve = wheel_on_rail.wheel.curve
@@ -102,11 +109,11 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
         if (touch := _first_contact(wheel_on_rail, shift)) is not None
     ]
     cuts = [cut for cut in (_ridge_position(wheel_on_rail, *pair) for pair in pairwise(touched)) if cut is not None]
-    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones_of_positions(y, cuts)])
+    nodes = np.column_stack([y, wheel_radius + curve(y), curve(y, 1), _zones_of_positions(y, cuts)])
     knots = _evenly_spaced(wheel_on_rail.rail.y, wheel_on_rail.rail.z, KNOT_SPACING)
     cubic = CubicSpline(knots, wheel_on_rail.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
-    level = wheel_on_rail.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
+    level = wheel_on_rail.clearance(WheelsetPose(0.0, 0.0, 0.0, 0.0)) - wheel_radius
     head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, wheel_on_rail.wheelset.arm, level]]
     return LaidProfile(
         *(_read_only_records(*pair) for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE), (rail, RAIL_KNOT)))
@@ -118,9 +125,9 @@ def no_profile() -> LaidProfile:
     return LaidProfile(np.zeros(1, PROFILE_COUNTS), np.empty(0, WHEEL_NODE), np.empty(0, RAIL_KNOT))
 
 
-def _read_only_records(rows: Any, record_type: np.dtype) -> Array:
+def _read_only_records(number_rows: Any, record_type: np.dtype) -> Array:
     """Read-only records (n,) from rows of numbers."""
-    records_array = np.ascontiguousarray(rows, float).view(record_type)[:, 0]
+    records_array = np.ascontiguousarray(number_rows, float).view(record_type)[:, 0]
     records_array.flags.writeable = False
     return records_array
 
@@ -165,10 +172,10 @@ def _ridge_position(
     return None
 
 
-def _zones_of_positions(y: Array, cuts: list[float]) -> Array:
+def _zones_of_positions(y: Array, zone_borders: list[float]) -> Array:
     """Zone (n,) of positions on the wheel: a whole number, or a fraction in the smooth transition between two zones."""
     zones = np.zeros(y.size)
-    for cut in cuts:
+    for cut in zone_borders:
         t = np.clip((y - cut) / (2.0 * BLEND_HALF_LENGTH) + 0.5, 0.0, 1.0)
         zones += t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
     return zones

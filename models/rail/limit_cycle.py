@@ -115,27 +115,27 @@ class Orbit:
 
 
 def guess_near_state(
-    equations: Equations, state: Array, orbit_period: float, step: float, executor: Executor | None = None
+    equations: Equations, start_state: Array, orbit_period: float, time_step: float, executor: Executor | None = None
 ) -> Orbit:
     """Initial guess for ``solved_orbit``: a state (10,) near a maximum of y, and a period (s) divided into steps of at
-    most ``step`` (s)."""
-    start = state.copy()
+    most ``time_step`` (s)."""
+    start = start_state.copy()
     start[Y_RATE] = 0.0
     return _with_return_slopes(
-        Orbit(equations, start, orbit_period, math.ceil(orbit_period / step), np.empty(0)), executor
+        Orbit(equations, start, orbit_period, math.ceil(orbit_period / time_step), np.empty(0)), executor
     )
 
 
 def orbit_of_small_amplitude(
-    equations: Equations, amplitude: float, step: float, executor: Executor | None = None
+    equations: Equations, amplitude: float, time_step: float, executor: Executor | None = None
 ) -> Orbit:
     """Orbit of a small amplitude (m), found from the linear motion that neither grows nor decays at the critical speed.
 
-    step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
+    time_step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
     amplitude is so small that cells of FASTSIM begin to slide one by one.
     """
 
-    def growth(_: Wheelset, speed: float) -> float:
+    def growth(_equations_type: Wheelset, speed: float) -> float:
         return float(np.linalg.eigvals(replace(equations, speed=speed).state_matrix).real.max())
 
     critical_equations = replace(equations, speed=critical_speed(equations.wheelset, growth))
@@ -143,7 +143,7 @@ def orbit_of_small_amplitude(
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
     state = critical_equations.rest.copy()
     state[RETURNING_STATES] += amplitude * (vectors[:, k] / vectors[AMPLITUDE_INDEX, k]).real
-    guess = guess_near_state(critical_equations, state, 2.0 * math.pi / values[k].imag, step, executor)
+    guess = guess_near_state(critical_equations, state, 2.0 * math.pi / values[k].imag, time_step, executor)
     return solved_orbit(guess, "speed", executor=executor)
 
 
@@ -156,12 +156,14 @@ def guess_from_orbit(known_orbit: Orbit, equations: Equations) -> Orbit:
     )
 
 
-def branch_of_orbits(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
+def branch_of_orbits(
+    first_orbit: Orbit, amplitudes: Iterable[float], executor: Executor | None = None
+) -> Iterator[Orbit]:
     """Orbits of successive amplitudes (m), each continued from the two before; the speed of each is solved for.
 
     Raises RunFailed where the branch cannot be followed.
     """
-    earlier_orbit, latest_orbit = replace(first, state=first.equations.rest), first
+    earlier_orbit, latest_orbit = replace(first_orbit, state=first_orbit.equations.rest), first_orbit
     for amplitude in amplitudes:
         earlier_orbit, latest_orbit = (
             latest_orbit,
@@ -200,7 +202,7 @@ def _continued_orbit(
 
 
 def solved_orbit(
-    orbit_guess: Orbit, sought_quantity: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
+    orbit_guess: Orbit, sought_quantity: SoughtQuantity, *, is_precise: bool = True, executor: Executor | None = None
 ) -> Orbit:
     """Orbit near a guess. ``sought_quantity`` is solved for: speed or amplitude; the other keeps the guess's value. A
     precise orbit gets slopes computed about itself.
@@ -217,7 +219,7 @@ def solved_orbit(
         missed = ((end - orbit.state) / STATE_SIZES)[RETURNING_STATES]
         size = float(np.abs(missed).max())
         if size < CLOSURE_TOLERANCE:
-            return orbit if fresh or not precise else _with_return_slopes(orbit, executor)
+            return orbit if fresh or not is_precise else _with_return_slopes(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
             orbit, fresh = _with_return_slopes(orbit, executor), True
         orbit, left, fresh = _newton_corrected(orbit, missed, sought_quantity), size, False
@@ -229,7 +231,10 @@ def solved_orbit(
 def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor: Executor | None = None) -> Orbit:
     """Orbit computed with half the step, with the changes of its speed or amplitude and of its frequency as errors."""
     half = solved_orbit(
-        replace(known_orbit, step_count=2 * known_orbit.step_count), sought_quantity, precise=False, executor=executor
+        replace(known_orbit, step_count=2 * known_orbit.step_count),
+        sought_quantity,
+        is_precise=False,
+        executor=executor,
     )
     return replace(
         half,
@@ -238,8 +243,8 @@ def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor:
     )
 
 
-def _state_after(equations: Equations, state: Array, orbit_period: float, step_count: int) -> Array:
-    return equations.run(state, orbit_period, orbit_period / step_count, step_count).states[-1]
+def _state_after(equations: Equations, start_state: Array, orbit_period: float, step_count: int) -> Array:
+    return equations.run(start_state, orbit_period, orbit_period / step_count, step_count).states[-1]
 
 
 OrbitGuess = tuple[Equations, Array, float]
@@ -269,13 +274,13 @@ def _ends_of_period(guess_pair: list[OrbitGuess], step_count: int) -> list[Array
     return [_state_after(*guess, step_count) for guess in guess_pair]
 
 
-def _newton_corrected(known_orbit: Orbit, mismatch: Array, sought_quantity: SoughtQuantity) -> Orbit:
+def _newton_corrected(known_orbit: Orbit, period_mismatch: Array, sought_quantity: SoughtQuantity) -> Orbit:
     """The orbit after a Newton correction with its slopes; the lateral rate stays zero."""
     returned = known_orbit.return_slopes.copy()
     returned[:, : len(RETURNING_STATES)] -= np.eye(len(RETURNING_STATES))
     free = [k for k in SECTION_COORDINATES if k != AMPLITUDE_INDEX]
     columns = [*free, AMPLITUDE_INDEX if sought_quantity == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
-    *section, change, longer = -np.linalg.solve(returned[:, columns], mismatch)
+    *section, change, longer = -np.linalg.solve(returned[:, columns], period_mismatch)
     state, speed = known_orbit.state.copy(), known_orbit.speed
     state_indices = [RETURNING_STATES[k] for k in free]
     state[state_indices] += section * STATE_SIZES[state_indices]
@@ -288,33 +293,41 @@ def _newton_corrected(known_orbit: Orbit, mismatch: Array, sought_quantity: Soug
 
 
 def attained_cycle(
-    equations: Equations, *, start_displacement: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
+    equations: Equations,
+    *,
+    initial_displacement: float = 5e-3,
+    time_step: float = 5e-4,
+    executor: Executor | None = None,
 ) -> Orbit | None:
-    """Limit cycle that a wheelset reaches from a lateral displacement ``start_displacement`` (m); None if the motion
+    """Limit cycle that a wheelset reaches from a lateral displacement ``initial_displacement`` (m); None if the motion
     decays.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
     """
-    state = equations.displaced_state(start_displacement)
+    state = equations.displaced_state(initial_displacement)
     for _ in range(MOST_MARCHES):
-        path = equations.run(state, MARCH_DURATION, step)
+        path = equations.run(state, MARCH_DURATION, time_step)
         y, state = path.states[:, Y], path.states[-1]
         if np.abs(y[-y.size // 4 :]).max() < DECAYED_DISPLACEMENT:
             return None
         tops = positive_maxima(y)
         if tops.size > 2 and np.ptp(y[tops[-2:]]) < AMPLITUDE_CHANGE * y[tops[-1]]:
             period = float(path.times[tops[-1]] - path.times[tops[-2]])
-            guess = guess_near_state(equations, path.states[tops[-1]], period, step, executor)
+            guess = guess_near_state(equations, path.states[tops[-1]], period, time_step, executor)
             return solved_orbit(guess, "amplitude", executor=executor)
     raise RunFailed(
         "wheelset", f"no steady motion within {MOST_MARCHES * MARCH_DURATION:g} s at {equations.speed:.6g} m/s"
     )
 
 
-def positive_maxima(samples: Array) -> np.ndarray:
+def positive_maxima(displacement_samples: Array) -> np.ndarray:
     """Indices of the positive local maxima."""
-    previous_values, middle_values, next_values = samples[:-2], samples[1:-1], samples[2:]
+    previous_values, middle_values, next_values = (
+        displacement_samples[:-2],
+        displacement_samples[1:-1],
+        displacement_samples[2:],
+    )
     return 1 + np.flatnonzero(
         (middle_values > previous_values) & (middle_values >= next_values) & (middle_values > 0.0)
     )
@@ -324,7 +337,7 @@ def bifurcation(
     equations: Equations,
     lowest_speed: float,
     highest_speed: float,
-    step: float = 5e-4,
+    time_step: float = 5e-4,
     executor: Executor | None = None,
 ) -> Iterator[Orbit]:
     """Limit cycles of increasing amplitude, from the critical speed on until the speed of a cycle leaves a range (m/s).
@@ -335,7 +348,7 @@ def bifurcation(
     clearance = equations.wheelset.flange_clearance
     for share in FIRST_AMPLITUDES:
         try:
-            first = orbit_of_small_amplitude(equations, share * clearance, step, executor)
+            first = orbit_of_small_amplitude(equations, share * clearance, time_step, executor)
             break
         except RunFailed:
             if share == FIRST_AMPLITUDES[-1]:

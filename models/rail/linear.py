@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.inputs import Array
-from models.contact.linear_theory import coefficients
+from models.contact.linear_theory import kalker_coefficients
 from models.core.errors import InputError
 from models.rail.wheelset import Wheelset
 
@@ -40,14 +40,14 @@ class NoCriticalSpeed(InputError):
     """Error of a wheelset that does not change from stable to unstable at any speed; ``unstable`` is whether it is
     always unstable."""
 
-    def __init__(self, unstable: bool) -> None:
-        self.unstable = unstable
+    def __init__(self, is_always_unstable: bool) -> None:
+        self.unstable = is_always_unstable
         super().__init__(
             "",
             "wheelset",
             None,
             f"is unstable at {LOWEST_SPEED:g} m/s already: its suspension is too soft"
-            if unstable
+            if is_always_unstable
             else f"is stable up to {HIGHEST_SPEED:g} m/s: there is no critical speed",
         )
 
@@ -79,7 +79,7 @@ def kalker_matrix(wheelset: Wheelset) -> Array:
     """Matrix (3, 3) of Kalker's linear theory, negative creep forces of one wheel per creepage: rows -fx, -fy, -mz,
     columns xi_x, xi_y, spin; N, N m, N m^2."""
     contact, pair = wheelset.ellipse, wheelset.material_pair
-    c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
+    c, area = kalker_coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
     turn = area**1.5 * c.c23
     return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
 
@@ -103,28 +103,29 @@ def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
     )
 
 
-def _contact_kinematics(w: Wheelset) -> list[tuple[Array, Array]]:
+def _contact_kinematics(wheelset: Wheelset) -> list[tuple[Array, Array]]:
     """Linear kinematics of the right and the left wheel: matrices (3, 2) from (y', psi') / V and from (y, psi) to the
     two creepages and spin."""
-    cosine, b = w.cone_sine_and_cosine[1], w.half_gauge
-    across = b / (b - w.conicity * w.radius) / cosine
+    cosine, b = wheelset.cone_sine_and_cosine[1], wheelset.half_gauge
+    across = b / (b - wheelset.conicity * wheelset.radius) / cosine
     return [
         (
             np.array([[0.0, -side * b], [across, 0.0], [0.0, cosine]]),
-            np.array([[-side * w.equivalent_conicity / w.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]]),
+            np.array([[-side * wheelset.equivalent_conicity / wheelset.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]]),
         )
         for side in (1.0, -1.0)
     ]
 
 
-def gravity_stiffness(w: Wheelset) -> Array:
+def gravity_stiffness(wheelset: Wheelset) -> Array:
     """Stiffness matrix (2, 2) of the weight on the wheelset, which lateral displacement y raises and yaw lowers."""
-    b, c = w.half_gauge, w.conicity
+    b, c = wheelset.half_gauge, wheelset.conicity
     rise = (
-        2.0 * w.roll_per_displacement
-        + (c * b + w.radius + w.head_radius / w.cone_sine_and_cosine[1]) * w.roll_per_displacement**2
+        2.0 * wheelset.roll_per_displacement
+        + (c * b + wheelset.radius + wheelset.head_radius / wheelset.cone_sine_and_cosine[1])
+        * wheelset.roll_per_displacement**2
     )
-    return w.load * np.diag([rise, -c * (b - c * w.radius)])
+    return wheelset.load * np.diag([rise, -c * (b - c * wheelset.radius)])
 
 
 def kinematic_wavelength(wheelset: Wheelset) -> float:
@@ -140,30 +141,36 @@ def largest_growth(wheelset: Wheelset, speed: float) -> float:
     return float(np.linalg.eigvals(linear_matrices(wheelset, speed).state_matrix).real.max())
 
 
-def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = largest_growth) -> float:
+def critical_speed(wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, float], float] = largest_growth) -> float:
     """Lowest speed (m/s) at which a motion of the wheelset no longer decays.
 
-    growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed if the
+    growth_at_speed : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed if the
     wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
     """
     speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEED_COUNT)
     slower = speeds[0]
-    if growth(wheelset, slower) >= 0.0:
-        raise NoCriticalSpeed(unstable=True)
+    if growth_at_speed(wheelset, slower) >= 0.0:
+        raise NoCriticalSpeed(is_always_unstable=True)
     for speed in speeds[1:]:
-        if growth(wheelset, speed) >= 0.0:
+        if growth_at_speed(wheelset, speed) >= 0.0:
             return float(
-                brentq(lambda v: growth(wheelset, v), slower, speed, xtol=SPEED_PRECISION * speed, rtol=SPEED_PRECISION)
+                brentq(
+                    lambda v: growth_at_speed(wheelset, v),
+                    slower,
+                    speed,
+                    xtol=SPEED_PRECISION * speed,
+                    rtol=SPEED_PRECISION,
+                )
             )
         slower = speed
-    raise NoCriticalSpeed(unstable=False)
+    raise NoCriticalSpeed(is_always_unstable=False)
 
 
 def critical_speed_or_reason(
-    wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = largest_growth
+    wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, float], float] = largest_growth
 ) -> tuple[float | None, str]:
     """Critical speed (m/s) of the wheelset and "", or None and the reason, as words that continue "the wheelset"."""
     try:
-        return critical_speed(wheelset, growth), ""
+        return critical_speed(wheelset, growth_at_speed), ""
     except NoCriticalSpeed as error:
         return None, str(error.allowed)

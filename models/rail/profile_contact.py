@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.contact.hertz import aspect
+from models.contact.hertz import axis_ratio_and_integrals
 from models.contact.inputs import Array
 from models.machine.compiled import lean, njit
 from models.machine.records import record
@@ -78,34 +78,34 @@ _LEAST_DEPTH_SQUARE = 1e-40
 
 
 @njit(cache=True, error_model="numpy")
-def profile_on_rail(wheel_side, pose, profile, modulus, touches):
-    """Fill the contact patches ``touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or
+def profile_on_rail(wheel_side, wheelset_pose, laid_profile, contact_modulus, zone_touches):
+    """Fill the contact patches ``zone_touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or
     less is no contact.
 
-    pose : ``Pose``; profile : ``LaidProfile``; modulus : E* (Pa).
+    wheelset_pose : ``Pose``; laid_profile : ``LaidProfile``; contact_modulus : E* (Pa).
     """
-    head = profile.head[0]
+    head = laid_profile.head[0]
     sums = np.zeros(int(head.zones), _SUMS)
-    y, z, roll, yaw = pose
+    y, z, roll, yaw = wheelset_pose
     wheel_pose = _pose_of_wheel(
         wheel_side * y, z + head.level, wheel_side * roll, wheel_side * yaw
     )  # the left wheel is the right one in a mirror
     knot, previous_depth = 0, -1.0
     for j in range(0, int(head.nodes), COARSE_NODES):
-        node = _node_contact(profile.nodes[j], wheel_pose, head, profile.knots, knot)
+        node = _node_contact(laid_profile.nodes[j], wheel_pose, head, laid_profile.knots, knot)
         knot = node[-1]
         if max(previous_depth, node[0]) > -SEARCH_MARGIN:
             for i in range(max(0, j - COARSE_NODES), j):
-                fine = _node_contact(profile.nodes[i], wheel_pose, head, profile.knots, knot)
+                fine = _node_contact(laid_profile.nodes[i], wheel_pose, head, laid_profile.knots, knot)
                 if fine[0] > 0.0:
-                    _add_node(profile.nodes[i], fine, i * head.spacing, sums)
+                    _add_node(laid_profile.nodes[i], fine, i * head.spacing, sums)
         previous_depth = node[0]
     together = 0
     for zone in range(len(sums)):
-        _fill_touch(wheel_side, sums[zone], wheel_pose, touches[zone])
-        together += touches[zone].depth > 0.0
+        _fill_touch(wheel_side, sums[zone], wheel_pose, zone_touches[zone])
+        together += zone_touches[zone].depth > 0.0
     if together > 1:
-        settle_depths(touches, modulus)
+        settle_depths(zone_touches, contact_modulus)
 
 
 @lean
@@ -119,15 +119,15 @@ def _pose_of_wheel(y, z, roll, yaw):
 
 
 @lean
-def _node_contact(node, wheel_pose, rail_head, knots, knot):
-    """Contact of the wheel circle through a node: depth along the rail's normal (m), position x, y, z from the centre
+def _node_contact(wheel_node, wheel_pose, rail_head, rail_knots, knot_guess):
+    """Contact of the wheel circle through a wheel_node: depth along the rail's normal (m), position x, y, z from the centre
     (m), slope of the rail, and the index of the knot."""
     y, z, cr, sr, cy, sy, lead, level, steer = wheel_pose
-    sine = min(1.0, max(-1.0, -node.slope * steer))
+    sine = min(1.0, max(-1.0, -wheel_node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
-    x_on_circle = node.radius * (sine - cosine * lead) * level
-    z_on_circle = node.radius * (cosine + sine * lead) * level
-    arm = rail_head.arm + node.y
+    x_on_circle = wheel_node.radius * (sine - cosine * lead) * level
+    z_on_circle = wheel_node.radius * (cosine + sine * lead) * level
+    arm = rail_head.arm + wheel_node.y
     across = cr * arm - sr * z_on_circle
     place_x, place_y, place_z = (
         cy * x_on_circle - sy * across,
@@ -135,95 +135,99 @@ def _node_contact(node, wheel_pose, rail_head, knots, knot):
         sr * arm + cr * z_on_circle,
     )
     y_on_rail, last_knot = y + place_y, int(rail_head.knots) - 1
-    if not knots[0].y <= y_on_rail < knots[last_knot].y:
-        return -1.0, place_x, place_y, place_z, 0.0, knot
-    while y_on_rail < knots[knot].y:
-        knot -= 1
-    while y_on_rail >= knots[knot + 1].y:
-        knot += 1
-    cubic = knots[knot]
+    if not rail_knots[0].y <= y_on_rail < rail_knots[last_knot].y:
+        return -1.0, place_x, place_y, place_z, 0.0, knot_guess
+    while y_on_rail < rail_knots[knot_guess].y:
+        knot_guess -= 1
+    while y_on_rail >= rail_knots[knot_guess + 1].y:
+        knot_guess += 1
+    cubic = rail_knots[knot_guess]
     t = y_on_rail - cubic.y
     vertical_depth = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
     if vertical_depth < -FAR_HEIGHT:
-        return -1.0, place_x, place_y, place_z, 0.0, knot
+        return -1.0, place_x, place_y, place_z, 0.0, knot_guess
     slope = cubic.c1 + t * (2.0 * cubic.c2 + 3.0 * t * cubic.c3)
-    return vertical_depth / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
+    return vertical_depth / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot_guess
 
 
 @lean
-def _add_node(node, node_contact, length, zone_sums):
+def _add_node(wheel_node, node_contact, node_length, zone_sums):
     """Add a touching node, which represents a length (m) of the contour, to the sums of its zone, or of both zones in a
     transition."""
     depth, place_x, place_y, place_z, slope, _ = node_contact
     upright = 1.0 / math.sqrt(1.0 + slope * slope)
-    zone = int(node.zone)
-    share = node.zone - zone
+    zone = int(wheel_node.zone)
+    share = wheel_node.zone - zone
     for zone_side in range(2):
         weight = (share if zone_side == 1 else 1.0 - share) * depth**2
         if weight > 0.0:
             to = zone_sums[zone + zone_side]
             to.w2 += weight
             to.w3 += weight * depth
-            to.s1 += weight * length
-            to.s2 += weight * length * length
+            to.s1 += weight * node_length
+            to.s2 += weight * node_length * node_length
             to.n_y -= weight * slope * upright
             to.n_z += weight * upright
             to.x += weight * place_x
             to.y += weight * place_y
             to.z += weight * place_z
-            to.radius += weight * node.radius
+            to.radius += weight * wheel_node.radius
 
 
 @lean
-def _fill_touch(wheel_side, zone_sums, wheel_pose, touch):
+def _fill_touch(wheel_side, zone_sums, wheel_pose, zone_touch):
     """Fill a contact patch from the sums of its zone."""
-    touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
+    zone_touch.depth = zone_touch.n_y = zone_touch.n_z = zone_touch.x = zone_touch.y = zone_touch.z = (
+        zone_touch.along
+    ) = zone_touch.across = 0.0
     weight_sum = zone_sums.w2
     if weight_sum <= _LEAST_DEPTH_SQUARE:
         return
     middle, size = zone_sums.s1 / weight_sum, math.hypot(zone_sums.n_y, zone_sums.n_z)
     depth, n_y, n_z = 3.5 / 3.0 * zone_sums.w3 / weight_sum, zone_sums.n_y / size, zone_sums.n_z / size
     spread = max(0.0, 7.0 * (zone_sums.s2 / weight_sum - middle * middle))
-    touch.depth, touch.n_y, touch.n_z = depth, wheel_side * n_y, n_z
-    touch.x, touch.y, touch.z = (
+    zone_touch.depth, zone_touch.n_y, zone_touch.n_z = depth, wheel_side * n_y, n_z
+    zone_touch.x, zone_touch.y, zone_touch.z = (
         zone_sums.x / weight_sum,
         wheel_side * zone_sums.y / weight_sum,
         zone_sums.z / weight_sum,
     )
     _, _, cr, sr, cy = wheel_pose[:5]
-    touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * weight_sum / zone_sums.radius
-    touch.across = depth / (spread + depth / SHARPEST_CURVATURE)
+    zone_touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * weight_sum / zone_sums.radius
+    zone_touch.across = depth / (spread + depth / SHARPEST_CURVATURE)
 
 
 @njit(cache=True, error_model="numpy")
-def settle_depths(touches, modulus):
+def settle_depths(zone_touches, contact_modulus):
     """Reduce the depths of one wheel's touches, TOUCH (zones,), by the elastic displacement that each touch's load
     causes at the others.
 
-    modulus : E* (Pa). A load N displaces the surface of a half-space by N / (pi E* r) at a distance r. To r^2, the mean
+    contact_modulus : E* (Pa). A load N displaces the surface of a half-space by N / (pi E* r) at a distance r. To r^2, the mean
     square lengths of both patches are added.
     """
-    n = len(touches)
+    n = len(zone_touches)
     unloaded_depths, load, axis = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        touch = touches[i]
+        touch = zone_touches[i]
         unloaded_depths[i] = touch.depth
-        load[i], axis[i] = normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[:2]
+        load[i], axis[i] = normal_force_and_axes(touch.depth, touch.along, touch.across, contact_modulus)[:2]
     stiff = load.copy()
     for _ in range(SHARE_SWEEPS):
         for i in range(n):
             displacement = 0.0
             for j in range(n):
                 if j != i and load[j] > 0.0:
-                    displacement += load[j] * _cosine_of_normals(touches[i], touches[j], axis[i] ** 2 + axis[j] ** 2)
-            depth = unloaded_depths[i] - displacement / (math.pi * modulus)
-            touches[i].depth = depth
+                    displacement += load[j] * _cosine_of_normals(
+                        zone_touches[i], zone_touches[j], axis[i] ** 2 + axis[j] ** 2
+                    )
+            depth = unloaded_depths[i] - displacement / (math.pi * contact_modulus)
+            zone_touches[i].depth = depth
             load[i] = stiff[i] * (max(0.0, depth) / unloaded_depths[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
 
 
 @lean
-def _cosine_of_normals(first_touch, second_touch, squares):
-    """Ratio (1/m) of the cosine between the normals of two patches to their distance; ``squares`` (m^2) are added to
+def _cosine_of_normals(first_touch, second_touch, squared_lengths):
+    """Ratio (1/m) of the cosine between the normals of two patches to their distance; ``squared_lengths`` (m^2) are added to
     the squared distance."""
     squared_distance = (
         (first_touch.x - second_touch.x) ** 2
@@ -231,19 +235,21 @@ def _cosine_of_normals(first_touch, second_touch, squares):
         + (first_touch.z - second_touch.z) ** 2
     )
     return (first_touch.n_y * second_touch.n_y + first_touch.n_z * second_touch.n_z) / math.sqrt(
-        squared_distance + squares / 5.0
+        squared_distance + squared_lengths / 5.0
     )
 
 
 @lean
-def normal_force_and_axes(penetration, curvature_along, curvature_across, modulus):
+def normal_force_and_axes(penetration, curvature_along, curvature_across, contact_modulus):
     """Elastic normal force (N) and semi-axes (m) from a penetration (m), curvatures along and across (1/m) and E* (Pa);
     zeros where there is a gap."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
-    g, cosine, sine = aspect(min(curvature_along, curvature_across) / max(curvature_along, curvature_across))
+    g, cosine, sine = axis_ratio_and_integrals(
+        min(curvature_along, curvature_across) / max(curvature_along, curvature_across)
+    )
     short = math.sqrt(penetration * cosine / (max(curvature_along, curvature_across) * (cosine + sine)))
-    load = 2.0 / 3.0 * math.pi * modulus * penetration * short / (g * (cosine + sine))
+    load = 2.0 / 3.0 * math.pi * contact_modulus * penetration * short / (g * (cosine + sine))
     if curvature_along <= curvature_across:
         return load, short / g, short
     return load, short, short / g

@@ -51,9 +51,9 @@ def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
     rails, half = rails_of(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.first_touch_pose(wheelset.radius, lateral_shift)
 
-    def pose(unknowns: Array) -> Equilibrium:
+    def pose(fall_and_roll: Array) -> Equilibrium:
         touches = np.zeros(count_of_patches(rails.profile), TOUCH)
-        height_and_roll = (z + unknowns[0] * CHANGE_SIZE, roll + unknowns[1] * CHANGE_SIZE)
+        height_and_roll = (z + fall_and_roll[0] * CHANGE_SIZE, roll + fall_and_roll[1] * CHANGE_SIZE)
         contact_points(Pose(lateral_shift, *height_and_roll, 0.0), rails, touches)
         modulus = rails.wheels["modulus"][0]
         loads = np.array(
@@ -61,8 +61,8 @@ def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
         )
         return Equilibrium(*height_and_roll, touches, loads)
 
-    def load_error(unknowns: Array) -> Array:
-        placed = pose(unknowns)
+    def load_error(fall_and_roll: Array) -> Array:
+        placed = pose(fall_and_roll)
         return (placed.loads * placed.touches["n_z"]).reshape(2, -1).sum(axis=1) / half - 1.0
 
     solved = root(load_error, [5.0, 0.0], tol=1e-14)

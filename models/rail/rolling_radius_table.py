@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import Array, quantity
-from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, touching_pose
+from models.contact.inputs import Array, checked_quantity
+from models.contact.wheel_on_rail import WheelAndRail, WheelsetPose, lowest_point, touching_pose
 from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
@@ -40,7 +40,9 @@ class RollingRadiusTable:
     source: str = ""
 
     def __post_init__(self) -> None:
-        y, dr = (quantity(name, getattr(self, name), "finite lengths") for name in ("displacements", "differences"))
+        y, dr = (
+            checked_quantity(name, getattr(self, name), "finite lengths") for name in ("displacements", "differences")
+        )
         if y.ndim != 1 or y.shape != dr.shape or y.size < FEWEST_ROWS:
             shapes = [list(y.shape), list(dr.shape)]
             raise InputError(
@@ -53,18 +55,18 @@ class RollingRadiusTable:
         object.__setattr__(self, "displacements", y[~repeated])
         object.__setattr__(self, "differences", dr[~repeated])
 
-    def _check_order(self, y: Array) -> None:
-        steps = np.diff(y)
+    def _check_order(self, displacements: Array) -> None:
+        steps = np.diff(displacements)
         back = np.flatnonzero(steps < 0.0)
         if back.size:
             i = int(back[0]) + 1
-            allowed = f"comes after {y[i - 1]:g}: displacements must rise (or fall) from row to row; sort the table"
-            raise InputError(self.source, f"displacement, row {i + 1}", float(y[i]), allowed)
+            allowed = f"comes after {displacements[i - 1]:g}: displacements must rise (or fall) from row to row; sort the table"
+            raise InputError(self.source, f"displacement, row {i + 1}", float(displacements[i]), allowed)
         thrice = np.flatnonzero((steps[1:] == 0.0) & (steps[:-1] == 0.0))
         if thrice.size:
             i = int(thrice[0])
             allowed = "stands in three rows: two rows at one displacement are a jump, three have no meaning"
-            raise InputError(self.source, f"displacement, row {i + 3}", float(y[i]), allowed)
+            raise InputError(self.source, f"displacement, row {i + 3}", float(displacements[i]), allowed)
 
     @cached_property
     def potential(self) -> Array:
@@ -77,12 +79,15 @@ class RollingRadiusTable:
         """First and last displacement of the table."""
         return float(self.displacements[0]), float(self.displacements[-1])
 
-    def section(self, low: float, high: float) -> tuple[Array, Array]:
-        """Displacements and differences of the section of the table from ``low`` to ``high``, including both ends."""
+    def section(self, lowest_displacement: float, highest_displacement: float) -> tuple[Array, Array]:
+        """Displacements and differences of the section of the table from ``lowest_displacement`` to ``highest_displacement``, including both ends."""
         y, dr = self.displacements, self.differences
-        first_row, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
-        end_differences = self.difference(low, "right"), self.difference(high, "left")
-        return np.array([low, *y[first_row:last_row], high]), np.array(
+        first_row, last_row = (
+            int(np.searchsorted(y, lowest_displacement, "right")),
+            int(np.searchsorted(y, highest_displacement, "left")),
+        )
+        end_differences = self.difference(lowest_displacement, "right"), self.difference(highest_displacement, "left")
+        return np.array([lowest_displacement, *y[first_row:last_row], highest_displacement]), np.array(
             [end_differences[0], *dr[first_row:last_row], end_differences[1]]
         )
 
@@ -112,33 +117,35 @@ class RollingRadiusTable:
         return replace(self, displacements=self.displacements[kept_rows], differences=self.differences[kept_rows])
 
 
-def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
+def read_rolling_radii(table_path: str | Path) -> RollingRadiusTable:
     """Rolling radius table from a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says;
     converted to m.
 
     InputError names the line that is wrong.
     """
-    table = read_table(path, TABLE_COLUMNS, least_row_count=FEWEST_ROWS)
-    return RollingRadiusTable(table["y"], table["dr"], str(path))
+    table = read_table(table_path, TABLE_COLUMNS, least_row_count=FEWEST_ROWS)
+    return RollingRadiusTable(table["y"], table["dr"], str(table_path))
 
 
 def rolling_radii_of(
-    right_side: WheelAndRail,
-    left_side: WheelAndRail,
-    displacements: Array,
+    right_wheel_and_rail: WheelAndRail,
+    left_wheel_and_rail: WheelAndRail,
+    lateral_displacements: Array,
     report_progress: Callable[[float], Any] = lambda share: None,
 ) -> RollingRadiusTable:
     """Rolling radius table of two wheels on their rails; the left wheel is described as a mirrored right one.
 
-    displacements : (n,) m, ascending. Displacements at the ends at which not both wheels touch are left out.
+    lateral_displacements : (n,) m, ascending. Displacements at the ends at which not both wheels touch are left out.
     report_progress : called with the completed share. Raises InputError where fewer than three are left.
     """
-    shifts = quantity("displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03)
+    shifts = checked_quantity(
+        "displacements", lateral_displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03
+    )
     rows = []
     for k, shift in enumerate(shifts.tolist()):
         report_progress(k / shifts.size)
         try:
-            rows.append((shift, *_rolling_radii(right_side, left_side, shift)))
+            rows.append((shift, *_rolling_radii(right_wheel_and_rail, left_wheel_and_rail, shift)))
         except InputError:
             if rows and shift > 0.0:
                 break
@@ -149,13 +156,22 @@ def rolling_radii_of(
     return RollingRadiusTable(y, of_right - of_left)
 
 
-def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_shift: float) -> tuple[float, float]:
+def _rolling_radii(
+    right_wheel_and_rail: WheelAndRail, left_wheel_and_rail: WheelAndRail, lateral_shift: float
+) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
-    pose = touching_pose(right_side, lateral_shift, 0.0, left_side)
-    return rolling_radius(right_side, pose), rolling_radius(left_side, Pose(-lateral_shift, 0.0, -pose.roll, pose.fall))
+    pose = touching_pose(right_wheel_and_rail, lateral_shift, 0.0, left_wheel_and_rail)
+    return rolling_radius(right_wheel_and_rail, pose), rolling_radius(
+        left_wheel_and_rail, WheelsetPose(-lateral_shift, 0.0, -pose.roll, pose.fall)
+    )
 
 
-def rolling_radius(wheel_and_rail: WheelAndRail, pose: Pose) -> float:
+def rolling_radius(wheel_and_rail: WheelAndRail, wheelset_pose: WheelsetPose) -> float:
     """Rolling radius (m) of a wheel at the point nearest to its rail."""
-    across = float((pose.rotation.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.axle_centre(pose)))[1])
+    across = float(
+        (
+            wheelset_pose.rotation.T
+            @ (lowest_point(wheel_and_rail, wheelset_pose) - wheel_and_rail.axle_centre(wheelset_pose))
+        )[1]
+    )
     return float(wheel_and_rail.wheelset.radius + wheel_and_rail.wheel.curve(across - wheel_and_rail.wheelset.arm))

@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, MARCHES
-from models.contact.fastsim_grid import grid, strips_of
-from models.contact.fastsim_many import forces
+from models.contact.fastsim import FLEXIBILITY_KINDS, MARCH_KINDS
+from models.contact.fastsim_grid import count_of_strips, ellipse_grid
+from models.contact.fastsim_many import fill_contact_forces
 from models.contact.fastsim_records import CONTACT, FORCES, cells_in, strips_in
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficient_at, flexibilities_at
@@ -79,7 +79,7 @@ WHEELSET = np.dtype(
 )
 """Motion and resultant of a wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s);
 angular velocity, spin about the axle included (rad/s); force (N) and moment about the centre (N m) on it."""
-BLENDED_BRISTLES, SECOND_ORDER_MARCH = KINDS["blended"], MARCHES["second-order"]
+BLENDED_BRISTLES, SECOND_ORDER_MARCH = FLEXIBILITY_KINDS["blended"], MARCH_KINDS["second-order"]
 
 
 class Rails(NamedTuple):
@@ -107,7 +107,7 @@ class Workspace(NamedTuple):
     contacts: Array
     motion: Array
     directed: Array
-    forces: Array
+    fill_contact_forces: Array
 
 
 class PatchPlace(NamedTuple):
@@ -144,22 +144,24 @@ class PatchNormalContact(NamedTuple):
     push: float
 
 
-def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) -> Rails:
+def rails_of(wheelset: Wheelset, creep_law: str = "linear", cell_count: int = LEAST_CELLS) -> Rails:
     """Rails under a wheelset, with FASTSIM's grid for its contact ellipse at rest (see ``fastsim_grid``)."""
-    if isinstance(cells, bool) or not isinstance(cells, int) or not LEAST_CELLS <= cells <= MOST_CELLS:
-        raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
+    if isinstance(cell_count, bool) or not isinstance(cell_count, int) or not LEAST_CELLS <= cell_count <= MOST_CELLS:
+        raise InputError("", "cells", cell_count, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
     w, pair, ellipse = wheelset, wheelset.material_pair, wheelset.ellipse
     shape = w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu
     wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
     profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
-    net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
+    net = ellipse_grid(cell_count, int(count_of_strips(np.asarray(ellipse.a / ellipse.b), cell_count)), "intermediate")
     laid = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
-    return Rails(wheels, laid, net.strips, net.cells, net.middle, LAW_NUMBERS[law])
+    return Rails(wheels, laid, net.strips, net.cells, net.middle, LAW_NUMBERS[creep_law])
 
 
-def plain_rails(rails: Rails) -> tuple[Any, ...]:
+def plain_rails(rails_and_wheels: Rails) -> tuple[Any, ...]:
     """``Rails`` as plain tuples, which Python passes to compiled functions faster."""
-    return tuple(tuple(rail_part) if isinstance(rail_part, LaidProfile) else rail_part for rail_part in rails)
+    return tuple(
+        tuple(rail_part) if isinstance(rail_part, LaidProfile) else rail_part for rail_part in rails_and_wheels
+    )
 
 
 @inlined
@@ -190,126 +192,134 @@ def workspace_for(profile):
 
 
 @lean
-def contact_points(pose, rails, touches):
-    """Fill the contact patches ``touches``, TOUCH (patches,), the right wheel's first; patches far from contact get no
+def contact_points(wheelset_pose, rails_and_wheels, zone_touches):
+    """Fill the contact patches ``zone_touches``, TOUCH (patches,), the right wheel's first; patches far from contact get no
     normal."""
-    per_wheel, wheels = len(touches) // 2, rails.wheels[0]
+    per_wheel, wheels = len(zone_touches) // 2, rails_and_wheels.wheels[0]
     for k in range(2):
-        side, of_side = RIGHT if k == 0 else LEFT, touches[k * per_wheel : (k + 1) * per_wheel]
-        if rails.profile.nodes.size > 0:
-            profile_on_rail(side, pose, rails.profile, wheels.modulus, of_side)
+        side, of_side = RIGHT if k == 0 else LEFT, zone_touches[k * per_wheel : (k + 1) * per_wheel]
+        if rails_and_wheels.profile.nodes.size > 0:
+            profile_on_rail(side, wheelset_pose, rails_and_wheels.profile, wheels.modulus, of_side)
             continue
         cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)
-        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, wheelset_pose, cone)
         touch = of_side[0]
         touch.depth, touch.n_y, touch.n_z, touch.x, touch.y, touch.z = depth, n_y, n_z, cx, cy, cz
         touch.along, touch.across = _longitudinal_curvature(rolling, wheels.conicity), 0.5 / wheels.head
 
 
 @njit(cache=True, error_model="numpy")
-def supported_force(z, rails):
+def supported_force(fall, rails_and_wheels):
     """Vertical part (N) of the elastic normal forces, with the wheelset's centre at height z (m) in the middle of the
     track."""
-    touches, force_sum = np.zeros(count_of_patches(rails.profile), TOUCH), 0.0
-    contact_points(Pose(0.0, z, 0.0, 0.0), rails, touches)
+    touches, force_sum = np.zeros(count_of_patches(rails_and_wheels.profile), TOUCH), 0.0
+    contact_points(Pose(0.0, fall, 0.0, 0.0), rails_and_wheels, touches)
     for k in range(len(touches)):
         touch = touches[k]
         force_sum += (
-            touch.n_z * normal_force_and_axes(touch.depth, touch.along, touch.across, rails.wheels[0].modulus)[0]
+            touch.n_z
+            * normal_force_and_axes(touch.depth, touch.along, touch.across, rails_and_wheels.wheels[0].modulus)[0]
         )
     return force_sum
 
 
 @inlined
-def _linear_forces(a, b, motion, shear, poisson):
+def _linear_forces(a, b, creep_motion, shear_modulus, poisson_ratio):
     """Creep forces (N) and moment (N m) of one patch by Kalker's coefficients, for creepages and spin given as
-    ``motion``."""
-    x, y, spin = motion
+    ``creep_motion``."""
+    x, y, spin = creep_motion
     if a <= 0.0:
         a, b, x, y, spin = 1.0, 1.0, 0.0, 0.0, 0.0
     area, ratio = a * b, a / b
     c = array(doubles(4), (4,))
     for kind in range(4):  # a loop, as numba compiles one function for each number that is written out
-        c[kind] = coefficient_at(kind, ratio, poisson)
+        c[kind] = coefficient_at(kind, ratio, poisson_ratio)
     turn = area**1.5 * c[2]
-    fx = -shear * area * c[0] * x
-    fy = -shear * (area * c[1] * y + turn * spin)
-    return fx, fy, shear * (turn * y - area**2 * c[3] * spin)
+    fx = -shear_modulus * area * c[0] * x
+    fy = -shear_modulus * (area * c[1] * y + turn * spin)
+    return fx, fy, shear_modulus * (turn * y - area**2 * c[3] * spin)
 
 
 @lean
-def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
+def _fill_one_direction(direction_sign, patch_contacts, creep_slips, speed, rails_and_wheels, wheel_forces):
     """Fill the creep forces fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll
     backwards (sign -1)."""
     reference_speed = max(abs(speed), REGULARISED_SPEED)
-    for k in range(len(contacts)):
-        contact = contacts[k]
-        contact.xi_x, contact.xi_y = sign * slip[k].vx / reference_speed, slip[k].aside / reference_speed
-        contact.spin = sign * slip[k].turn / reference_speed
-    if rails.law == FASTSIM:
-        forces(
-            contacts,
-            strips_in(rails.strips),
-            cells_in(rails.cells, rails.middle),
+    for k in range(len(patch_contacts)):
+        contact = patch_contacts[k]
+        contact.xi_x, contact.xi_y = (
+            direction_sign * creep_slips[k].vx / reference_speed,
+            creep_slips[k].aside / reference_speed,
+        )
+        contact.spin = direction_sign * creep_slips[k].turn / reference_speed
+    if rails_and_wheels.law == FASTSIM:
+        fill_contact_forces(
+            patch_contacts,
+            strips_in(rails_and_wheels.strips),
+            cells_in(rails_and_wheels.cells, rails_and_wheels.middle),
             BLENDED_BRISTLES,
             SECOND_ORDER_MARCH,
             wheel_forces,
         )
     else:
-        shear, poisson = rails.wheels[0].shear, rails.wheels[0].nu
-        for k in range(len(contacts)):
-            c, force = contacts[k], wheel_forces[k]
+        shear, poisson = rails_and_wheels.wheels[0].shear, rails_and_wheels.wheels[0].nu
+        for k in range(len(patch_contacts)):
+            c, force = patch_contacts[k], wheel_forces[k]
             force.fx, force.fy, force.mz = _linear_forces(c.a, c.b, (c.xi_x, c.xi_y, c.spin), shear, poisson)
 
 
 @inlined
-def fill_creep_forces(contacts, slip, speed, rails, workspace):
-    """Fill the creep forces fx, fy, mz in ``workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
+def fill_creep_forces(patch_contacts, creep_slips, speed, rails_and_wheels, contact_workspace):
+    """Fill the creep forces fx, fy, mz in ``contact_workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
 
     Near standstill they are a mixture of forward and backward rolling. The creepages are written into the contacts; for
     a wheel that rolls backwards those of its mirror image.
     """
-    answers, directed = workspace.forces, workspace.directed[: len(contacts)]
-    for k in range(len(contacts)):
-        contact, answer = contacts[k], answers[k]
+    answers, directed = contact_workspace.forces, contact_workspace.directed[: len(patch_contacts)]
+    for k in range(len(patch_contacts)):
+        contact, answer = patch_contacts[k], answers[k]
         answer.fx = answer.fy = answer.mz = 0.0
-        if rails.law == FASTSIM:
+        if rails_and_wheels.law == FASTSIM:
             contact.l1, contact.l2, contact.l3 = flexibilities_at(
-                contact.a, contact.b, rails.wheels[0].shear, rails.wheels[0].nu
+                contact.a, contact.b, rails_and_wheels.wheels[0].shear, rails_and_wheels.wheels[0].nu
             )
     forwards = min(1.0, max(0.0, 0.5 + 0.5 * speed / REGULARISED_SPEED))
     first, last = 0 if forwards > 0.0 else 1, 1 if forwards < 1.0 else 0
     for way in range(first, last + 1):  # one call for both ways, or callers are compiled with two copies of the law
         sign, share = (1.0, forwards) if way == 0 else (-1.0, 1.0 - forwards)
-        _fill_one_direction(sign, contacts, slip, speed, rails, directed)
-        for k in range(len(contacts)):
+        _fill_one_direction(sign, patch_contacts, creep_slips, speed, rails_and_wheels, directed)
+        for k in range(len(patch_contacts)):
             answers[k].fx += share * sign * directed[k].fx
             answers[k].fy += share * directed[k].fy
             answers[k].mz += share * sign * directed[k].mz
 
 
 @inlined
-def wheel_forces(pose, rails, report, workspace):
+def wheel_forces(wheelset_pose, rails_and_wheels, contact_report, contact_workspace):
     """Add the forces and moments of both rails on the wheelset to its resultants.
 
-    pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; workspace : ``Workspace``, its
+    wheelset_pose : ``Pose``; contact_report : REPORT (patches,), filled, or of no rows where nobody asks; contact_workspace : ``Workspace``, its
     wheelset given in, all else written over.
     """
-    if rails.law == LINEAR and rails.profile.nodes.size == 0 and workspace.wheelset[0].velocity[0] >= REGULARISED_SPEED:
-        _linear_cones(pose, rails.wheels[0], workspace.wheelset[0], report)
+    if (
+        rails_and_wheels.law == LINEAR
+        and rails_and_wheels.profile.nodes.size == 0
+        and contact_workspace.wheelset[0].velocity[0] >= REGULARISED_SPEED
+    ):
+        _linear_cones(wheelset_pose, rails_and_wheels.wheels[0], contact_workspace.wheelset[0], contact_report)
     else:
-        patch_by_patch(pose, rails, report, workspace)
+        patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_workspace)
 
 
 @lean
-def _linear_cones(pose, wheels, wheelset, report):
+def _linear_cones(wheelset_pose, wheels, wheelset, contact_report):
     """Add the forces of cones with the linear creep law that roll forwards, as ``patch_by_patch`` does but without
     storing intermediate values."""
     cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
     speed, modulus, shear, poisson = wheelset.velocity[0], wheels.modulus, wheels.shear, wheels.nu
     damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
     for side in (RIGHT, LEFT):
-        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, wheelset_pose, cone)
         patch_point = PatchPlace(n_y, n_z, cx, cy, cz)
         motion = _patch_motion(patch_point, velocity, turning)
         elastic, a, b = normal_force_and_axes(
@@ -318,60 +328,68 @@ def _linear_cones(pose, wheels, wheelset, report):
         slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
         creeping = _linear_forces(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
-        press = PatchNormalContact(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
+        press = PatchNormalContact(depth, a, b, elastic, load, _flange_force(side, wheelset_pose.y, wheels))
         _add_patch_forces(patch_point, press, creeping, wheelset.force, wheelset.moment)
-        if len(report) > 0:
-            _fill_report(patch_point, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
+        if len(contact_report) > 0:
+            _fill_report(patch_point, motion, press, creeping, speed, contact_report[0 if side == RIGHT else 1])
 
 
 @lean
-def patch_by_patch(pose, rails, report, workspace):
+def patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_workspace):
     """Add the forces of both rails for all kinds of patches, creep laws and directions of rolling; see
     ``wheel_forces``."""
     touches, wheels, wheelset, n, count = (
-        workspace.touches,
-        rails.wheels[0],
-        workspace.wheelset[0],
-        len(workspace.touches),
+        contact_workspace.touches,
+        rails_and_wheels.wheels[0],
+        contact_workspace.wheelset[0],
+        len(contact_workspace.touches),
         0,
     )
-    velocity, on_cones = wheelset.velocity, rails.profile.nodes.size == 0
-    contact_points(pose, rails, touches)
+    velocity, on_cones = wheelset.velocity, rails_and_wheels.profile.nodes.size == 0
+    contact_points(wheelset_pose, rails_and_wheels, touches)
     for k in range(n):
         if touches[k].n_z != 0.0 or touches[k].n_y != 0.0:
-            push = _flange_force(RIGHT if 2 * k < n else LEFT, pose.y, wheels) if on_cones else 0.0
-            _fill_contact(touches[k], wheelset, wheels, push, workspace.contacts[count], workspace.motion[count])
-            workspace.motion[count].patch, count = k, count + 1
-    fill_creep_forces(workspace.contacts[:count], workspace.motion[:count], velocity[0], rails, workspace)
-    for k in range(len(report)):
-        _clear_report(report[k])
+            push = _flange_force(RIGHT if 2 * k < n else LEFT, wheelset_pose.y, wheels) if on_cones else 0.0
+            _fill_contact(
+                touches[k], wheelset, wheels, push, contact_workspace.contacts[count], contact_workspace.motion[count]
+            )
+            contact_workspace.motion[count].patch, count = k, count + 1
+    fill_creep_forces(
+        contact_workspace.contacts[:count],
+        contact_workspace.motion[:count],
+        velocity[0],
+        rails_and_wheels,
+        contact_workspace,
+    )
+    for k in range(len(contact_report)):
+        _clear_report(contact_report[k])
     for i in range(count):
-        contact, m, answer = workspace.contacts[i], workspace.motion[i], workspace.forces[i]
+        contact, m, answer = contact_workspace.contacts[i], contact_workspace.motion[i], contact_workspace.forces[i]
         touch = touches[int(m.patch)]
         press = PatchNormalContact(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz
         _add_patch_forces(_patch_place(touch), press, creeping, wheelset.force, wheelset.moment)
-        if len(report) > 0:
+        if len(contact_report) > 0:
             motion = PatchMotion(m.vx, m.vy, m.aside, m.turn, m.rate)
-            _fill_report(_patch_place(touch), motion, press, creeping, velocity[0], report[int(m.patch)])
+            _fill_report(_patch_place(touch), motion, press, creeping, velocity[0], contact_report[int(m.patch)])
 
 
 @inlined
-def _longitudinal_curvature(rolling, conicity):
+def _longitudinal_curvature(rolling_radius, conicity):
     """Curvature (1/m) of a cone along the track, from its rolling radius and conicity."""
-    return 0.5 / (rolling * math.sqrt(1.0 + conicity * conicity))
+    return 0.5 / (rolling_radius * math.sqrt(1.0 + conicity * conicity))
 
 
 @inlined
-def _flange_force(wheel_side, y, wheels):
+def _flange_force(wheel_side, lateral_position, wheels):
     """Lateral force (N) of a cone's flange at a lateral displacement y (m)."""
-    return -wheel_side * wheels.flange * max(0.0, wheel_side * y - wheels.clearance)
+    return -wheel_side * wheels.flange * max(0.0, wheel_side * lateral_position - wheels.clearance)
 
 
 @inlined
-def _patch_place(touch):
+def _patch_place(zone_touch):
     """``PatchPlace`` of a touching point."""
-    return PatchPlace(touch.n_y, touch.n_z, touch.x, touch.y, touch.z)
+    return PatchPlace(zone_touch.n_y, zone_touch.n_z, zone_touch.x, zone_touch.y, zone_touch.z)
 
 
 @inlined
@@ -387,22 +405,22 @@ def _patch_motion(patch_point, velocity, angular_velocity):
 
 
 @inlined
-def _fill_contact(touch, wheelset, wheels, push, contact, motion):
-    """Fill the contact of one patch for the creep law and its motion: kinematics and normal force."""
-    moving = _patch_motion(_patch_place(touch), wheelset.velocity, wheelset.turning)
-    elastic, a, b = normal_force_and_axes(touch.depth, touch.along, touch.across, wheels.modulus)
-    motion.vx, motion.vy, motion.aside, motion.turn, motion.rate = moving
-    motion.elastic, motion.push = elastic, push
-    contact.a, contact.b, contact.mu = a, b, wheels.friction
-    contact.load = elastic * max(0.0, 1.0 + wheels.damping * moving.rate)
+def _fill_contact(zone_touch, wheelset, wheels, flange_push, patch_contact, patch_motion):
+    """Fill the contact of one patch for the creep law and its patch_motion: kinematics and normal force."""
+    moving = _patch_motion(_patch_place(zone_touch), wheelset.velocity, wheelset.turning)
+    elastic, a, b = normal_force_and_axes(zone_touch.depth, zone_touch.along, zone_touch.across, wheels.modulus)
+    patch_motion.vx, patch_motion.vy, patch_motion.aside, patch_motion.turn, patch_motion.rate = moving
+    patch_motion.elastic, patch_motion.push = elastic, flange_push
+    patch_contact.a, patch_contact.b, patch_contact.mu = a, b, wheels.friction
+    patch_contact.load = elastic * max(0.0, 1.0 + wheels.damping * moving.rate)
 
 
 @inlined
-def _add_patch_forces(patch_point, press, creeping, force, moment):
+def _add_patch_forces(patch_point, normal_force, creep_forces, force, moment):
     """Add the forces of one patch to the wheelset's force and moment."""
     n_y, n_z, cx, cy, cz = patch_point
-    fx, fy, mz = creeping
-    across, force_down = n_z * fy - n_y * press.load + press.push, -n_y * fy - n_z * press.load
+    fx, fy, mz = creep_forces
+    across, force_down = n_z * fy - n_y * normal_force.load + normal_force.push, -n_y * fy - n_z * normal_force.load
     force[0] += fx
     force[1] += across
     force[2] += force_down
@@ -412,24 +430,37 @@ def _add_patch_forces(patch_point, press, creeping, force, moment):
 
 
 @lean
-def _clear_report(report):
+def _clear_report(contact_report):
     """Fill the report of a patch without contact with zeros."""
-    report.load = report.fx = report.fy = report.mz = report.xi_x = report.xi_y = report.spin = 0.0
-    report.a = report.b = report.depth = report.power = report.angle = report.x = report.y = report.z = 0.0
-    report.flange_force = report.elastic_power = report.damping_power = 0.0
+    contact_report.load = contact_report.fx = contact_report.fy = contact_report.mz = contact_report.xi_x = (
+        contact_report.xi_y
+    ) = contact_report.spin = 0.0
+    contact_report.a = contact_report.b = contact_report.depth = contact_report.power = contact_report.angle = (
+        contact_report.x
+    ) = contact_report.y = contact_report.z = 0.0
+    contact_report.flange_force = contact_report.elastic_power = contact_report.damping_power = 0.0
 
 
 @lean
-def _fill_report(patch_point, motion, press, creeping, speed, report):
+def _fill_report(patch_point, patch_motion, normal_force, creep_forces, speed, contact_report):
     """Fill the report of a patch from its position, motion, normal contact and creep forces."""
-    fx, fy, mz = creeping
-    vx, vy, side_speed, turn, rate = motion
-    report.load, report.fx, report.fy, report.mz = press.load, fx, fy, mz
+    fx, fy, mz = creep_forces
+    vx, vy, side_speed, turn, rate = patch_motion
+    contact_report.load, contact_report.fx, contact_report.fy, contact_report.mz = normal_force.load, fx, fy, mz
     reference_speed = max(abs(speed), REGULARISED_SPEED)
-    report.xi_x, report.xi_y, report.spin = vx / reference_speed, side_speed / reference_speed, turn / reference_speed
-    report.a, report.b, report.depth = press.a, press.b, press.depth
-    report.angle = math.atan2(-patch_point.n_y, patch_point.n_z)
-    report.power = fx * vx + fy * side_speed + mz * turn
-    report.x, report.y, report.z, report.flange_force = patch_point.x, patch_point.y, patch_point.z, press.push
-    report.elastic_power = press.push * vy - press.elastic * rate
-    report.damping_power = (press.elastic - press.load) * rate
+    contact_report.xi_x, contact_report.xi_y, contact_report.spin = (
+        vx / reference_speed,
+        side_speed / reference_speed,
+        turn / reference_speed,
+    )
+    contact_report.a, contact_report.b, contact_report.depth = normal_force.a, normal_force.b, normal_force.depth
+    contact_report.angle = math.atan2(-patch_point.n_y, patch_point.n_z)
+    contact_report.power = fx * vx + fy * side_speed + mz * turn
+    contact_report.x, contact_report.y, contact_report.z, contact_report.flange_force = (
+        patch_point.x,
+        patch_point.y,
+        patch_point.z,
+        normal_force.push,
+    )
+    contact_report.elastic_power = normal_force.push * vy - normal_force.elastic * rate
+    contact_report.damping_power = (normal_force.elastic - normal_force.load) * rate

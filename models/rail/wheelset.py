@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field, ValidationError, model_validator
 from scipy.optimize import brentq
 
-from models.contact.hertz import Hertz, by_load
+from models.contact.hertz import HertzContact, by_load
 from models.contact.material import STEEL, Material, MaterialPair
 from models.core.strict import Strict, input_error_from_faults, quantity
 from models.rail.laid_profiles import Profiles
@@ -46,9 +46,9 @@ class Wheelset(Strict):
     material: Material = STEEL
     profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, **parameters: Any) -> None:
         try:
-            super().__init__(**values)
+            super().__init__(**parameters)
         except ValidationError as error:
             raise input_error_from_faults(error, type(self), "", "wheelset") from None
 
@@ -82,23 +82,23 @@ class Wheelset(Strict):
         small displacements."""
         return self.roll_per_displacement * (self.half_gauge + self.head_radius * self.cone_sine_and_cosine[0])
 
-    def coned(self, equivalent: float) -> "Wheelset":
+    def coned(self, wanted_conicity: float) -> "Wheelset":
         """Returns a copy of the wheelset on cones with this equivalent conicity, as profiles have at some amplitude."""
         largest_conicity = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
         conicity = brentq(
-            lambda c: self.changed(conicity=c).equivalent_conicity - equivalent,
+            lambda c: self.changed(conicity=c).equivalent_conicity - wanted_conicity,
             LEAST_CONICITY,
             largest_conicity,
             xtol=1e-15,
         )
         return self.changed(conicity=float(conicity))
 
-    def changed(self, **values: Any) -> "Wheelset":
+    def changed(self, **changed_parameters: Any) -> "Wheelset":
         """Returns a copy of the wheelset with some values changed, and checked as in a file."""
-        return Wheelset(**{name: getattr(self, name) for name in type(self).model_fields} | values)
+        return Wheelset(**{name: getattr(self, name) for name in type(self).model_fields} | changed_parameters)
 
     @property
-    def ellipse(self) -> Hertz:
+    def ellipse(self) -> HertzContact:
         """Contact ellipse of one wheel in the middle of the track, under half the load."""
         cosine = self.cone_sine_and_cosine[1]
         load = self.load / (2.0 * cosine)

@@ -56,90 +56,98 @@ class ForceLaws(NamedTuple):
 
 
 @lean
-def add_scaled(total, factor, row):
-    """Add ``factor`` times a row (copies,) to another row ``total``; nothing is done where the factor is 0."""
+def add_scaled(total_row, factor, added_row):
+    """Add ``factor`` times a row (copies,) to another row ``total_row``; nothing is done where the factor is 0."""
     if factor != 0.0:
-        for c in range(total.size):
-            total[c] += factor * row[c]
+        for c in range(total_row.size):
+            total_row[c] += factor * added_row[c]
 
 
 @lean
-def add_curve_force(curves, spring, argument, force):
-    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel (m) or rate (m/s), ``argument``
+def add_curve_force(curves, spring_index, travel_or_rate, force):
+    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel (m) or rate (m/s), ``travel_or_rate``
     (copies,)."""
-    offset, slope = curves.offset[spring], curves.slope[spring]
+    offset, slope = curves.offset[spring_index], curves.slope[spring_index]
     for c in range(force.size):
-        force[c] += offset + slope * argument[c]
+        force[c] += offset + slope * travel_or_rate[c]
     for k in range(curves.corners.shape[1]):
-        corner, bend = curves.corners[spring, k], curves.bends[spring, k]
+        corner, bend = curves.corners[spring_index, k], curves.bends[spring_index, k]
         if bend != 0.0:
             for c in range(force.size):
-                force[c] += bend * max(argument[c] - corner, 0.0)
+                force[c] += bend * max(travel_or_rate[c] - corner, 0.0)
 
 
 @lean
-def fill_missing_tyre_force(tyre_index, x, road, tyres, pressed, rate, missing_force):
+def fill_missing_tyre_force(
+    tyre_index, vehicle_states, road_heights, pushing_tyres, tyre_compression, compression_rate, missing_force
+):
     """Fill ``missing_force`` (copies,) in N: the force of a tyre that cannot pull, minus that of a linear tyre. It is 0
     on the road, and cancels the pull of a lifted tyre.
 
     pressed, rate (copies,) are overwritten.
     """
-    n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, tyres.wheel[tyre_index]
-    load, stiffness, damping = tyres.load[tyre_index], tyres.stiffness[tyre_index], tyres.damping[tyre_index]
-    pressed[:], rate[:] = 0.0, 0.0
-    add_scaled(pressed, 1.0, road[wheel])
-    add_scaled(rate, 1.0, road[wheels + wheel])
+    n, wheels, wheel = vehicle_states.shape[0] // 2, road_heights.shape[0] // 2, pushing_tyres.wheel[tyre_index]
+    load, stiffness, damping = (
+        pushing_tyres.load[tyre_index],
+        pushing_tyres.stiffness[tyre_index],
+        pushing_tyres.damping[tyre_index],
+    )
+    tyre_compression[:], compression_rate[:] = 0.0, 0.0
+    add_scaled(tyre_compression, 1.0, road_heights[wheel])
+    add_scaled(compression_rate, 1.0, road_heights[wheels + wheel])
     for j in range(n):
-        add_scaled(pressed, -tyres.heights[tyre_index, j], x[j])
-        add_scaled(rate, -tyres.heights[tyre_index, j], x[n + j])
+        add_scaled(tyre_compression, -pushing_tyres.heights[tyre_index, j], vehicle_states[j])
+        add_scaled(compression_rate, -pushing_tyres.heights[tyre_index, j], vehicle_states[n + j])
     for c in range(missing_force.size):
-        elastic = load + stiffness * pressed[c]
-        total_force = elastic + damping * rate[c]
+        elastic = load + stiffness * tyre_compression[c]
+        total_force = elastic + damping * compression_rate[c]
         missing_force[c] = max(min(total_force, 2.0 * elastic), 0.0) - total_force
 
 
 @lean
-def fill_rates(x, road, laws, force, state_rate, workspace):
+def fill_rates(vehicle_states, road_heights, force_laws, nonlinear_forces, state_rate, workspace):
     """Fill the time derivatives (2 n, copies) of the states (positions, then rates) on roads (2 w, copies), and the
     nonlinear forces (s + u, copies) in N; workspace (2, copies) is overwritten."""
-    n, w, springs = x.shape[0] // 2, road.shape[0], laws.travel_rows.shape[0]
+    n, w, springs = vehicle_states.shape[0] // 2, road_heights.shape[0], force_laws.travel_rows.shape[0]
     for s in range(springs):
-        travel, slip, bent = workspace[0], workspace[1], force[s]
+        travel, slip, bent = workspace[0], workspace[1], nonlinear_forces[s]
         travel[:], slip[:], bent[:] = 0.0, 0.0, 0.0
         for j in range(n):
-            add_scaled(travel, laws.travel_rows[s, j], x[j])
-            add_scaled(slip, laws.travel_rows[s, j], x[n + j])
-        add_curve_force(laws.by_travel, s, travel, bent)
-        add_curve_force(laws.by_rate, s, slip, bent)
-        if laws.friction[s] != 0.0:
+            add_scaled(travel, force_laws.travel_rows[s, j], vehicle_states[j])
+            add_scaled(slip, force_laws.travel_rows[s, j], vehicle_states[n + j])
+        add_curve_force(force_laws.by_travel, s, travel, bent)
+        add_curve_force(force_laws.by_rate, s, slip, bent)
+        if force_laws.friction[s] != 0.0:
             for c in range(bent.size):
-                bent[c] += laws.friction[s] * math.tanh(slip[c] / laws.friction_rate[s])
-    for u in range(laws.tyres.wheel.size):
-        fill_missing_tyre_force(u, x, road, laws.tyres, workspace[0], workspace[1], force[springs + u])
+                bent[c] += force_laws.friction[s] * math.tanh(slip[c] / force_laws.friction_rate[s])
+    for u in range(force_laws.tyres.wheel.size):
+        fill_missing_tyre_force(
+            u, vehicle_states, road_heights, force_laws.tyres, workspace[0], workspace[1], nonlinear_forces[springs + u]
+        )
     for i in range(n):
         state_rate[i], state_rate[n + i] = 0.0, 0.0
-        add_scaled(state_rate[i], 1.0, x[n + i])
+        add_scaled(state_rate[i], 1.0, vehicle_states[n + i])
         for j in range(2 * n):
-            add_scaled(state_rate[n + i], laws.acceleration_rows[i, j], x[j])
+            add_scaled(state_rate[n + i], force_laws.acceleration_rows[i, j], vehicle_states[j])
         for j in range(w):
-            add_scaled(state_rate[n + i], laws.acceleration_rows[i, 2 * n + j], road[j])
-        for s in range(force.shape[0]):
-            add_scaled(state_rate[n + i], laws.acceleration_rows[i, 2 * n + w + s], force[s])
+            add_scaled(state_rate[n + i], force_laws.acceleration_rows[i, 2 * n + j], road_heights[j])
+        for s in range(nonlinear_forces.shape[0]):
+            add_scaled(state_rate[n + i], force_laws.acceleration_rows[i, 2 * n + w + s], nonlinear_forces[s])
 
 
 @lean
-def fill_output(output_index, x, road, rate, force, laws, output):
+def fill_output(output_index, vehicle_states, road_heights, state_rates, nonlinear_forces, force_laws, output):
     """Fill an output (copies,) from the states and their time derivatives."""
-    n, w = x.shape[0] // 2, road.shape[0]
+    n, w = vehicle_states.shape[0] // 2, road_heights.shape[0]
     output[:] = 0.0
     for j in range(2 * n):
-        add_scaled(output, laws.output_rows[output_index, j], x[j])
+        add_scaled(output, force_laws.output_rows[output_index, j], vehicle_states[j])
     for j in range(w):
-        add_scaled(output, laws.output_rows[output_index, 2 * n + j], road[j])
+        add_scaled(output, force_laws.output_rows[output_index, 2 * n + j], road_heights[j])
     for j in range(n):
-        add_scaled(output, laws.output_rows[output_index, 2 * n + w + j], rate[n + j])
-    for s in range(force.shape[0]):
-        add_scaled(output, laws.output_rows[output_index, 3 * n + w + s], force[s])
+        add_scaled(output, force_laws.output_rows[output_index, 2 * n + w + j], state_rates[n + j])
+    for s in range(nonlinear_forces.shape[0]):
+        add_scaled(output, force_laws.output_rows[output_index, 3 * n + w + s], nonlinear_forces[s])
 
 
 @lean
@@ -154,24 +162,24 @@ def add_powers(output_values, power_sums, output_index, first_copy):
 
 
 @lean
-def advance_states(x, time, rate, next_states):
+def advance_states(vehicle_states, duration, state_rates, next_states):
     """Fill ``next_states`` with the states (2 n, copies) after a time (s) at constant rates."""
-    for j in range(x.shape[0]):
-        for c in range(x.shape[1]):
-            next_states[j, c] = x[j, c] + time * rate[j, c]
+    for j in range(vehicle_states.shape[0]):
+        for c in range(vehicle_states.shape[1]):
+            next_states[j, c] = vehicle_states[j, c] + duration * state_rates[j, c]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def march(states, roads, step, first_counted, stride, laws, power_sums):
+def march(vehicle_states, road_paths, time_step, first_counted_step, counting_stride, force_laws, power_sums):
     """Integrate all copies by the classical Runge-Kutta method with a fixed step (s), and sum up powers of their
     outputs.
 
     states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; power_sums (4, p,
-    copies) gain the outputs, their squares, cubes and fourth powers before step ``first_counted`` and each
-    ``stride``-th after it."""
-    for copy in range(0, states.shape[1], COPIES_SIDE_BY_SIDE):
-        columns = slice(copy, min(copy + COPIES_SIDE_BY_SIDE, states.shape[1]))
-        x, road = states[:, columns].copy(), roads[:, :, columns].copy()
+    copies) gain the outputs, their squares, cubes and fourth powers before step ``first_counted_step`` and each
+    ``counting_stride``-th after it."""
+    for copy in range(0, vehicle_states.shape[1], COPIES_SIDE_BY_SIDE):
+        columns = slice(copy, min(copy + COPIES_SIDE_BY_SIDE, vehicle_states.shape[1]))
+        x, road = vehicle_states[:, columns].copy(), road_paths[:, :, columns].copy()
         k1, k2, k3, k4, moved_states = (
             np.empty_like(x),
             np.empty_like(x),
@@ -179,21 +187,21 @@ def march(states, roads, step, first_counted, stride, laws, power_sums):
             np.empty_like(x),
             np.empty_like(x),
         )
-        forces = laws.travel_rows.shape[0] + laws.tyres.wheel.size
+        forces = force_laws.travel_rows.shape[0] + force_laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
-            fill_rates(x, road[2 * i], laws, force, k1, room)
-            if i >= first_counted and (i - first_counted) % stride == 0:
-                for p in range(laws.output_rows.shape[0]):
-                    fill_output(p, x, road[2 * i], k1, force, laws, room[0])
+            fill_rates(x, road[2 * i], force_laws, force, k1, room)
+            if i >= first_counted_step and (i - first_counted_step) % counting_stride == 0:
+                for p in range(force_laws.output_rows.shape[0]):
+                    fill_output(p, x, road[2 * i], k1, force, force_laws, room[0])
                     add_powers(room[0], power_sums, p, copy)
-            advance_states(x, 0.5 * step, k1, moved_states)
-            fill_rates(moved_states, road[2 * i + 1], laws, force, k2, room)
-            advance_states(x, 0.5 * step, k2, moved_states)
-            fill_rates(moved_states, road[2 * i + 1], laws, force, k3, room)
-            advance_states(x, step, k3, moved_states)
-            fill_rates(moved_states, road[2 * i + 2], laws, force, k4, room)
+            advance_states(x, 0.5 * time_step, k1, moved_states)
+            fill_rates(moved_states, road[2 * i + 1], force_laws, force, k2, room)
+            advance_states(x, 0.5 * time_step, k2, moved_states)
+            fill_rates(moved_states, road[2 * i + 1], force_laws, force, k3, room)
+            advance_states(x, time_step, k3, moved_states)
+            fill_rates(moved_states, road[2 * i + 2], force_laws, force, k4, room)
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):
-                    x[j, c] += step / 6.0 * (k1[j, c] + 2.0 * (k2[j, c] + k3[j, c]) + k4[j, c])
-        states[:, columns] = x
+                    x[j, c] += time_step / 6.0 * (k1[j, c] + 2.0 * (k2[j, c] + k3[j, c]) + k4[j, c])
+        vehicle_states[:, columns] = x

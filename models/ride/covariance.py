@@ -52,34 +52,40 @@ class StationaryCovariance:
         return np.sqrt(self.variance)
 
 
-def stationary_covariance(system: DelayedSystem, accuracy: float = MATRIX_ACCURACY) -> StationaryCovariance:
+def stationary_covariance(
+    delayed_system: DelayedSystem, matrix_accuracy: float = MATRIX_ACCURACY
+) -> StationaryCovariance:
     """Stationary covariance of a system whose axles meet unit white noise one after the other.
 
-    ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
+    ``matrix_accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
     Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
     where a variance cannot be told to UNCERTAINTY_LIMIT of itself.
     """
-    met = noise_arrivals(system)
-    split = split_marginal(system.A, accuracy)
+    met = noise_arrivals(delayed_system)
+    split = split_marginal(delayed_system.A, matrix_accuracy)
     onto_stable = met._replace(B=[split.W @ b for b in met.B])  # in extended precision: modes may be nearly parallel
     P, correction, residual = lyapunov_solution(split.S, noise_intensity(split.S, onto_stable))
     V = split.V
     if split.count_of_marginal_states:
         P, correction, V = _with_marginal_motions(split, met, onto_stable, P, correction)
-    C = system.C @ V
+    C = delayed_system.C @ V
     floor, change = rounding_thresholds(C, P), _output_variances(C, correction)
     variance = _output_variances(C, P)
     variance = np.where(variance > floor, variance, 0.0)
-    grown = variance_growth(split, met.B, met.delays, system.C, met.independent, variance + floor, accuracy)
-    status, reason = variance_verdicts(met.D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
+    grown = variance_growth(
+        split, met.B, met.delays, delayed_system.C, met.independent, variance + floor, matrix_accuracy
+    )
+    status, reason = variance_verdicts(
+        met.D, variance, floor, grown, float(np.linalg.norm(split.S)), matrix_accuracy, split
+    )
     finite = np.array(status) == FINITE
     error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
     error += split.neglected_rate_ratio
     if (error[finite] > UNCERTAINTY_LIMIT).any():
-        _refuse(system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
+        _refuse(delayed_system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
     V, P = V.astype(float), P.astype(float)
     return StationaryCovariance(
-        system.names,
+        delayed_system.names,
         V @ P @ V.T,
         np.where(finite, variance, np.inf),
         status,
@@ -108,19 +114,22 @@ class NoiseArrivals(NamedTuple):
     independent: bool
 
 
-def noise_arrivals(system: DelayedSystem) -> NoiseArrivals:
+def noise_arrivals(delayed_system: DelayedSystem) -> NoiseArrivals:
     """``NoiseArrivals`` of a system; axles that meet the same noise at the same instant are combined."""
-    if system.independent:
-        return NoiseArrivals([*system.B], [*system.D], [0.0] * len(system.B), True)
-    delays = sorted(set(system.delays))
-    axles_by_hit = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
-    if len(delays) == len(system.B):
+    if delayed_system.independent:
+        return NoiseArrivals([*delayed_system.B], [*delayed_system.D], [0.0] * len(delayed_system.B), True)
+    delays = sorted(set(delayed_system.delays))
+    axles_by_hit = [[i for i, delay in enumerate(delayed_system.delays) if delay == hit] for hit in delays]
+    if len(delays) == len(delayed_system.B):
         return NoiseArrivals(
-            [system.B[i] for (i,) in axles_by_hit], [system.D[i] for (i,) in axles_by_hit], delays, False
+            [delayed_system.B[i] for (i,) in axles_by_hit],
+            [delayed_system.D[i] for (i,) in axles_by_hit],
+            delays,
+            False,
         )
     B, D = (
         [np.sum([matrices[i] for i in together], axis=0) for together in axles_by_hit]
-        for matrices in (system.B, system.D)
+        for matrices in (delayed_system.B, delayed_system.D)
     )
     return NoiseArrivals(B, D, delays, False)
 
@@ -130,40 +139,49 @@ Propagator = Callable[[float, np.ndarray], np.ndarray]
 
 
 def _responses_before_arrival(
-    A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagator | None = None
+    A: np.ndarray, noise_arrivals_at_axles: NoiseArrivals, matrix_exponential: Propagator | None = None
 ) -> list[np.ndarray]:
     """State responses F_j to noise that earlier axles have met, just before axle j meets the same noise; zero where no
     axle has met it before."""
-    if propagator is None:
+    if matrix_exponential is None:
 
         def propagator(time: float, B: np.ndarray) -> np.ndarray:
             return np.asarray(expm(A * time) @ B)
 
-    responses = [np.zeros_like(arrivals.B[0])]
-    for j in range(1, len(arrivals.B)):
-        never_correlated = arrivals.independent or len(A) == 0
-        step = arrivals.delays[j] - arrivals.delays[j - 1]
+    responses = [np.zeros_like(noise_arrivals_at_axles.B[0])]
+    for j in range(1, len(noise_arrivals_at_axles.B)):
+        never_correlated = noise_arrivals_at_axles.independent or len(A) == 0
+        step = noise_arrivals_at_axles.delays[j] - noise_arrivals_at_axles.delays[j - 1]
         responses.append(
-            np.zeros_like(arrivals.B[0]) if never_correlated else propagator(step, responses[-1] + arrivals.B[j - 1])
+            np.zeros_like(noise_arrivals_at_axles.B[0])
+            if never_correlated
+            else matrix_exponential(step, responses[-1] + noise_arrivals_at_axles.B[j - 1])
         )
     return responses
 
 
-def noise_intensity_of_system(system: DelayedSystem, propagator: Propagator | None = None) -> np.ndarray:
+def noise_intensity_of_system(
+    delayed_system: DelayedSystem, matrix_exponential: Propagator | None = None
+) -> np.ndarray:
     """Noise intensity matrix Q of a system (see ``noise_intensity``), in double precision."""
-    return noise_intensity(system.A, noise_arrivals(system), propagator).astype(float)
+    return noise_intensity(delayed_system.A, noise_arrivals(delayed_system), matrix_exponential).astype(float)
 
 
-def noise_intensity(A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagator | None = None) -> np.ndarray:
+def noise_intensity(
+    A: np.ndarray, noise_arrivals_at_axles: NoiseArrivals, matrix_exponential: Propagator | None = None
+) -> np.ndarray:
     """Noise intensity matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise at all
     axles, with exact delays.
 
-    ``propagator`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
+    ``matrix_exponential`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
     noises cancel in an output, so do the squares of their rounding.
     """
     earlier_responses, hit_inputs = (
         [matrix.astype(np.longdouble) for matrix in matrices]
-        for matrices in (_responses_before_arrival(A, arrivals, propagator), arrivals.B)
+        for matrices in (
+            _responses_before_arrival(A, noise_arrivals_at_axles, matrix_exponential),
+            noise_arrivals_at_axles.B,
+        )
     )
     return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(earlier_responses, hit_inputs, strict=True)))
 
@@ -206,10 +224,10 @@ UNCERTAINTY_LIMIT = 1e-6
 """Relative error of a variance above which no variance is given."""
 
 
-def _refuse(name: str, error: float) -> None:
+def _refuse(quantity_name: str, error: float) -> None:
     raise InputError(
         "",
-        f"output {name}",
+        f"output {quantity_name}",
         None,
         f"its variance would be known to {error:.1g} of itself only: the rates of the "
         "vehicle and of the road lie too many decades apart, or a motion hardly dies out; look for a stiffness, "
@@ -224,7 +242,11 @@ digits off the error as the first solution had."""
 
 
 def _with_marginal_motions(
-    split: MarginalParts, arrivals: NoiseArrivals, onto_stable: NoiseArrivals, P: np.ndarray, correction: np.ndarray
+    marginal_parts: MarginalParts,
+    noise_arrivals_at_axles: NoiseArrivals,
+    stable_arrivals: NoiseArrivals,
+    P: np.ndarray,
+    last_correction: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance of the whole state (marginal motions first), its last correction and its basis; motions with unbounded
     variance are left out.
@@ -232,36 +254,43 @@ def _with_marginal_motions(
     A motion that does not diffuse responds only between the first and the last hit: its covariances are integrals over
     that window.
     """
-    k, onto_marginal = split.count_of_marginal_states, arrivals._replace(B=[split.W0 @ b for b in arrivals.B])
+    k, onto_marginal = (
+        marginal_parts.count_of_marginal_states,
+        noise_arrivals_at_axles._replace(B=[marginal_parts.W0 @ b for b in noise_arrivals_at_axles.B]),
+    )
     responses_before = (
-        _responses_before_arrival(split.M, onto_marginal),
-        _responses_before_arrival(split.S, onto_stable),
+        _responses_before_arrival(marginal_parts.M, onto_marginal),
+        _responses_before_arrival(marginal_parts.S, stable_arrivals),
     )
     responses_after = [
         [f + g for f, g in zip(*pair, strict=True)]
-        for pair in zip(responses_before, (onto_marginal.B, onto_stable.B), strict=True)
+        for pair in zip(responses_before, (onto_marginal.B, stable_arrivals.B), strict=True)
     ]
-    within, cross = np.zeros((k, k)), np.zeros((k, len(split.S)))
-    for j in range(0 if arrivals.independent else len(arrivals.B) - 1):
-        within += _integral_over_delay(split.M, responses_after[0][j], arrivals.delays[j + 1] - arrivals.delays[j])
+    within, cross = np.zeros((k, k)), np.zeros((k, len(marginal_parts.S)))
+    for j in range(0 if noise_arrivals_at_axles.independent else len(noise_arrivals_at_axles.B) - 1):
+        within += _integral_over_delay(
+            marginal_parts.M,
+            responses_after[0][j],
+            noise_arrivals_at_axles.delays[j + 1] - noise_arrivals_at_axles.delays[j],
+        )
         cross += (
             responses_after[0][j] @ responses_after[1][j].T - responses_before[0][j + 1] @ responses_before[1][j + 1].T
         )
-    if len(split.S):
+    if len(marginal_parts.S):
         from control import lyap
 
-        cross = lyap(split.M, split.S.T, cross.astype(float), method="scipy")
+        cross = lyap(marginal_parts.M, marginal_parts.S.T, cross.astype(float), method="scipy")
     full_covariance = np.block([[within.astype(np.longdouble), cross], [cross.T, P]])
     changed = np.zeros_like(full_covariance)
-    changed[k:, k:] = correction
-    return full_covariance, changed, np.hstack([split.V0, split.V])
+    changed[k:, k:] = last_correction
+    return full_covariance, changed, np.hstack([marginal_parts.V0, marginal_parts.V])
 
 
-def _integral_over_delay(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
-    """Integral of e^(M s) R R' e^(M' s) from s = 0 to ``length``, by van Loan's block matrix; M neither grows nor
+def _integral_over_delay(M: np.ndarray, R: np.ndarray, delay: float) -> np.ndarray:
+    """Integral of e^(M s) R R' e^(M' s) from s = 0 to ``delay``, by van Loan's block matrix; M neither grows nor
     decays."""
     k = len(M)
-    block = expm(np.block([[-M, R @ R.T], [np.zeros((k, k)), M.T]]) * length)
+    block = expm(np.block([[-M, R @ R.T], [np.zeros((k, k)), M.T]]) * delay)
     integral = block[k:, k:].T @ block[:k, k:]
     return (integral + integral.T) / 2
 
@@ -280,35 +309,40 @@ def variance_verdicts(
     D: Sequence[np.ndarray],
     variance: np.ndarray,
     rounding_floor: np.ndarray,
-    growth: Growth,
+    growth_of_variance: Growth,
     fastest_rate: float,
-    accuracy: float,
-    split: MarginalParts | None = None,
+    matrix_accuracy: float,
+    marginal_parts: MarginalParts | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Status of every output's variance (finite, infinite or diffusing), and the reason for it.
 
     White noise that comes through D counts if, up to the system's ``fastest_rate`` (1/s), it carries more than rounding
     could of the output's variance without it; ``rounding_floor`` (p,) is what rounding makes of a variance of zero."""
     direct = sum((d**2).sum(axis=1) for d in D) * fastest_rate
-    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + rounding_floor
-    verdicts = [_variance_verdict(*output, split) for output in zip(white, growth.rate, growth.power, strict=True)]
+    white = direct > (ZERO_MARGIN * matrix_accuracy) ** 2 * variance + rounding_floor
+    verdicts = [
+        _variance_verdict(*output, marginal_parts)
+        for output in zip(white, growth_of_variance.rate, growth_of_variance.power, strict=True)
+    ]
     return tuple(status for status, _ in verdicts), tuple(reason for _, reason in verdicts)
 
 
-def _variance_verdict(is_white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
+def _variance_verdict(
+    is_white: bool, growth_rate: float, growth_power: int, marginal_parts: MarginalParts | None
+) -> tuple[str, str]:
     if is_white:
         return INFINITE, WHITE_NOISE_REASON
-    if power:
-        deviation_after = np.sqrt(rate * 100.0**power)
+    if growth_power:
+        deviation_after = np.sqrt(growth_rate * 100.0**growth_power)
         return DIFFUSING, (
             f"the road drives a motion that nothing pulls back and that this output sees: its variance "
-            f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {deviation_after:.3g} after "
+            f"grows as {growth_rate:.4g} t^{growth_power} (t in s), a standard deviation of {deviation_after:.3g} after "
             "100 s"
         )
-    if split is None or not split.count_of_marginal_states:
+    if marginal_parts is None or not marginal_parts.count_of_marginal_states:
         return FINITE, "every motion dies out"
     return FINITE, (
-        f"{split.count_of_marginal_states} states are of motions that nothing pulls back, but this output does not see "
+        f"{marginal_parts.count_of_marginal_states} states are of motions that nothing pulls back, but this output does not see "
         "them, or sees only what the road does not drive in the long run"
     )
 

@@ -37,7 +37,7 @@ class DelayedSystem:
     independent: bool = False
 
 
-def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> DelayedSystem:
+def vehicle_with_road(linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float) -> DelayedSystem:
     """State-space model of a vehicle with its road filters, at a constant speed (m/s, above 0).
 
     State (q, q', f of each axle). In time a filter reads f' = v F f + sqrt(v) G w; the height's rate is
@@ -46,44 +46,46 @@ def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: flo
     """
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
-    if has_singular_mass(vehicle.mass):
-        return first_order_system(vehicle, vehicle_states(vehicle), excitation, speed)[0]
-    n, (m, k), axles = len(vehicle.mass), excitation.G.shape, len(excitation.heights)
-    by_motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
-    by_road = np.linalg.solve(vehicle.mass, np.hstack([vehicle.road_stiffness, vehicle.road_damping]))
+    if has_singular_mass(linear_vehicle.mass):
+        return first_order_system(linear_vehicle, vehicle_states(linear_vehicle), road_excitation, speed)[0]
+    n, (m, k), axles = len(linear_vehicle.mass), road_excitation.G.shape, len(road_excitation.heights)
+    by_motion = np.linalg.solve(linear_vehicle.mass, np.hstack([-linear_vehicle.stiffness, -linear_vehicle.damping]))
+    by_road = np.linalg.solve(
+        linear_vehicle.mass, np.hstack([linear_vehicle.road_stiffness, linear_vehicle.road_damping])
+    )
     by_height, by_rate = np.split(by_road, 2, axis=1)
-    read, root = vehicle.read, speed**0.5
+    read, root = linear_vehicle.read, speed**0.5
     A = np.zeros((2 * n + axles * m,) * 2)
     A[:n, n : 2 * n] = np.eye(n)
     A[n : 2 * n, : 2 * n] = by_motion
     filters = [slice(first, first + m) for first in range(2 * n, len(A), m)]
     B = [np.zeros((len(A), k)) for _ in range(axles)]
-    for filter_slice, H, noise in zip(filters, excitation.heights, B, strict=True):
-        A[n : 2 * n, filter_slice] = by_height @ H + by_rate @ H @ excitation.F * speed
-        A[filter_slice, filter_slice] = speed * excitation.F
-        noise[n : 2 * n] = root * by_rate @ H @ excitation.G
-        noise[filter_slice] = root * excitation.G
+    for filter_slice, H, noise in zip(filters, road_excitation.heights, B, strict=True):
+        A[n : 2 * n, filter_slice] = by_height @ H + by_rate @ H @ road_excitation.F * speed
+        A[filter_slice, filter_slice] = speed * road_excitation.F
+        noise[n : 2 * n] = root * by_rate @ H @ road_excitation.G
+        noise[filter_slice] = root * road_excitation.G
     C = read.acceleration_factors @ A[n : 2 * n]
     C[:, :n] += read.displacement_factors
     C[:, n : 2 * n] += read.rate_factors
     D = []
-    for filter_slice, H, noise in zip(filters, excitation.heights, B, strict=True):
-        C[:, filter_slice] += read.road_factors @ H + speed * read.road_rate_factors @ H @ excitation.F
-        D.append(read.acceleration_factors @ noise[n : 2 * n] + root * read.road_rate_factors @ H @ excitation.G)
-    return _system(vehicle, excitation, speed, A, B, C, D)
+    for filter_slice, H, noise in zip(filters, road_excitation.heights, B, strict=True):
+        C[:, filter_slice] += read.road_factors @ H + speed * read.road_rate_factors @ H @ road_excitation.F
+        D.append(read.acceleration_factors @ noise[n : 2 * n] + root * read.road_rate_factors @ H @ road_excitation.G)
+    return _system(linear_vehicle, road_excitation, speed, A, B, C, D)
 
 
 def _system(
-    vehicle: LinearVehicle,
-    excitation: Excitation,
+    linear_vehicle: LinearVehicle,
+    road_excitation: Excitation,
     speed: float,
     A: np.ndarray,
     B: Iterable[np.ndarray],
     C: np.ndarray,
     D: Iterable[np.ndarray],
 ) -> DelayedSystem:
-    delays = tuple(length / speed for length in excitation.lengths)
-    return DelayedSystem(A, tuple(B), delays, C, tuple(D), vehicle.names, excitation.independent)
+    delays = tuple(length / speed for length in road_excitation.lengths)
+    return DelayedSystem(A, tuple(B), delays, C, tuple(D), linear_vehicle.names, road_excitation.independent)
 
 
 NEGLIGIBLE_SHARE = 1e-10
@@ -111,70 +113,77 @@ class VehicleStates:
     integrated_part: np.ndarray
 
 
-def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
+def vehicle_states(linear_vehicle: LinearVehicle) -> VehicleStates:
     """``VehicleStates`` of a vehicle whose mass matrix may be singular. Raises InputError where a massless body has
     neither spring nor damper."""
-    Y, Z = _range_and_kernel(vehicle.mass)
-    V, E = (Z @ basis for basis in _range_and_kernel(Z.T @ vehicle.damping @ Z))
-    n, a, b = len(vehicle.mass), Y.shape[1], V.shape[1]
+    Y, Z = _range_and_kernel(linear_vehicle.mass)
+    V, E = (Z @ basis for basis in _range_and_kernel(Z.T @ linear_vehicle.damping @ Z))
+    n, a, b = len(linear_vehicle.mass), Y.shape[1], V.shape[1]
     q_a, v_a, q_b = np.split(np.eye(2 * a + b), [a, 2 * a])
     q, direct = Y @ q_a + V @ q_b, np.zeros((n, n))
     if E.shape[1]:
-        elastic = E.T @ vehicle.stiffness
+        elastic = E.T @ linear_vehicle.stiffness
         direct = E @ _solved_for(elastic @ E, E.T)
-        q = q - direct @ (vehicle.stiffness @ q)
+        q = q - direct @ (linear_vehicle.stiffness @ q)
     # forces by the state and by g, on what is inert and on what dampers hold back
-    force = np.hstack([-vehicle.stiffness @ q - vehicle.damping @ Y @ v_a, np.eye(n) - vehicle.stiffness @ direct])
-    slow = _solved_for(V.T @ vehicle.damping @ V, V.T @ force)
-    inert = _solved_for(Y.T @ vehicle.mass @ Y, Y.T @ (force - vehicle.damping @ V @ slow))
+    force = np.hstack(
+        [
+            -linear_vehicle.stiffness @ q - linear_vehicle.damping @ Y @ v_a,
+            np.eye(n) - linear_vehicle.stiffness @ direct,
+        ]
+    )
+    slow = _solved_for(V.T @ linear_vehicle.damping @ V, V.T @ force)
+    inert = _solved_for(Y.T @ linear_vehicle.mass @ Y, Y.T @ (force - linear_vehicle.damping @ V @ slow))
     A, B = np.split(np.vstack([np.hstack([v_a, np.zeros((a, n))]), inert, slow]), [2 * a + b], axis=1)
     back = np.linalg.inv(np.hstack([Y, V, E]))
     return VehicleStates(A, B, q, direct, back[:a], back[a : a + b])
 
 
 def first_order_system(
-    vehicle: LinearVehicle, states: VehicleStates, excitation: Excitation, speed: float
+    linear_vehicle: LinearVehicle, vehicle_form: VehicleStates, road_excitation: Excitation, speed: float
 ) -> tuple[DelayedSystem, np.ndarray]:
     """State-space model with the state (a, a', b, f) of a vehicle whose mass matrix may be singular, and the matrix (n,
     x) from this state to the vehicle's coordinates.
 
     C and D are without rounding; what would see the derivative of white noise has infinite D.
     """
-    x, heights, axles = len(states.A), np.hstack(excitation.heights), len(excitation.heights)
-    m, k = excitation.G.shape
+    x, heights, axles = len(vehicle_form.A), np.hstack(road_excitation.heights), len(road_excitation.heights)
+    m, k = road_excitation.G.shape
     path, noise_inputs = np.zeros((axles * m,) * 2), np.zeros((axles, axles * m, k))
     for i in range(axles):
         filter_slice = slice(i * m, (i + 1) * m)
         path[filter_slice, filter_slice], noise_inputs[i, filter_slice] = (
-            speed * excitation.F,
-            speed**0.5 * excitation.G,
+            speed * road_excitation.F,
+            speed**0.5 * road_excitation.G,
         )
-    stiff, rate = vehicle.road_stiffness @ heights, heights @ path
-    by_rate = states.B @ vehicle.road_damping
+    stiff, rate = linear_vehicle.road_stiffness @ heights, heights @ path
+    by_rate = vehicle_form.B @ linear_vehicle.road_damping
     A = np.zeros((x + axles * m,) * 2)
-    A[:x, :x], A[x:, x:] = states.A, path
-    A[:x, x:] = states.B @ stiff + by_rate @ rate
+    A[:x, :x], A[x:, x:] = vehicle_form.A, path
+    A[:x, x:] = vehicle_form.B @ stiff + by_rate @ rate
     noise = heights @ noise_inputs
     B = np.concatenate([by_rate @ noise, noise_inputs], axis=1)
-    q, read = np.hstack([states.Q, states.direct @ stiff]), vehicle.read
+    q, read = np.hstack([vehicle_form.Q, vehicle_form.direct @ stiff]), linear_vehicle.read
     v = q @ A
     C = read.displacement_factors @ q + read.rate_factors @ v + read.acceleration_factors @ v @ A
     C[:, x:] += read.road_factors @ heights + read.road_rate_factors @ rate
-    return _system(vehicle, excitation, speed, A, B, C, _direct_transmission(read, q, v, B, noise)), q
+    return _system(linear_vehicle, road_excitation, speed, A, B, C, _direct_transmission(read, q, v, B, noise)), q
 
 
 def _direct_transmission(
-    output_rows: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray
+    output_rows: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, road_rate_noise: np.ndarray
 ) -> np.ndarray:
     """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, through B, and
     through noise in the rates of the road's heights."""
     transmission = (
         output_rows.rate_factors @ q @ B
         + output_rows.acceleration_factors @ v @ B
-        + output_rows.road_rate_factors @ noise
+        + output_rows.road_rate_factors @ road_rate_noise
     )
     size = abs(output_rows.rate_factors) @ abs(q) @ abs(B) + abs(output_rows.acceleration_factors) @ abs(v) @ abs(B)
-    is_certain = abs(transmission) > NEGLIGIBLE_SHARE * (size + abs(output_rows.road_rate_factors) @ abs(noise))
+    is_certain = abs(transmission) > NEGLIGIBLE_SHARE * (
+        size + abs(output_rows.road_rate_factors) @ abs(road_rate_noise)
+    )
     worse = abs(output_rows.acceleration_factors @ (q @ B)) > NEGLIGIBLE_SHARE * (
         abs(output_rows.acceleration_factors) @ abs(q) @ abs(B)
     )

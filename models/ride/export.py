@@ -14,27 +14,27 @@ if TYPE_CHECKING:
     import control
 
 
-def exported_arrays(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
+def exported_arrays(delayed_system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
     """Arrays for export by name: A, C, B and D of every axle (B1, D1, ...), delays (s), names, state covariance P and
     standard deviations of the outputs."""
-    named: dict[str, Any] = {"A": system.A, "C": system.C}
-    for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
+    named: dict[str, Any] = {"A": delayed_system.A, "C": delayed_system.C}
+    for i, (B, D) in enumerate(zip(delayed_system.B, delayed_system.D, strict=True), start=1):
         named |= {f"B{i}": B, f"D{i}": D}
     return named | {
-        "delays": np.array(system.delays),
-        "independent": system.independent,
-        "outputs": np.array(system.names),
+        "delays": np.array(delayed_system.delays),
+        "independent": delayed_system.independent,
+        "outputs": np.array(delayed_system.names),
         "P": covariance.P,
         "deviation": covariance.deviation,
     }
 
 
-def write_exports(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) -> list[Path]:
-    """Write the exported arrays to ``stem``.npz and ``stem``.mat; returns the paths of both files."""
+def write_exports(delayed_system: DelayedSystem, covariance: StationaryCovariance, path_stem: Path) -> list[Path]:
+    """Write the exported arrays to ``path_stem``.npz and ``path_stem``.mat; returns the paths of both files."""
     from scipy.io import savemat
 
-    content = exported_arrays(system, covariance)
-    paths = [stem.with_suffix(".npz"), stem.with_suffix(".mat")]
+    content = exported_arrays(delayed_system, covariance)
+    paths = [path_stem.with_suffix(".npz"), path_stem.with_suffix(".mat")]
     with whole_file(paths[0]) as partial_path:
         np.savez(partial_path, allow_pickle=False, **content)
     with whole_file(paths[1]) as partial_path:
@@ -42,7 +42,7 @@ def write_exports(system: DelayedSystem, covariance: StationaryCovariance, stem:
     return paths
 
 
-def state_space(system: DelayedSystem) -> "control.StateSpace":
+def state_space(delayed_system: DelayedSystem) -> "control.StateSpace":
     """State-space model of python-control in which each axle's noise is a separate input, axle after axle; the user
     must apply the delays.
 
@@ -50,7 +50,12 @@ def state_space(system: DelayedSystem) -> "control.StateSpace":
     """
     from control import StateSpace
 
-    names = [f"w{i}_{k}" for i, B in enumerate(system.B, 1) for k in range(1, B.shape[1] + 1)]
+    names = [f"w{i}_{k}" for i, B in enumerate(delayed_system.B, 1) for k in range(1, B.shape[1] + 1)]
     return StateSpace(
-        system.A, np.hstack(system.B), system.C, np.hstack(system.D), inputs=names, outputs=list(system.names)
+        delayed_system.A,
+        np.hstack(delayed_system.B),
+        delayed_system.C,
+        np.hstack(delayed_system.D),
+        inputs=names,
+        outputs=list(delayed_system.names),
     )

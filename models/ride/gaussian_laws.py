@@ -20,55 +20,55 @@ SECH_LIMIT, NORMAL_LIMIT = 20.0, 9.0
 """Ends of the integration range: sech^2 is 4 e^-40 there, the normal density e^-40."""
 
 
-def mean_force_and_slope(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
+def mean_force_and_slope(force_curve: Curve | None, mean: float, standard_deviation: float) -> tuple[float, float]:
     """Expected values E[f(x)] (N) and E[f'(x)] (N per unit of x) of a force curve f for normally distributed x; zeros
     without a curve."""
-    if curve is None:
+    if force_curve is None:
         return 0.0, 0.0
-    if deviation == 0.0:
-        return curve(mean), curve.slope_at_rest() if mean == 0.0 else _slope_of_curve(curve, mean)
-    offset, slope, corners, bends = curve.hinges()
-    bent, corner_distance = np.array(bends), (mean - np.array(corners)) / deviation
+    if standard_deviation == 0.0:
+        return force_curve(mean), force_curve.slope_at_rest() if mean == 0.0 else _slope_of_curve(force_curve, mean)
+    offset, slope, corners, bends = force_curve.hinges()
+    bent, corner_distance = np.array(bends), (mean - np.array(corners)) / standard_deviation
     density = np.exp(-(corner_distance**2) / 2.0) / np.sqrt(2.0 * np.pi)
-    beyond = deviation * (density + corner_distance * ndtr(corner_distance))  # mean of max(x - corner, 0)
+    beyond = standard_deviation * (density + corner_distance * ndtr(corner_distance))  # mean of max(x - corner, 0)
     return offset + slope * mean + float(bent @ beyond), slope + float(bent @ ndtr(corner_distance))
 
 
-def _slope_of_curve(curve: Curve, x: float) -> float:
+def _slope_of_curve(force_curve: Curve, x: float) -> float:
     """Slope of a curve at x; at a corner, the slope on the side away from rest."""
-    _, slope, corners, bends = curve.hinges()
+    _, slope, corners, bends = force_curve.hinges()
     return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if x >= corner)
 
 
-def mean_friction_slope(friction: float, friction_rate: float, deviation: float) -> float:
+def mean_friction_slope(friction_force: float, friction_rate: float, standard_deviation: float) -> float:
     """Expected slope E[f'(v)] (N s/m) of the friction force f(v) = friction tanh(v / friction_rate), for v normal with
     mean 0 and a standard deviation (m/s).
 
     With t = v / friction_rate the integrand sech^2(t) times the density of t is smooth at any ratio of the two.
     """
-    ratio = deviation / friction_rate
+    ratio = standard_deviation / friction_rate
     if ratio == 0.0:
-        return friction / friction_rate
+        return friction_force / friction_rate
     t = min(SECH_LIMIT, NORMAL_LIMIT * ratio) * TRAPEZOID_NODES
     density = np.exp(-((t / ratio) ** 2) / 2.0) / (np.sqrt(2.0 * np.pi) * ratio)
-    return friction / friction_rate * float((density / np.cosh(t) ** 2).sum() * (t[1] - t[0]))
+    return friction_force / friction_rate * float((density / np.cosh(t) ** 2).sum() * (t[1] - t[0]))
 
 
-def linearised_travel_law(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
+def linearised_travel_law(spring: SpringDamper, mean: float, standard_deviation: float) -> tuple[float, float, float]:
     """Statistical linearisation of a spring's force curve over travel (m): mean force (N), gain (N/m), and variance
     (N^2) of the remaining force."""
-    force, gain = mean_force_and_slope(spring.travel_force, mean, deviation)
-    x = deviation * EXPECTATION_POINTS
+    force, gain = mean_force_and_slope(spring.travel_force, mean, standard_deviation)
+    x = standard_deviation * EXPECTATION_POINTS
     law = _curve_at(spring.travel_force, mean + x)
     return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
 
 
-def linearised_rate_law(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
+def linearised_rate_law(spring: SpringDamper, standard_deviation: float) -> tuple[float, float, float]:
     """Statistical linearisation of a spring's force curve and friction over the rate (m/s): mean force (N), gain (N
     s/m), and variance (N^2) of the remaining force."""
-    force, gain = mean_force_and_slope(spring.rate_force, 0.0, deviation)
-    gain += mean_friction_slope(spring.friction, spring.friction_rate, deviation)
-    x = deviation * EXPECTATION_POINTS
+    force, gain = mean_force_and_slope(spring.rate_force, 0.0, standard_deviation)
+    gain += mean_friction_slope(spring.friction, spring.friction_rate, standard_deviation)
+    x = standard_deviation * EXPECTATION_POINTS
     law = _curve_at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
     return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
 
@@ -79,9 +79,9 @@ EXPECTATION_WEIGHTS = np.exp(-(EXPECTATION_POINTS**2) / 2.0) / np.exp(-(EXPECTAT
 remaining force."""
 
 
-def _curve_at(curve: Curve | None, x: np.ndarray) -> np.ndarray:
+def _curve_at(force_curve: Curve | None, x: np.ndarray) -> np.ndarray:
     """Forces (N) of a spring's curve at many arguments."""
-    if curve is None:
+    if force_curve is None:
         return np.zeros_like(x)
-    offset, slope, corners, bends = curve.hinges()
+    offset, slope, corners, bends = force_curve.hinges()
     return offset + slope * x + np.maximum(x[:, None] - np.array(corners), 0.0) @ np.array(bends)

@@ -34,16 +34,16 @@ class Unstable(InputError):
     """Error of a system that leaves its equilibrium without excitation: its ``growth`` rate in 1/s and ``frequency`` in
     Hz."""
 
-    def __init__(self, growth: float, frequency: float, speed: float | None = None) -> None:
-        self.growth, self.frequency = growth, frequency
+    def __init__(self, growth_rate: float, frequency: float, speed: float | None = None) -> None:
+        self.growth, self.frequency = growth_rate, frequency
         speed_text = "at this speed" if speed is None else f"at {speed:g} m/s"
         motion_text = f"that swings at {frequency:.4g} Hz" if frequency else "that does not swing"
         super().__init__(
             "",
             "vehicle",
             None,
-            f"is unstable: a motion {motion_text} grows at a rate of {growth:.4g} 1/s, twofold in "
-            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable {speed_text}",
+            f"is unstable: a motion {motion_text} grows at a rate of {growth_rate:.4g} 1/s, twofold in "
+            f"{np.log(2) / growth_rate:.3g} s, so nothing has a stationary variance; it must be stable {speed_text}",
         )
 
 
@@ -75,17 +75,17 @@ class MarginalParts:
         return len(self.M)
 
 
-def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> MarginalParts:
+def split_marginal(A: np.ndarray, matrix_accuracy: float = MATRIX_ACCURACY) -> MarginalParts:
     """Marginal and stable part of x' = A x + u, with A (n, n). Raises Unstable, or InputError where they cannot be
     separated.
 
-    ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
+    ``matrix_accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
     balanced, scale, norm = _balanced_matrix(A)
-    V, form, zeros, left = _zeros_first(balanced, accuracy * norm)
-    if zeros and accuracy * norm > FREE_ROUNDING:
+    V, form, zeros, left = _zeros_first(balanced, matrix_accuracy * norm)
+    if zeros and matrix_accuracy * norm > FREE_ROUNDING:
         _refuse(norm)
-    U, stable_part, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
+    U, stable_part, undamped = _undamped_first(form[zeros:, zeros:], 10 * matrix_accuracy * norm)
     k = zeros + undamped
     V[:, zeros:] = V[:, zeros:] @ U
     form[:zeros, zeros:] = form[:zeros, zeros:] @ U
@@ -114,12 +114,12 @@ FREE_ROUNDING = 1e-3
 comes to rest."""
 
 
-def _refuse(fastest: float) -> None:
+def _refuse(fastest_rate: float) -> None:
     raise InputError(
         "",
         "vehicle",
         None,
-        f"has a motion so fast, {fastest:.2g} 1/s, that its slow ones cannot be told from free "
+        f"has a motion so fast, {fastest_rate:.2g} 1/s, that its slow ones cannot be told from free "
         "ones: look for a mass or an inertia that is far too small, a stiffness or damping that is far too large",
     )
 
@@ -136,8 +136,8 @@ def _balanced_matrix(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     return A * scale / scale[:, None], scale, fastest
 
 
-def _ratio_to_slowest_decay(rate: float, S: np.ndarray) -> float:
-    return rate / float(-np.linalg.eigvals(S).real.max()) if len(S) else 0.0
+def _ratio_to_slowest_decay(neglected_rate: float, S: np.ndarray) -> float:
+    return neglected_rate / float(-np.linalg.eigvals(S).real.max()) if len(S) else 0.0
 
 
 def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int, float]:
@@ -169,8 +169,8 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
     Raises Unstable if any eigenvalue lies beyond them, on the right.
     """
 
-    def on_axis(re: np.ndarray, im: np.ndarray) -> np.ndarray:
-        return (im != 0) & (abs(re) <= tolerance)
+    def on_axis(real_part: np.ndarray, imaginary_part: np.ndarray) -> np.ndarray:
+        return (imaginary_part != 0) & (abs(real_part) <= tolerance)
 
     values = np.linalg.eigvals(A)
     on_the_axis = on_axis(values.real, values.imag)
@@ -184,15 +184,20 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
     return U, form, undamped
 
 
-def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
+def _decouple(block_triangular_form: np.ndarray, V: np.ndarray, W: np.ndarray, leading_size: int) -> None:
     """Remove the coupling form[:k, k:] of a block triangular form = W A V in place, by solving a Sylvester equation."""
-    if 0 < k < len(form):
+    if 0 < leading_size < len(block_triangular_form):
         from control import lyap
 
-        Z = lyap(form[:k, :k], -form[k:, k:], form[:k, k:], method="scipy")
-        V[:, k:] += V[:, :k] @ Z
-        W[:k] -= Z @ W[k:]
-        form[:k, k:] = 0.0
+        Z = lyap(
+            block_triangular_form[:leading_size, :leading_size],
+            -block_triangular_form[leading_size:, leading_size:],
+            block_triangular_form[:leading_size, leading_size:],
+            method="scipy",
+        )
+        V[:, leading_size:] += V[:, :leading_size] @ Z
+        W[:leading_size] -= Z @ W[leading_size:]
+        block_triangular_form[:leading_size, leading_size:] = 0.0
 
 
 def _modal_form(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -227,13 +232,13 @@ class Growth:
 
 
 def variance_growth(
-    split: MarginalParts,
+    marginal_parts: MarginalParts,
     B: Sequence[np.ndarray],
     delays: Sequence[float],
     C: np.ndarray,
-    independent: bool,
+    has_independent_axles: bool,
     variance: np.ndarray,
-    accuracy: float = MATRIX_ACCURACY,
+    matrix_accuracy: float = MATRIX_ACCURACY,
 ) -> Growth:
     """Long-run growth of the variances of the outputs y = C x along the marginal motions, under noise through B_i (n,
     k) with delays tau_i (s).
@@ -242,22 +247,42 @@ def variance_growth(
     last one may stop. C (p, n). Products no larger than ZERO_MARGIN times their accuracy are zero, unless the motion,
     if it is not free but dies out too slowly to tell, would still add to the ``variance`` (p,) of all others.
     """
-    join = np.hstack if independent else sum
-    carried = [np.eye(split.count_of_marginal_states) if independent else expm(-split.M * delay) for delay in delays]
-    G = join([E @ split.W0 @ b for E, b in zip(carried, B, strict=True)])
-    reach = np.linalg.norm(split.W0 * split.scale, axis=1, keepdims=True)
+    join = np.hstack if has_independent_axles else sum
+    carried = [
+        np.eye(marginal_parts.count_of_marginal_states) if has_independent_axles else expm(-marginal_parts.M * delay)
+        for delay in delays
+    ]
+    G = join([E @ marginal_parts.W0 @ b for E, b in zip(carried, B, strict=True)])
+    reach = np.linalg.norm(marginal_parts.W0 * marginal_parts.scale, axis=1, keepdims=True)
     G_size = join(
-        [abs(E) @ reach * np.linalg.norm(b / split.scale[:, None], axis=0) for E, b in zip(carried, B, strict=True)]
+        [
+            abs(E) @ reach * np.linalg.norm(b / marginal_parts.scale[:, None], axis=0)
+            for E, b in zip(carried, B, strict=True)
+        ]
     )
-    outputs_of_marginal = C @ split.V0
-    seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.count_of_marginal_states)
-    z, least_rate = split.zero_count, ZERO_MARGIN * accuracy
-    largest_rounding = least_rate * variance * 2 * accuracy * split.norm_of_rates
+    outputs_of_marginal = C @ marginal_parts.V0
+    seen_size = np.linalg.norm(C * marginal_parts.scale, axis=1, keepdims=True) * np.ones(
+        marginal_parts.count_of_marginal_states
+    )
+    z, least_rate = marginal_parts.zero_count, ZERO_MARGIN * matrix_accuracy
+    largest_rounding = least_rate * variance * 2 * matrix_accuracy * marginal_parts.norm_of_rates
     rate, power = _growth_by_zeros(
-        split.M[:z, :z], G[:z], G_size[:z], outputs_of_marginal[:, :z], seen_size[:, :z], least_rate, largest_rounding
+        marginal_parts.M[:z, :z],
+        G[:z],
+        G_size[:z],
+        outputs_of_marginal[:, :z],
+        seen_size[:, :z],
+        least_rate,
+        largest_rounding,
     )
     swung = _growth_by_undamped(
-        split.M[z:, z:], G[z:], G_size[z:], outputs_of_marginal[:, z:], seen_size[:, z:], least_rate, largest_rounding
+        marginal_parts.M[z:, z:],
+        G[z:],
+        G_size[z:],
+        outputs_of_marginal[:, z:],
+        seen_size[:, z:],
+        least_rate,
+        largest_rounding,
     )
     rate = np.where(power <= 1, rate + swung, rate)
     return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))

@@ -10,35 +10,35 @@ import math
 from models.core.errors import InputError
 
 
-def time_share_beyond(deviation: float, threshold: float) -> float:
+def time_share_beyond(standard_deviation: float, threshold: float) -> float:
     """Share of time for which abs(x) exceeds a threshold, from the standard deviation of a Gaussian x; both in the unit
     of x."""
-    _check_value(deviation=deviation, limit=threshold)
-    return 0.0 if deviation == 0.0 else math.erfc(threshold / (math.sqrt(2.0) * deviation))
+    _check_value(deviation=standard_deviation, limit=threshold)
+    return 0.0 if standard_deviation == 0.0 else math.erfc(threshold / (math.sqrt(2.0) * standard_deviation))
 
 
-def exceedance_rate(deviation: float, rate_deviation: float, threshold: float) -> float:
+def exceedance_rate(standard_deviation: float, rate_deviation: float, threshold: float) -> float:
     """Number of times per second that abs(x) exceeds a threshold, from the standard deviations of x and of its rate x'
     (per s).
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-threshold^2 / (2 sd^2)) / pi.
     """
-    _check_value(deviation=deviation, rate_deviation=rate_deviation, limit=threshold)
-    if deviation == 0.0:
+    _check_value(deviation=standard_deviation, rate_deviation=rate_deviation, limit=threshold)
+    if standard_deviation == 0.0:
         return 0.0
-    return rate_deviation / (math.pi * deviation) * math.exp(-((threshold / deviation) ** 2) / 2.0)
+    return rate_deviation / (math.pi * standard_deviation) * math.exp(-((threshold / standard_deviation) ** 2) / 2.0)
 
 
-def dynamic_load_factor(deviation: float, static_load: float) -> float:
+def dynamic_load_factor(standard_deviation: float, static_load: float) -> float:
     """Ratio of the standard deviation of a wheel's load to its static load (both N): at 0.33 the tyre begins to lift
     off.
 
     At three standard deviations the load is then gone, which a linear vehicle does not notice.
     """
-    _check_value(deviation=deviation)
+    _check_value(deviation=standard_deviation)
     if not 0.0 < static_load < math.inf:
         raise InputError("", "static", static_load, "must be a wheel's load above 0, in N")
-    return deviation / static_load
+    return standard_deviation / static_load
 
 
 def _check_value(**named_values: float) -> None:

@@ -57,21 +57,23 @@ class VarianceEstimate:
     error: np.ndarray
     copies: int
 
-    def z(self, deviation: np.ndarray) -> np.ndarray:
+    def z(self, expected_deviation: np.ndarray) -> np.ndarray:
         """Standard scores (N, p): estimated variance minus the square of the given standard deviations (N, p), divided
         by the standard errors."""
         known = np.isfinite(self.variance)
-        variance_error = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
+        variance_error = np.subtract(
+            self.variance, expected_deviation**2, out=np.zeros_like(self.variance), where=known
+        )
         return np.divide(variance_error, self.error, out=np.full_like(variance_error, np.nan), where=known)
 
 
 def variances_along_drive(
-    vehicle: LinearVehicle,
-    excitation: Excitation,
-    profile: SpeedProfile,
+    linear_vehicle: LinearVehicle,
+    road_excitation: Excitation,
+    speed_profile: SpeedProfile,
     instants: Sequence[float] | np.ndarray,
     *,
-    copies: int = 4000,
+    copy_count: int = 4000,
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
@@ -81,54 +83,54 @@ def variances_along_drive(
     The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
     ``weighting.system_with_weightings``. Raises InputError for a standstill: a cell would take for ever.
     """
-    slowest = float(profile.speeds.min())
+    slowest = float(speed_profile.speeds.min())
     if slowest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 for Monte Carlo, which steps along the road")
-    cells = _Cells(vehicle, excitation, weightings, slowest)
-    ends = profile.time(cells.length * np.arange(1, int(profile.paths[-1] / cells.length) + 1))
+    cells = _Cells(linear_vehicle, road_excitation, weightings, slowest)
+    ends = speed_profile.time(cells.length * np.arange(1, int(speed_profile.paths[-1] / cells.length) + 1))
     wanted = np.unique(np.abs(ends[:, None] - np.asarray(instants)).argmin(axis=0))
-    first = float(profile.speeds[0])
+    first = float(speed_profile.speeds[0])
     lead = np.full(cells.cells_to_forget(first), cells.length / first)
     rows = []
-    durations = np.append(lead, np.diff(ends[: wanted[-1] + 1], prepend=profile.times[0]))
-    for number, x in enumerate(cells.states(durations, copies, seed)):
+    durations = np.append(lead, np.diff(ends[: wanted[-1] + 1], prepend=speed_profile.times[0]))
+    for number, x in enumerate(cells.states(durations, copy_count, seed)):
         if number - len(lead) in wanted:
-            y = cells.outputs(x, float(profile.speed(ends[number - len(lead)])))
-            rows.append(((y**2).mean(axis=1), (y**2).std(axis=1) / copies**0.5))
-    return cells.estimate(ends[wanted], np.array(rows), copies)
+            y = cells.outputs(x, float(speed_profile.speed(ends[number - len(lead)])))
+            rows.append(((y**2).mean(axis=1), (y**2).std(axis=1) / copy_count**0.5))
+    return cells.estimate(ends[wanted], np.array(rows), copy_count)
 
 
 def variances_at_constant_speed(
-    vehicle: LinearVehicle,
-    excitation: Excitation,
+    linear_vehicle: LinearVehicle,
+    road_excitation: Excitation,
     speed: float,
     duration: float,
     *,
-    copies: int = 4000,
+    copy_count: int = 4000,
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
     """Stationary variances (1, p) of the outputs at a constant speed (m/s), averaged over the copies and, in each of
     them, over ``duration`` (s)."""
-    cells = _Cells(vehicle, excitation, weightings, speed)
+    cells = _Cells(linear_vehicle, road_excitation, weightings, speed)
     skipped, counted = cells.cells_to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
-    for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copies, seed)):
+    for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copy_count, seed)):
         if number >= skipped:
             total = total + cells.outputs(x, speed) ** 2
     mean = total / counted
-    rows = np.array([[mean.mean(axis=1), mean.std(axis=1) / copies**0.5]])
-    return cells.estimate(np.array([duration]), rows, copies)
+    rows = np.array([[mean.mean(axis=1), mean.std(axis=1) / copy_count**0.5]])
+    return cells.estimate(np.array([duration]), rows, copy_count)
 
 
 def path_cell(
-    lengths: Sequence[float], longest_cell: float, tolerance: float = AXLE_SHIFT_TOLERANCE
+    axle_distances: Sequence[float], longest_cell: float, tolerance: float = AXLE_SHIFT_TOLERANCE
 ) -> tuple[float, np.ndarray]:
     """Length (m) of a path cell, at most ``longest_cell``, and by how many cells each axle is behind the first.
 
     All distances are whole numbers of cells up to ``tolerance`` (m), the last axle's exactly.
     """
-    behind = np.asarray(lengths)
+    behind = np.asarray(axle_distances)
     if behind[-1] == 0.0:
         return longest_cell, np.zeros(len(behind), int)
     count = int(np.ceil(behind[-1] / longest_cell))
@@ -143,15 +145,19 @@ class _Cells:
     """Vehicle on a path that is divided into cells, which fit its axle distances and its slowest speed (m/s)."""
 
     def __init__(
-        self, vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None, slowest: float
+        self,
+        linear_vehicle: LinearVehicle,
+        road_excitation: Excitation,
+        weightings: Mapping[str, str] | None,
+        slowest_speed: float,
     ) -> None:
         def system(speed: float) -> DelayedSystem:
-            return system_at_speed(vehicle, excitation, speed, weightings)
+            return system_at_speed(linear_vehicle, road_excitation, speed, weightings)
 
         self.at_unit_speed, self.at_double_speed = system(1.0), system(2.0)
-        self.finite = np.array([status == FINITE for status in stationary_covariance(system(slowest)).status])
-        fastest = np.abs(np.linalg.eigvals(system(slowest).A)).max() / slowest
-        self.length, self.shifts = path_cell(excitation.lengths, LARGEST_RATE_TIMES_CELL / fastest)
+        self.finite = np.array([status == FINITE for status in stationary_covariance(system(slowest_speed)).status])
+        fastest = np.abs(np.linalg.eigvals(system(slowest_speed).A)).max() / slowest_speed
+        self.length, self.shifts = path_cell(road_excitation.lengths, LARGEST_RATE_TIMES_CELL / fastest)
         self.at_rest, self.per_speed = (
             2.0 * self.at_unit_speed.A - self.at_double_speed.A,
             self.at_double_speed.A - self.at_unit_speed.A,
@@ -165,16 +171,16 @@ class _Cells:
             raise InputError("", "vehicle", None, refusal)
         return int(np.ceil(FORGETTING_EXPONENT / slowest * speed / self.length))
 
-    def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:
-        """States (n, copies) at the end of each cell; ``durations`` : times (s) in which the first axle crosses the
+    def states(self, crossing_times: np.ndarray, copy_count: int, seed: int) -> Iterator[np.ndarray]:
+        """States (n, copies) at the end of each cell; ``crossing_times`` : times (s) in which the first axle crosses the
         cells."""
         k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
         independent = self.at_unit_speed.independent
-        draws = _draw_coefficients(seed, copies, k * LEGENDRE_MODES * (axles if independent else 1))
+        draws = _draw_coefficients(seed, copy_count, k * LEGENDRE_MODES * (axles if independent else 1))
         last_shift = int(self.shifts[-1])
         met = deque((next(draws) for _ in range(last_shift)), maxlen=last_shift + 1)
-        x, last_duration = np.zeros((len(self.at_rest), copies)), None
-        for duration in durations:
+        x, last_duration = np.zeros((len(self.at_rest), copy_count)), None
+        for duration in crossing_times:
             met.append(next(draws))
             if duration != last_duration:
                 E, R = self._cell_transition(duration)
@@ -183,25 +189,25 @@ class _Cells:
             x = E @ x + R @ np.concatenate(noise)
             yield x
 
-    def _cell_transition(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    def _cell_transition(self, crossing_time: float) -> tuple[np.ndarray, np.ndarray]:
         """Transition matrix (n, n) of the state over a cell, and responses (n, a k LEGENDRE_MODES) to the noise in it,
         axle by axle."""
-        matrix = duration * self.at_rest + self.length * self.per_speed
+        matrix = crossing_time * self.at_rest + self.length * self.per_speed
         rows = [np.stack(self.at_unit_speed.B, axis=1) * self.length**0.5]
         for _ in range(SERIES_TERMS - 1):
             rows.append(np.tensordot(matrix, rows[-1], 1))
         responses = np.einsum("jnak,jl->nakl", np.stack(rows), _legendre_integrals())
         return expm(matrix), responses.reshape(len(matrix), -1)
 
-    def outputs(self, x: np.ndarray, speed: float) -> np.ndarray:
+    def outputs(self, vehicle_states: np.ndarray, speed: float) -> np.ndarray:
         """Outputs (p, copies) at states x (n, copies), without their white-noise part."""
-        return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ x
+        return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ vehicle_states
 
-    def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> VarianceEstimate:
+    def estimate(self, time: np.ndarray, variances_and_errors: np.ndarray, copy_count: int) -> VarianceEstimate:
         """``VarianceEstimate`` from variances and their errors (N, 2, p), inf where an output has no finite
         variance."""
-        moments = np.where(self.finite, rows, np.inf)
-        return VarianceEstimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
+        moments = np.where(self.finite, variances_and_errors, np.inf)
+        return VarianceEstimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copy_count)
 
 
 def _legendre_integrals() -> np.ndarray:
@@ -213,14 +219,16 @@ def _legendre_integrals() -> np.ndarray:
     return np.einsum("u,uj,ul->jl", weights / 2.0, taylor_terms((1.0 - points) / 2.0, SERIES_TERMS), basis)
 
 
-def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:
+def _draw_coefficients(seed: int, copy_count: int, channel_count: int) -> Iterator[np.ndarray]:
     """Yield the random coefficients (channels, copies) of each cell in turn.
 
     Several cells are drawn from the same block of noise if there are few copies.
     """
-    together, path = max(1, SAMPLES_PER_BLOCK // copies), 0
+    together, path = max(1, SAMPLES_PER_BLOCK // copy_count), 0
     while True:
         yield from (
-            normal_samples(seed, path, together * copies, channels, noise_source=ROAD).reshape(together, copies, -1).mT
+            normal_samples(seed, path, together * copy_count, channel_count, noise_source=ROAD)
+            .reshape(together, copy_count, -1)
+            .mT
         )
         path += 1

@@ -81,10 +81,10 @@ class Copies:
         central = fourth - 4 * first * third + 6 * first**2 * second - 3 * first**4
         return central / self.variance**2
 
-    def z(self, deviation: np.ndarray) -> np.ndarray:
+    def z(self, expected_deviation: np.ndarray) -> np.ndarray:
         """Standard scores (p,): the variances minus the squares of the given standard deviations (p,), divided by the
         standard errors."""
-        return (self.variance - deviation**2) / self.error
+        return (self.variance - expected_deviation**2) / self.error
 
     def about_mean(self) -> np.ndarray:
         """Mean square (copies, p) of each copy's outputs about the mean of all copies."""
@@ -94,11 +94,11 @@ class Copies:
 
 def copies_in_time(
     vehicle: SpatialVehicle,
-    excitation: Excitation,
+    road_excitation: Excitation,
     speed: float,
     duration: float,
     *,
-    copies: int = 500,
+    copy_count: int = 500,
     seed: int = 0,
     longest_step: float | None = None,
 ) -> Copies:
@@ -108,12 +108,12 @@ def copies_in_time(
     longest_step : largest step (s); by itself it comes from the fastest rates.
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
-    check_rates(vehicle, excitation)
-    replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), excitation, speed).vehicle
-    road = road_path(excitation, speed, longest_step or usual_step(vehicle, speed, replaced))
+    check_rates(vehicle, road_excitation)
+    replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), road_excitation, speed).vehicle
+    road = road_path(road_excitation, speed, longest_step or usual_step(vehicle, speed, replaced))
     settling, counted = int(np.ceil(settling_time(replaced) / road.step)), int(np.ceil(duration / road.step))
-    march = CopiesMarch(vehicle, speed, road.step, copies)
-    for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
+    march = CopiesMarch(vehicle, speed, road.step, copy_count)
+    for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copy_count, seed)):
         left = settling + counted - number * STEPS_PER_BLOCK
         march.march_over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * STEPS_PER_BLOCK))
         if left <= STEPS_PER_BLOCK:
@@ -127,12 +127,15 @@ RERUN_SHARE = 0.5
 
 
 def coarser_variances(
-    vehicle: SpatialVehicle, excitation: Excitation, speed: float, fine_copies: Copies, step_factor: int, seed: int
+    vehicle: SpatialVehicle, road_excitation: Excitation, speed: float, fine_copies: Copies, step_factor: int, seed: int
 ) -> np.ndarray:
     """Variances (k, p) of the outputs about their means for the first k copies, simulated again on the same roads with
     steps that are ``step_factor`` (2 or 4) times as long."""
     copies = len(fine_copies.moments[0])
-    rerun_copies, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine_copies.step / 2.0)
+    rerun_copies, road = (
+        max(1, math.ceil(RERUN_SHARE * copies)),
+        RoadPath(road_excitation, speed, fine_copies.step / 2.0),
+    )
     settling, counted = (
         fine_copies.settling_steps // step_factor,
         round(fine_copies.duration / fine_copies.step) // step_factor,
@@ -156,32 +159,35 @@ class CopiesMarch:
     """Time integration of copies of a vehicle, from rest, over random roads; ``sums`` (4, p, copies): sums of the
     powers of its outputs so far."""
 
-    def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:
+    def __init__(self, vehicle: SpatialVehicle, speed: float, time_step: float, copy_count: int) -> None:
         springs = nonlinear_springs(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
-        self.laws, self.step = force_laws(vehicle, self.plain, springs, speed), step
-        self.sums = np.zeros((POWERS_SUMMED, len(self.plain.outputs), copies))
+        self.laws, self.step = force_laws(vehicle, self.plain, springs, speed), time_step
+        self.sums = np.zeros((POWERS_SUMMED, len(self.plain.outputs), copy_count))
         self.states: np.ndarray | None = None
 
-    def march_over(self, roads: np.ndarray, first_counted: int, stride: int = STEPS_PER_READING) -> None:
+    def march_over(
+        self, road_paths: np.ndarray, first_counted_step: int, counting_stride: int = STEPS_PER_READING
+    ) -> None:
         """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
-        ``first_counted`` on."""
+        ``first_counted_step`` on."""
         if self.states is None:
-            self.states = np.vstack([_static_positions(self.plain, roads[0])] * 2)
+            self.states = np.vstack([_static_positions(self.plain, road_paths[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
-        march(self.states, roads, self.step, first_counted, stride, self.laws, self.sums)
+        march(self.states, road_paths, self.step, first_counted_step, counting_stride, self.laws, self.sums)
 
 
-def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
-    """Step (s) for a nonlinear vehicle, from the rates of its statistically linearised ``equivalent``."""
+def usual_step(vehicle: SpatialVehicle, speed: float, linearised_vehicle: LinearVehicle) -> float:
+    """Step (s) for a nonlinear vehicle, from the rates of its statistically linearised ``linearised_vehicle``."""
     return min(
-        LARGEST_RATE_TIMES_STEP / float(abs(eigenvalues(equivalent)).max()), longest_resolving_step(vehicle, speed)
+        LARGEST_RATE_TIMES_STEP / float(abs(eigenvalues(linearised_vehicle)).max()),
+        longest_resolving_step(vehicle, speed),
     )
 
 
-def settling_time(equivalent: LinearVehicle) -> float:
+def settling_time(linearised_vehicle: LinearVehicle) -> float:
     """Time (s) after which copies no longer depend on their initial state."""
-    decay = abs(eigenvalues(equivalent).real)
+    decay = abs(eigenvalues(linearised_vehicle).real)
     return SETTLING_EXPONENT / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
@@ -191,16 +197,20 @@ def longest_resolving_step(vehicle: SpatialVehicle, speed: float) -> float:
     return LARGEST_STIFF_RATE_TIMES_STEP / float(abs(eigenvalues(steepest)).max())
 
 
-def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PER_READING) -> int:
-    """Number of steps from the ``completed`` ones to the next step at which outputs count."""
-    return settling - completed if completed <= settling else (settling - completed) % stride
+def _steps_to_first_output(settling_steps: int, completed_steps: int, counting_stride: int = STEPS_PER_READING) -> int:
+    """Number of steps from the ``completed_steps`` ones to the next step at which outputs count."""
+    return (
+        settling_steps - completed_steps
+        if completed_steps <= settling_steps
+        else (settling_steps - completed_steps) % counting_stride
+    )
 
 
-def _static_positions(linear: LinearVehicle, road: np.ndarray) -> np.ndarray:
+def _static_positions(linear_vehicle: LinearVehicle, road_heights: np.ndarray) -> np.ndarray:
     """Positions (n, copies) of static equilibrium on a road (2 w, copies). Vehicles that start far above the road would
     oscillate for long."""
-    heights = road[: linear.road_stiffness.shape[1]]
-    return np.linalg.lstsq(linear.stiffness, linear.road_stiffness @ heights, rcond=1e-12)[0]
+    heights = road_heights[: linear_vehicle.road_stiffness.shape[1]]
+    return np.linalg.lstsq(linear_vehicle.stiffness, linear_vehicle.road_stiffness @ heights, rcond=1e-12)[0]
 
 
 def _steepest_gains(spring: SpringDamper) -> Gains:
@@ -209,27 +219,34 @@ def _steepest_gains(spring: SpringDamper) -> Gains:
     return spring.stiffness + travel, spring.damping + rate + spring.friction / spring.friction_rate
 
 
-def _slopes_of_pieces(curve: Curve | None) -> np.ndarray:
-    if curve is None:
+def _slopes_of_pieces(force_curve: Curve | None) -> np.ndarray:
+    if force_curve is None:
         return np.zeros(1)
-    _, slope, _, bends = curve.hinges()
+    _, slope, _, bends = force_curve.hinges()
     return slope + np.cumsum([0.0, *bends])
 
 
 def force_laws(
-    vehicle: SpatialVehicle, linear: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float
+    vehicle: SpatialVehicle, linear_vehicle: LinearVehicle, bent_springs: tuple[SpringDamper, ...], speed: float
 ) -> ForceLaws:
-    """``ForceLaws`` of the vehicle for compiled loops; ``linear`` is the vehicle without the nonlinear parts of these
+    """``ForceLaws`` of the vehicle for compiled loops; ``linear_vehicle`` is the vehicle without the nonlinear parts of these
     springs."""
-    n = len(linear.mass)
-    watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
+    n = len(linear_vehicle.mass)
+    watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in bent_springs))
     rows = np.array([o.displacement_factors for o in linearise(watched, speed).outputs]).reshape(-1, n)
     pushing = [tyre for tyre in vehicle.tyres if tyre.pushes_only]
     kinematics = Kinematics(vehicle)
     heights = np.array([kinematics.shift(tyre.body, tyre.point)[2] for tyre in pushing]).reshape(-1, n)
-    forced = (-linear.stiffness, -linear.damping, linear.road_stiffness, linear.road_damping, -rows.T, heights.T)
-    motion = np.linalg.solve(linear.mass, np.hstack(forced))
-    named_forces = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
+    forced = (
+        -linear_vehicle.stiffness,
+        -linear_vehicle.damping,
+        linear_vehicle.road_stiffness,
+        linear_vehicle.road_damping,
+        -rows.T,
+        heights.T,
+    )
+    motion = np.linalg.solve(linear_vehicle.mass, np.hstack(forced))
+    named_forces = [*(("force", s.name) for s in bent_springs), *(("tyre force", tyre.name) for tyre in pushing)]
     read = np.array([[float((o.kind, _part_of_output(o)) == force) for force in named_forces] for o in vehicle.outputs])
     read = np.hstack(
         [
@@ -243,30 +260,36 @@ def force_laws(
                         o.acceleration_factors,
                     ]
                 )
-                for o in linear.outputs
+                for o in linear_vehicle.outputs
             ],
-            read.reshape(len(linear.outputs), -1),
+            read.reshape(len(linear_vehicle.outputs), -1),
         ]
     )
     return ForceLaws(
         rows,
         motion,
         read,
-        _padded_curves([s.travel_force for s in springs]),
-        _padded_curves([s.rate_force for s in springs]),
-        np.array([s.friction for s in springs], dtype=float),
-        np.array([s.friction_rate for s in springs], dtype=float),
+        _padded_curves([s.travel_force for s in bent_springs]),
+        _padded_curves([s.rate_force for s in bent_springs]),
+        np.array([s.friction for s in bent_springs], dtype=float),
+        np.array([s.friction_rate for s in bent_springs], dtype=float),
         _pushing_tyres(vehicle, pushing, heights),
     )
 
 
-def _part_of_output(output: SpatialOutput) -> str:
+def _part_of_output(vehicle_output: SpatialOutput) -> str:
     """Name of the spring or tyre whose force or travel an output reads; "" if none."""
-    return output.part if isinstance(output, PartOutput) else output.tyre if isinstance(output, TyreOutput) else ""
+    return (
+        vehicle_output.part
+        if isinstance(vehicle_output, PartOutput)
+        else vehicle_output.tyre
+        if isinstance(vehicle_output, TyreOutput)
+        else ""
+    )
 
 
-def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray) -> PushingTyres:
-    """``PushingTyres`` of tyres that only push; ``heights`` (u, n) : rise of each tyre's wheel per coordinate."""
+def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], wheel_rises: np.ndarray) -> PushingTyres:
+    """``PushingTyres`` of tyres that only push; ``wheel_rises`` (u, n) : rise of each tyre's wheel per coordinate."""
     loads = preloads(vehicle).tyres if tyres else {}
     load, stiffness, damping = (
         np.array([(loads[tyre.name], tyre.stiffness, tyre.damping) for tyre in tyres], dtype=float)
@@ -274,12 +297,12 @@ def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.n
         .T.copy()
     )
     wheel = np.array([vehicle.tyres.index(tyre) for tyre in tyres], dtype=np.int64)
-    return PushingTyres(wheel, load, stiffness, damping, heights)
+    return PushingTyres(wheel, load, stiffness, damping, wheel_rises)
 
 
-def _padded_curves(curves: Sequence[Curve | None]) -> Curves:
+def _padded_curves(force_curves: Sequence[Curve | None]) -> Curves:
     """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets a curve that is 0 everywhere."""
-    known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
+    known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in force_curves]
     most_corners = max((len(corners) for _, _, corners, _ in known), default=0)
     offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()
     corners, bends = np.zeros((len(known), most_corners)), np.zeros((len(known), most_corners))

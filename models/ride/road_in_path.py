@@ -46,20 +46,20 @@ class RoadInPath:
 
 
 def road_in_path(
-    vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None = None
+    linear_vehicle: LinearVehicle, road_excitation: Excitation, weightings: Mapping[str, str] | None = None
 ) -> RoadInPath:
     """``RoadInPath`` of a vehicle on a road, with weighted outputs as in ``system_with_weightings``; raises the errors
     of that function.
 
     A system is linear in v (its noise in sqrt(v)), so two speeds tell all.
     """
-    at_1, at_2 = (system_at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
-    first, (m, axles) = 2 * len(vehicle.mass), (len(excitation.F), len(excitation.heights))
+    at_1, at_2 = (system_at_speed(linear_vehicle, road_excitation, v, weightings) for v in (1.0, 2.0))
+    first, (m, axles) = 2 * len(linear_vehicle.mass), (len(road_excitation.F), len(road_excitation.heights))
     road = np.arange(first, first + axles * m)
     other_states = np.setdiff1d(np.arange(len(at_1.A)), road)
     steady, by_speed = 2.0 * at_1.A - at_2.A, at_2.A - at_1.A
     A = steady[np.ix_(other_states, other_states)]
-    known = np.linalg.pinv(np.hstack([excitation.F, excitation.G]))
+    known = np.linalg.pinv(np.hstack([road_excitation.F, road_excitation.G]))
     T = np.hstack(
         [
             np.hstack([by_speed[np.ix_(other_states, filter_states)], B[other_states]]) @ known
@@ -80,15 +80,18 @@ def road_in_path(
         (2.0 * at_1.C - at_2.C) @ basis,
         (at_2.C - at_1.C) @ basis,
         at_1.names,
-        excitation,
+        road_excitation,
     )
 
 
 def system_at_speed(
-    vehicle: LinearVehicle, excitation: Excitation, speed: float, weightings: Mapping[str, str] | None = None
+    linear_vehicle: LinearVehicle,
+    road_excitation: Excitation,
+    speed: float,
+    weightings: Mapping[str, str] | None = None,
 ) -> DelayedSystem:
     """State-space model of the vehicle on its road at a constant speed (m/s, above 0), with weighted outputs."""
-    return system_with_weightings(vehicle_with_road(vehicle, excitation, speed), weightings or {})
+    return system_with_weightings(vehicle_with_road(linear_vehicle, road_excitation, speed), weightings or {})
 
 
 SERIES_TERMS = 24
@@ -101,13 +104,13 @@ class Responses:
     Between the points of the profile only: on a step the path must be a polynomial of time.
     """
 
-    def __init__(self, road_in_path: RoadInPath, profile: SpeedProfile) -> None:
-        F, G = road_in_path.excitation.F, road_in_path.excitation.G
-        self.form, self.profile, self.path = road_in_path, profile, profile.path
-        self.n, self.axles, self.m = road_in_path.noise_inputs.shape
+    def __init__(self, path_equations: RoadInPath, speed_profile: SpeedProfile) -> None:
+        F, G = path_equations.excitation.F, path_equations.excitation.G
+        self.form, self.profile, self.path = path_equations, speed_profile, speed_profile.path
+        self.n, self.axles, self.m = path_equations.noise_inputs.shape
         self.decay, self.noise = exponential_series(F, np.eye(self.m)), exponential_series(F, G)
         self.motion = [
-            exponential_series(road_in_path.A, road_in_path.noise_inputs[:, axle]) for axle in range(self.axles)
+            exponential_series(path_equations.A, path_equations.noise_inputs[:, axle]) for axle in range(self.axles)
         ]
         self.of_length = lru_cache(maxsize=64)(self._step_matrices)
 
@@ -123,14 +126,14 @@ class Responses:
             E[first : first + self.m, first : first + self.m] = decay[-self.m :]
         return E
 
-    def _step_matrices(self, length: float) -> tuple[np.ndarray, np.ndarray]:
+    def _step_matrices(self, step_duration: float) -> tuple[np.ndarray, np.ndarray]:
         """Matrix exponential e^(A h) over a step of length h (s), and the effect of inputs at the points of the step
         through e^(A (h - u)): (n a, g m)."""
-        left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in UNIT_POINTS])
-        inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.noise_inputs, optimize=True)
-        return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
+        left = np.stack([expm(self.form.A * step_duration * (1.0 - point)) for point in UNIT_POINTS])
+        inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * step_duration, left, self.form.noise_inputs, optimize=True)
+        return expm(self.form.A * step_duration), inputs.reshape(self.n * self.axles, -1)
 
-    def noise_responses(self, axle: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
+    def noise_responses(self, axle_index: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
         """States (n + a m, L, k) at ``end_time`` (L,) after a unit of noise that the axle has met at ``meeting_times``
         (L,), in s.
 
@@ -143,10 +146,10 @@ class Responses:
         weighted = np.swapaxes(taylor_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
         responses = np.zeros((self.n + self.axles * self.m, len(meeting_times), k))
         columns = weighted.reshape(-1, SERIES_TERMS, self.m, k).transpose(1, 2, 0, 3).reshape(SERIES_TERMS * self.m, -1)
-        motion = self.motion[axle].reshape(SERIES_TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
+        motion = self.motion[axle_index].reshape(SERIES_TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
         responses[: self.n] = (motion @ columns).reshape(self.n, -1, k)
         filter_states = taylor_terms(self.path(end_time) - self.path(meeting_times), SERIES_TERMS) @ self.noise
-        rows = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
+        rows = slice(self.n + axle_index * self.m, self.n + (axle_index + 1) * self.m)
         responses[rows] = filter_states.reshape(-1, self.m, k).transpose(1, 0, 2)
         return responses
 

@@ -21,21 +21,23 @@ class SpeedProfile:
     """
 
     def __init__(
-        self, times: Sequence[float], speeds: Sequence[float], file: str = "", key_path: str = "drive"
+        self, times: Sequence[float], speeds: Sequence[float], scene_path: str = "", key_path: str = "drive"
     ) -> None:
         self.times, self.speeds = np.array(times, float), np.array(speeds, float)
         if len(self.times) != len(self.speeds) or len(self.times) < 2:
             sizes = f"{len(self.times)} times, {len(self.speeds)} speeds"
-            raise InputError(file, key_path, sizes, "must be a table of two points or more, a time and a speed each")
+            raise InputError(
+                scene_path, key_path, sizes, "must be a table of two points or more, a time and a speed each"
+            )
         _check_values(
             self.speeds,
             (self.speeds >= 0.0) & np.isfinite(self.speeds),
             f"{key_path}.speed",
             "must be 0 or above, in m/s: the road is met from one side only",
-            file,
+            scene_path,
         )
         rises = np.append(True, np.diff(self.times) > 0.0) & np.isfinite(self.times)
-        _check_values(self.times, rises, f"{key_path}.time", "must rise from point to point, in s", file)
+        _check_values(self.times, rises, f"{key_path}.time", "must rise from point to point, in s", scene_path)
         pieces = np.diff(self.times)
         self.accelerations = np.append(np.diff(self.speeds) / pieces, 0.0)
         self.paths = np.append(0.0, np.cumsum(pieces * (self.speeds[1:] + self.speeds[:-1]) / 2.0))
@@ -52,14 +54,14 @@ class SpeedProfile:
         acceleration = np.where(since < 0.0, 0.0, self.accelerations[piece])
         return self.paths[piece] + since * (self.speeds[piece] + acceleration * since / 2.0)
 
-    def time(self, path: np.ndarray | float) -> np.ndarray:
+    def time(self, distance: np.ndarray | float) -> np.ndarray:
         """Time (s) at which a distance (m) along the path is passed; minus or plus infinity if it never is.
 
         At a place of standstill: the time of arrival.
         """
-        path = np.asarray(path, float)
-        piece = np.clip(np.searchsorted(self.paths, path, side="left") - 1, 0, None)
-        further = path - self.paths[piece]
+        distance = np.asarray(distance, float)
+        piece = np.clip(np.searchsorted(self.paths, distance, side="left") - 1, 0, None)
+        further = distance - self.paths[piece]
         start, acceleration = self.speeds[piece], np.where(further < 0.0, 0.0, self.accelerations[piece])
         root = np.sqrt(np.maximum(start**2 + 2.0 * acceleration * further, 0.0))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -67,11 +69,11 @@ class SpeedProfile:
         return self.times[piece] + since
 
 
-def _check_values(values: np.ndarray, valid: np.ndarray, key_path: str, allowed: str, file: str) -> None:
+def _check_values(values: np.ndarray, is_valid: np.ndarray, key_path: str, allowed_text: str, scene_path: str) -> None:
     """Raise InputError for the first value that is not valid."""
-    if not valid.all():
-        first_wrong = int(np.argmin(valid))
-        raise InputError(file, f"{key_path}.{first_wrong}", float(values[first_wrong]), allowed)
+    if not is_valid.all():
+        first_wrong = int(np.argmin(is_valid))
+        raise InputError(scene_path, f"{key_path}.{first_wrong}", float(values[first_wrong]), allowed_text)
 
 
 GAUSS_NODES = 5
@@ -98,7 +100,7 @@ class IntegrationPoints:
 
 
 def step_ends_of_drive(
-    profile: SpeedProfile,
+    speed_profile: SpeedProfile,
     begin_time: float,
     instants: Sequence[float] | np.ndarray,
     motion_rate: float,
@@ -111,41 +113,45 @@ def step_ends_of_drive(
     A step times the fastest rate of the motion (1/s) and of the road met (``road_rate`` in 1/m) is at most
     ``largest_rate_times_step``.
     """
-    within = [t for t in instants if begin_time < t < profile.times[-1]]
-    cuts = np.unique(np.concatenate([[begin_time], profile.times, within]))
+    within = [t for t in instants if begin_time < t < speed_profile.times[-1]]
+    cuts = np.unique(np.concatenate([[begin_time], speed_profile.times, within]))
     ends = [cuts[:1]]
     for start, stop in pairwise(cuts):
-        rate = max(motion_rate, road_rate * float(profile.speed(np.array([start, stop])).max()))
+        rate = max(motion_rate, road_rate * float(speed_profile.speed(np.array([start, stop])).max()))
         ends.append(
             np.linspace(start, stop, max(1, int(np.ceil(rate * (stop - start) / largest_rate_times_step))) + 1)[1:]
         )
     return np.concatenate(ends)
 
 
-def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> IntegrationPoints:
+def integration_points(
+    speed_profile: SpeedProfile, step_ends: np.ndarray, axle_distances: Sequence[float]
+) -> IntegrationPoints:
     """Integration points of the integral over the path, in cells. Cells end at every step's end, and wherever an axle
     passes a position at which a step ended.
 
-    ``distances`` (m) of the other axles behind the first: at such a place the speed may change its slope, or the
+    ``axle_distances`` (m) of the other axles behind the first: at such a place the speed may change its slope, or the
     vehicle may have stood. Near a standstill, where time depends on the root of the distance, cells become smaller.
     """
-    path, ends_after = profile.path(step_ends), step_ends[step_ends >= profile.times[0]]
-    stops = _passing_times(profile, path[profile.speed(step_ends) == 0.0], distances)
+    path, ends_after = speed_profile.path(step_ends), step_ends[step_ends >= speed_profile.times[0]]
+    stops = _passing_times(speed_profile, path[speed_profile.speed(step_ends) == 0.0], axle_distances)
     shrinking = (stops[:, None] + np.diff(ends_after).max() * STANDSTILL_CUTS).ravel()
-    cell_ends = np.sort(np.concatenate([_passing_times(profile, path, distances), shrinking]))
+    cell_ends = np.sort(np.concatenate([_passing_times(speed_profile, path, axle_distances), shrinking]))
     cell_ends = cell_ends[(cell_ends > ends_after[0]) & (cell_ends < ends_after[-1])]
     next_end = np.searchsorted(ends_after, cell_ends)
     is_separate = np.minimum(ends_after[next_end] - cell_ends, cell_ends - ends_after[next_end - 1]) > EQUAL_CUTS
     is_separate &= np.diff(cell_ends, prepend=-np.inf) > EQUAL_CUTS
     cuts = np.sort(np.concatenate([ends_after, cell_ends[is_separate]]))
     time = cuts[:-1, None] + np.diff(cuts)[:, None] * UNIT_POINTS
-    weight = np.diff(cuts)[:, None] * UNIT_WEIGHTS * profile.speed(time)
+    weight = np.diff(cuts)[:, None] * UNIT_WEIGHTS * speed_profile.speed(time)
     moving = weight.any(axis=1)
     time, weight = time[moving].ravel(), weight[moving].ravel()
     return IntegrationPoints(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
 
 
-def _passing_times(profile: SpeedProfile, positions: np.ndarray, distances: Sequence[float]) -> np.ndarray:
-    """Times (s) at which any axle, one of ``distances`` behind the first, reaches the positions of the first."""
-    different = np.unique(positions)
-    return np.concatenate([profile.time(different + distance) for distance in distances] or [np.zeros(0)])
+def _passing_times(
+    speed_profile: SpeedProfile, path_positions: np.ndarray, axle_distances: Sequence[float]
+) -> np.ndarray:
+    """Times (s) at which any axle, one of ``axle_distances`` behind the first, reaches the positions of the first."""
+    different = np.unique(path_positions)
+    return np.concatenate([speed_profile.time(different + distance) for distance in axle_distances] or [np.zeros(0)])

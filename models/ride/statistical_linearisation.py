@@ -106,7 +106,7 @@ def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
 
 
 def statistically_linear(
-    vehicle: SpatialVehicle, excitation: Excitation, speed: float, start_scale: float = 1.0
+    vehicle: SpatialVehicle, road_excitation: Excitation, speed: float, start_scale: float = 1.0
 ) -> StatisticallyLinear:
     """Statistical linearisation of a vehicle with nonlinear springs on a road, at a constant speed (m/s).
 
@@ -122,7 +122,7 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _FixedPointSearch(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
+    return _FixedPointSearch(vehicle, road_excitation, speed).iterate_to_fixed_point(start_scale)
 
 
 LinearisedLaw = tuple[float, float, float]
@@ -144,8 +144,8 @@ class _FixedPointSearch:
     """Fixed-point search for the equivalent gains of one vehicle, road and speed; extra outputs read the motion of the
     nonlinear springs."""
 
-    def __init__(self, vehicle: SpatialVehicle, excitation: Excitation, speed: float) -> None:
-        self.vehicle, self.excitation, self.speed = vehicle, excitation, speed
+    def __init__(self, vehicle: SpatialVehicle, road_excitation: Excitation, speed: float) -> None:
+        self.vehicle, self.excitation, self.speed = vehicle, road_excitation, speed
         self.springs = nonlinear_springs(vehicle)
         kinds: tuple[PartKind, ...] = ("travel", "travel rate")
         watched = [PartOutput(f"{kind} of {s.name}", kind, s.name) for kind in kinds for s in self.springs]
@@ -180,82 +180,97 @@ class _FixedPointSearch:
             gains = gains + relaxation_factor * (wanted - gains)
         return self._result(gains, moments, position, changes)
 
-    def _equivalent_gains(self, moments: _Moments) -> np.ndarray:
+    def _equivalent_gains(self, spring_moments: _Moments) -> np.ndarray:
         """Equivalent stiffness and damping (springs, 2) of the nonlinear springs at given moments of their motion."""
-        laws = zip(self.springs, self._linearised_laws(moments), strict=True)
+        laws = zip(self.springs, self._linearised_laws(spring_moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
-    def _linearised_laws(self, moments: _Moments) -> list[tuple[LinearisedLaw, LinearisedLaw]]:
+    def _linearised_laws(self, spring_moments: _Moments) -> list[tuple[LinearisedLaw, LinearisedLaw]]:
         """Statistical linearisation of each spring's force laws over travel and over rate: mean force, gain, and
         variance of the remaining force."""
-        moments_by_spring = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
+        moments_by_spring = zip(
+            self.springs, spring_moments.mean, spring_moments.travel, spring_moments.rate, strict=True
+        )
         return [
             (linearised_travel_law(s, mean, travel), linearised_rate_law(s, rate))
             for s, mean, travel, rate in moments_by_spring
         ]
 
-    def _linearised_vehicle(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
-        named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
+    def _linearised_vehicle(self, equivalent_gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
+        named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, equivalent_gains, strict=True)}
         return linearise(vehicle, self.speed, named)
 
-    def _spring_moments(self, gains: np.ndarray, position: np.ndarray) -> tuple[_Moments, np.ndarray]:
+    def _spring_moments(self, equivalent_gains: np.ndarray, mean_position: np.ndarray) -> tuple[_Moments, np.ndarray]:
         """Moments of the springs' motion in the linearised vehicle, and its mean position (n,)."""
-        linear = self._linearised_vehicle(gains, self.watched)
+        linear = self._linearised_vehicle(equivalent_gains, self.watched)
         deviation = stationary_covariance(vehicle_with_road(linear, self.excitation, self.speed)).deviation[
             len(self.vehicle.outputs) :
         ]
         if not np.isfinite(deviation).all():
             raise RunFailed("statistical linearisation", "the travel of a bent spring has no finite variance here")
         travel, rate = np.split(deviation, 2)
-        position = self._mean_position(travel, rate, position)
-        return _Moments(self.rows @ position, travel, rate), position
+        mean_position = self._mean_position(travel, rate, mean_position)
+        return _Moments(self.rows @ mean_position, travel, rate), mean_position
 
-    def _mean_position(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
+    def _mean_position(self, mean_travels: np.ndarray, mean_rates: np.ndarray, mean_position: np.ndarray) -> np.ndarray:
         """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
         stay 0."""
-        damper = np.array([linearised_rate_law(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
+        damper = np.array([linearised_rate_law(s, r)[0] for s, r in zip(self.springs, mean_rates, strict=True)])
         for _ in range(MOST_NEWTON_STEPS):
             laws = [
                 linearised_travel_law(s, m, d)
-                for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)
+                for s, m, d in zip(self.springs, self.rows @ mean_position, mean_travels, strict=True)
             ]
             force, gain = np.array([law[:2] for law in laws]).reshape(-1, 2).T
-            left = self.plain.stiffness @ position + self.rows.T @ (force + damper)
+            left = self.plain.stiffness @ mean_position + self.rows.T @ (force + damper)
             step = np.linalg.lstsq(self.plain.stiffness + self.rows.T * gain @ self.rows, left, rcond=1e-12)[0]
-            position = position - step
-            if abs(step).max(initial=0.0) <= 1e-15 + 1e-13 * abs(position).max(initial=0.0):
-                return position
+            mean_position = mean_position - step
+            if abs(step).max(initial=0.0) <= 1e-15 + 1e-13 * abs(mean_position).max(initial=0.0):
+                return mean_position
         raise RunFailed("statistical linearisation", "no mean position balances the mean forces of the bent springs")
 
     def _result(
-        self, gains: np.ndarray, moments: _Moments, position: np.ndarray, changes: list[float]
+        self,
+        equivalent_gains: np.ndarray,
+        spring_moments: _Moments,
+        mean_position: np.ndarray,
+        gain_changes: list[float],
     ) -> StatisticallyLinear:
-        linear = self._linearised_vehicle(gains, self.vehicle)
+        linear = self._linearised_vehicle(equivalent_gains, self.vehicle)
         system = vehicle_with_road(linear, self.excitation, self.speed)
         covariance = stationary_covariance(system)
-        left = self._left_out(linear, moments, system, covariance)
-        springs = {s.name: self._spring_in_motion(i, gains[i], moments) for i, s in enumerate(self.springs)}
+        left = self._left_out(linear, spring_moments, system, covariance)
+        springs = {
+            s.name: self._spring_in_motion(i, equivalent_gains[i], spring_moments) for i, s in enumerate(self.springs)
+        }
         outputs = zip(covariance.names, left, covariance.status, strict=True)
         sentences = tuple(_left_out_sentence(*output) for output in outputs)
         return StatisticallyLinear(
             linear,
             system,
             covariance,
-            self._output_means(springs, linear, position),
+            self._output_means(springs, linear, mean_position),
             springs,
             left,
             sentences,
-            tuple(changes),
+            tuple(gain_changes),
         )
 
-    def _spring_in_motion(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
-        s, mean, d, r = self.springs[i], float(moments.mean[i]), float(moments.travel[i]), float(moments.rate[i])
-        travel, rate = self._linearised_laws(moments)[i]
+    def _spring_in_motion(
+        self, spring_index: int, equivalent_gains: np.ndarray, spring_moments: _Moments
+    ) -> BentSpring:
+        s, mean, d, r = (
+            self.springs[spring_index],
+            float(spring_moments.mean[spring_index]),
+            float(spring_moments.travel[spring_index]),
+            float(spring_moments.rate[spring_index]),
+        )
+        travel, rate = self._linearised_laws(spring_moments)[spring_index]
         lost = travel[2] + rate[2]
-        total = lost + (gains[0] * d) ** 2 + (gains[1] * r) ** 2
+        total = lost + (equivalent_gains[0] * d) ** 2 + (equivalent_gains[1] * r) ** 2
         return BentSpring(
-            (float(gains[0]), float(gains[1])),
+            (float(equivalent_gains[0]), float(equivalent_gains[1])),
             mean,
             d,
             r,
@@ -263,29 +278,40 @@ class _FixedPointSearch:
             float(lost / total) if total else 0.0,
         )
 
-    def _output_means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
+    def _output_means(
+        self, springs: dict[str, BentSpring], linearised_vehicle: LinearVehicle, mean_position: np.ndarray
+    ) -> np.ndarray:
         """Means (p,) of the outputs. The mean force of a nonlinear spring is not its gain times its mean travel."""
-        means = np.array([output.displacement_factors @ position for output in linear.outputs])
+        means = np.array([output.displacement_factors @ mean_position for output in linearised_vehicle.outputs])
         for i, spec in enumerate(self.vehicle.outputs):
             if isinstance(spec, PartOutput) and spec.kind == "force" and spec.part in springs:
                 means[i] = springs[spec.part].force
         return means
 
     def _left_out(
-        self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: StationaryCovariance
+        self,
+        linearised_vehicle: LinearVehicle,
+        spring_moments: _Moments,
+        delayed_system: DelayedSystem,
+        covariance: StationaryCovariance,
     ) -> np.ndarray:
         """Ratios (p,) of the variance that the left-out forces would add to each output to the output's own variance;
         each force law counts separately."""
         if not self.springs:
-            return np.zeros(len(linear.outputs))
-        n = len(linear.mass)
-        jerk = self.rows @ system.A[n : 2 * n]
+            return np.zeros(len(linearised_vehicle.outputs))
+        n = len(linearised_vehicle.mass)
+        jerk = self.rows @ delayed_system.A[n : 2 * n]
         change = np.sqrt(np.einsum("si,ij,sj->s", jerk, covariance.P, jerk).clip(0.0))
         corners = np.concatenate(
-            [_corner_frequency(moments.rate, moments.travel), _corner_frequency(change, moments.rate)]
+            [
+                _corner_frequency(spring_moments.rate, spring_moments.travel),
+                _corner_frequency(change, spring_moments.rate),
+            ]
         )
-        lost = np.array([[law[2] for law in laws] for laws in self._linearised_laws(moments)]).T.ravel()
-        forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._spring_force_outputs())
+        lost = np.array([[law[2] for law in laws] for laws in self._linearised_laws(spring_moments)]).T.ravel()
+        forced = _vehicle_under_forces(
+            linearised_vehicle, np.vstack([self.rows, self.rows]), self._spring_force_outputs()
+        )
         noise = np.diag(np.sqrt(2.0 * corners * lost))
         added = stationary_covariance(
             vehicle_with_road(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0)
@@ -304,37 +330,47 @@ class _FixedPointSearch:
         )
 
 
-def _corner_frequency(rate_deviation: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+def _corner_frequency(rate_deviation: np.ndarray, travel_deviation: np.ndarray) -> np.ndarray:
     """Corner frequency (1/s) of the spectrum of a left-out force, from the standard deviations of the spring's motion
     and of its rate."""
-    return HARMONIC_RATIO * np.divide(rate_deviation, deviation, out=np.ones_like(rate_deviation), where=deviation > 0)
+    return HARMONIC_RATIO * np.divide(
+        rate_deviation, travel_deviation, out=np.ones_like(rate_deviation), where=travel_deviation > 0
+    )
 
 
-def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, direct_effects: np.ndarray) -> LinearVehicle:
+def _vehicle_under_forces(
+    linearised_vehicle: LinearVehicle, output_rows: np.ndarray, direct_effects: np.ndarray
+) -> LinearVehicle:
     """The vehicle excited by forces along rows (f, n) instead of road heights; ``direct_effects`` (p, f): direct effect
     of the forces on the outputs."""
-    no_roads = np.zeros(len(rows))
+    no_roads = np.zeros(len(output_rows))
     outputs = tuple(
         Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads)
-        for o, read in zip(linear.outputs, direct_effects, strict=True)
+        for o, read in zip(linearised_vehicle.outputs, direct_effects, strict=True)
     )
-    wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
-    return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
+    wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(output_rows)))
+    return replace(
+        linearised_vehicle,
+        road_stiffness=-output_rows.T,
+        road_damping=np.zeros(output_rows.T.shape),
+        wheels=wheels,
+        outputs=outputs,
+    )
 
 
-def _largest_gain_change(wanted_gains: np.ndarray, gains: np.ndarray) -> float:
+def _largest_gain_change(wanted_gains: np.ndarray, equivalent_gains: np.ndarray) -> float:
     """Largest relative change of a gain; a very small gain is related to the largest gain of its kind instead."""
     size = np.maximum(abs(wanted_gains), 1e-6 * abs(wanted_gains).max(axis=0, initial=np.finfo(float).tiny))
-    return float((abs(wanted_gains - gains) / size).max(initial=0.0))
+    return float((abs(wanted_gains - equivalent_gains) / size).max(initial=0.0))
 
 
-def _left_out_sentence(name: str, share: float, status: str) -> str:
+def _left_out_sentence(spring_name: str, left_out_share: float, variance_status: str) -> str:
     """Sentence on how much the left-out share of force may change an output's standard deviation."""
-    if status != "finite":
-        return f"{name}: {status}, so that there is no deviation to judge"
-    opening = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
+    if variance_status != "finite":
+        return f"{spring_name}: {variance_status}, so that there is no deviation to judge"
+    opening = f"{spring_name}: forces that the replaced springs leave out would add {100 * left_out_share:.2g} % to its variance: "
     for largest_share, error, shape in ERROR_GRADES:
-        if share <= largest_share:
+        if left_out_share <= largest_share:
             return opening + f"its deviation is good to {100 * error:.0f} %, and {shape}"
     return opening + (
         f"the covariance is no longer good (deviations were found up to {100 * EXTRAPOLATION_ERROR:.0f} % off, and far "
@@ -342,7 +378,9 @@ def _left_out_sentence(name: str, share: float, status: str) -> str:
     )
 
 
-def largest_error_seen(share: float) -> float:
+def largest_error_seen(left_out_share: float) -> float:
     """Largest relative error of an output's standard deviation that tests have seen at this share of left-out
     forces."""
-    return next((error for largest_share, error, _ in ERROR_GRADES if share <= largest_share), EXTRAPOLATION_ERROR)
+    return next(
+        (error for largest_share, error, _ in ERROR_GRADES if left_out_share <= largest_share), EXTRAPOLATION_ERROR
+    )

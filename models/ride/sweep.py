@@ -51,42 +51,46 @@ class Sweep:
         """Standard deviations (cases, speeds, outputs) in the outputs' units."""
         return np.sqrt(self.variance)
 
-    def of(self, case: str, output: str) -> np.ndarray:
+    def of(self, correlation_case: str, output_name: str) -> np.ndarray:
         """Standard deviations (speeds,) of one output in one correlation case."""
-        return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
+        return self.deviation[self.cases.index(correlation_case), :, self.outputs.index(output_name)]
 
 
 def variance_sweep(
-    vehicle: Callable[[float], LinearVehicle],
-    excitations: Mapping[str, Excitation],
+    linear_vehicle: Callable[[float], LinearVehicle],
+    excitation_by_case: Mapping[str, Excitation],
     speeds: Sequence[float] | np.ndarray,
-    filters: Mapping[str, str] | None = None,
-    accuracy: float = MATRIX_ACCURACY,
-    fast: bool = True,
+    weighting_filters: Mapping[str, str] | None = None,
+    matrix_accuracy: float = MATRIX_ACCURACY,
+    by_modes: bool = True,
 ) -> Sweep:
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
 
-    filters : weightings by output, as ``system_with_weightings`` takes them. fast : False sends every point the direct
+    weighting_filters : weightings by output, as ``system_with_weightings`` takes them. by_modes : False sends every point the direct
     way. Raises Unstable.
     """
     shared, direct, points = SharedModes(), Counter[str](), []
     for speed in speeds:
-        linear = vehicle(speed)
-        for excitation in excitations.values():
+        linear = linear_vehicle(speed)
+        for excitation in excitation_by_case.values():
             plain = vehicle_with_road(linear, excitation, speed)
-            system = system_with_weightings(plain, filters or {})
+            system = system_with_weightings(plain, weighting_filters or {})
             states = len(plain.A) - len(plain.B) * len(excitation.F)
-            point = _fast_variances(system, states, excitation, speed, shared, accuracy) if fast else DIRECT_BY_REQUEST
+            point = (
+                _fast_variances(system, states, excitation, speed, shared, matrix_accuracy)
+                if by_modes
+                else DIRECT_BY_REQUEST
+            )
             if isinstance(point, str):
                 direct[point] += 1
-                point = _direct_variances(system, speed, accuracy)
+                point = _direct_variances(system, speed, matrix_accuracy)
             points.append(point)
-    shape = (len(speeds), len(excitations), -1)
+    shape = (len(speeds), len(excitation_by_case), -1)
     variance, status, reason = (
         np.array(per_speed).reshape(shape).swapaxes(0, 1).copy() for per_speed in zip(*points, strict=True)
     )
-    units = *(output.unit for output in linear.outputs), *["m/s^2"] * len(filters or {})
-    return Sweep(tuple(excitations), np.array(speeds), system.names, units, variance, status, reason, direct)
+    units = *(output.unit for output in linear.outputs), *["m/s^2"] * len(weighting_filters or {})
+    return Sweep(tuple(excitation_by_case), np.array(speeds), system.names, units, variance, status, reason, direct)
 
 
 DIRECT_BY_REQUEST = "asked for"
@@ -95,30 +99,35 @@ OutputVariances = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
 """Variances, statuses and reasons of all outputs."""
 
 
-def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> OutputVariances:
+def _direct_variances(delayed_system: DelayedSystem, speed: float, matrix_accuracy: float) -> OutputVariances:
     """Variances from solving the Lyapunov equation; the error for an unstable vehicle states its speed."""
     try:
-        exact = stationary_covariance(system, accuracy)
+        exact = stationary_covariance(delayed_system, matrix_accuracy)
     except Unstable as error:
         raise Unstable(error.growth, error.frequency, speed) from None
     return exact.variance, exact.status, exact.reason
 
 
 def _fast_variances(
-    system: DelayedSystem,
+    delayed_system: DelayedSystem,
     vehicle_state_count: int,
-    excitation: Excitation,
+    road_excitation: Excitation,
     speed: float,
     shared_modes: "SharedModes",
-    accuracy: float,
+    matrix_accuracy: float,
 ) -> OutputVariances | str:
     """Variances by modal sums, or a text that says why these are unreliable here."""
-    quick = modal_variances(system, vehicle_state_count, excitation.F, speed, shared_modes)
+    quick = modal_variances(delayed_system, vehicle_state_count, road_excitation.F, speed, shared_modes)
     if isinstance(quick, str):
         return quick
-    no_growth = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
+    no_growth = Growth(np.zeros(len(delayed_system.C)), np.zeros(len(delayed_system.C), int))
     status, reason = variance_verdicts(
-        noise_arrivals(system).D, quick.variance, quick.rounding_floor, no_growth, quick.fastest_rate, accuracy
+        noise_arrivals(delayed_system).D,
+        quick.variance,
+        quick.rounding_floor,
+        no_growth,
+        quick.fastest_rate,
+        matrix_accuracy,
     )
     finite = np.array(status) == FINITE
     if (quick.relative_error[finite] > LARGEST_FAST_ERROR).any():
@@ -199,16 +208,20 @@ class ModalVariances:
 
 
 def modal_variances(
-    system: DelayedSystem, vehicle_state_count: int, road_filter: np.ndarray, speed: float, shared_modes: SharedModes
+    delayed_system: DelayedSystem,
+    vehicle_state_count: int,
+    road_filter: np.ndarray,
+    speed: float,
+    shared_modes: SharedModes,
 ) -> ModalVariances | str:
     """Variances of the outputs by modal sums, for a system as built by ``vehicle_with_road`` and
     ``system_with_weightings``; or a text that says why they cannot be computed here.
 
     vehicle_state_count : number of its states, which stand first; road_filter : the filter F (m, m) in path, one per
     axle behind them; the states of weightings stand last."""
-    axles = len(system.B)
+    axles = len(delayed_system.B)
     first_weighting_state = vehicle_state_count + axles * len(road_filter)
-    A = system.A
+    A = delayed_system.A
     vehicle_modes = shared_modes.of(A[:vehicle_state_count, :vehicle_state_count])
     path = shared_modes.of(road_filter)
     behind = shared_modes.of(A[first_weighting_state:, first_weighting_state:])
@@ -232,12 +245,12 @@ def modal_variances(
             values[1],
         )
     C0, C1, C2 = (
-        system.C[:, :vehicle_state_count],
-        system.C[:, vehicle_state_count:first_weighting_state],
-        system.C[:, first_weighting_state:],
+        delayed_system.C[:, :vehicle_state_count],
+        delayed_system.C[:, vehicle_state_count:first_weighting_state],
+        delayed_system.C[:, first_weighting_state:],
     )
     C = np.hstack([C0 @ vehicle_modes.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
-    arrivals, inputs = noise_arrivals(system), []
+    arrivals, inputs = noise_arrivals(delayed_system), []
     for b in arrivals.B:
         of_road = back @ b[vehicle_state_count:first_weighting_state]
         of_vehicle = vehicle_modes.inverse @ (b[:vehicle_state_count] - met @ of_road)
@@ -247,29 +260,40 @@ def modal_variances(
     return _variance_sum(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
 
 
-def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _coupling_solution(filter_block: Modes, coupling: np.ndarray, mode_values: np.ndarray) -> np.ndarray:
     """Solution X of A X + coupling = X diag(values), for a diagonalised A."""
-    return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
+    return filter_block.V @ ((filter_block.inverse @ coupling) / (mode_values - filter_block.values[:, None]))
 
 
 def _variance_sum(
-    s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
+    mode_values: np.ndarray,
+    C: np.ndarray,
+    noise_inputs: list[np.ndarray],
+    delays: list[float],
+    has_independent_axles: bool,
+    condition_number: float,
 ) -> ModalVariances | str:
     """Variances of the outputs y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the arrivals of
     noise at the axles."""
-    earlier_responses = np.zeros_like(inputs[0])
-    Q = np.zeros((len(s), len(s)), complex)
-    for j, b in enumerate(inputs):
-        if j and not independent:
-            earlier_responses = np.exp(s * (delays[j] - delays[j - 1]))[:, None] * (earlier_responses + inputs[j - 1])
+    earlier_responses = np.zeros_like(noise_inputs[0])
+    Q = np.zeros((len(mode_values), len(mode_values)), complex)
+    for j, b in enumerate(noise_inputs):
+        if j and not has_independent_axles:
+            earlier_responses = np.exp(mode_values * (delays[j] - delays[j - 1]))[:, None] * (
+                earlier_responses + noise_inputs[j - 1]
+            )
         Q += b @ b.conj().T + earlier_responses @ b.conj().T + b @ earlier_responses.conj().T
-    P = -Q / (s[:, None] + s.conj())
+    P = -Q / (mode_values[:, None] + mode_values.conj())
     variance = ((C @ P) * C.conj()).sum(axis=1).real
     size = ((abs(C) @ abs(P)) * abs(C)).sum(axis=1)
     if not np.isfinite(size).all():
         return "two eigenvalues of vehicle, road and weighting meet"
     floor = rounding_thresholds(C, P)
     relative_error = (
-        MACHINE_EPSILON * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
+        MACHINE_EPSILON
+        * condition_number
+        * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
     )
-    return ModalVariances(variance.clip(0.0), floor, np.where(size > floor, relative_error, 0.0), float(abs(s).max()))
+    return ModalVariances(
+        variance.clip(0.0), floor, np.where(size > floor, relative_error, 0.0), float(abs(mode_values).max())
+    )

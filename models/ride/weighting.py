@@ -64,20 +64,22 @@ class Weighting:
 
 
 def weighting_of_standard(
-    name: str, transition: tuple[float, float, float] | None, step: tuple[float, float, float, float] | None = None
+    weighting_name: str,
+    transition_section: tuple[float, float, float] | None,
+    upward_step: tuple[float, float, float, float] | None = None,
 ) -> Weighting:
     """Weighting from parameters of ISO 2631-1: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); frequencies in Hz.
 
     The band limit is that of all weightings for comfort and health: 0.4 to 100 Hz, Q = 1 / sqrt(2).
     """
     sections = [Section(100.0, 0.5**0.5, (1.0, 0.0, 0.0)), Section(0.4, 0.5**0.5, (0.0, 0.0, 1.0))]
-    if transition is not None:
-        f3, f4, q4 = transition
+    if transition_section is not None:
+        f3, f4, q4 = transition_section
         sections.append(Section(f4, q4, (1.0, f4 / f3, 0.0)))
-    if step is not None:
-        f5, q5, f6, q6 = step
+    if upward_step is not None:
+        f5, q5, f6, q6 = upward_step
         sections.append(Section(f6, q6, ((f5 / f6) ** 2, f5 / f6 / q5, 1.0)))
-    return Weighting(name, tuple(sections))
+    return Weighting(weighting_name, tuple(sections))
 
 
 WEIGHTINGS = {
@@ -94,42 +96,42 @@ HEALTH_FACTORS = {"x": 1.4, "y": 1.4, "z": 1.0}
 """Factors of the axes on the seat for health (Wd, Wd, Wk); for comfort all are 1."""
 
 
-def system_with_weightings(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem:
+def system_with_weightings(delayed_system: DelayedSystem, weighting_filters: Mapping[str, str]) -> DelayedSystem:
     """Returns the system with weighted outputs after its own: {"seat_z": "Wk"} adds the output "seat_z Wk".
 
     Filter states stand after the system's. A weighted output is finite even where white noise reaches the output
     itself: every weighting falls at high frequency. Raises InputError for an unknown output or weighting.
     """
-    for output, name in filters.items():
-        if output not in system.names:
-            raise InputError("", "weighted output", output, "must be an output of the vehicle", system.names)
+    for output, name in weighting_filters.items():
+        if output not in delayed_system.names:
+            raise InputError("", "weighted output", output, "must be an output of the vehicle", delayed_system.names)
         if name not in WEIGHTINGS:
             raise InputError("", f"weighting of {output}", name, "must be a weighting", tuple(WEIGHTINGS))
-    if not filters:
-        return system
-    rows = [system.names.index(output) for output in filters]
-    sections = [WEIGHTINGS[name].matrices() for name in filters.values()]
+    if not weighting_filters:
+        return delayed_system
+    rows = [delayed_system.names.index(output) for output in weighting_filters]
+    sections = [WEIGHTINGS[name].matrices() for name in weighting_filters.values()]
     A, inputs, C = (
         block_diag(*(a for a, _, _ in sections)),
         _block_columns([b for _, b, _ in sections]),
         _block_columns([c for *_, c in sections]),
     )
-    n, p = len(system.A), len(filters)
-    corner, silent = np.zeros((n, len(A))), np.zeros((p, system.B[0].shape[1]))
+    n, p = len(delayed_system.A), len(weighting_filters)
+    corner, silent = np.zeros((n, len(A))), np.zeros((p, delayed_system.B[0].shape[1]))
     return DelayedSystem(
-        A=np.block([[system.A, corner], [inputs @ system.C[rows], A]]),
-        B=tuple(np.vstack([B, inputs @ D[rows]]) for B, D in zip(system.B, system.D, strict=True)),
-        delays=system.delays,
-        C=np.block([[system.C, np.zeros((len(system.C), len(A)))], [np.zeros((p, n)), C.T]]),
-        D=tuple(np.vstack([D, silent]) for D in system.D),
-        names=(*system.names, *(f"{output} {name}" for output, name in filters.items())),
-        independent=system.independent,
+        A=np.block([[delayed_system.A, corner], [inputs @ delayed_system.C[rows], A]]),
+        B=tuple(np.vstack([B, inputs @ D[rows]]) for B, D in zip(delayed_system.B, delayed_system.D, strict=True)),
+        delays=delayed_system.delays,
+        C=np.block([[delayed_system.C, np.zeros((len(delayed_system.C), len(A)))], [np.zeros((p, n)), C.T]]),
+        D=tuple(np.vstack([D, silent]) for D in delayed_system.D),
+        names=(*delayed_system.names, *(f"{output} {name}" for output, name in weighting_filters.items())),
+        independent=delayed_system.independent,
     )
 
 
-def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]) -> float:
+def total_value(weighted_accelerations: Mapping[str, float], axis_factors: Mapping[str, float]) -> float:
     """Vibration total value a_v = sqrt(sum (k a_w)^2) of weighted rms accelerations (m/s^2), by axis (eq. 10)."""
-    return math.sqrt(sum((factors[axis] * value) ** 2 for axis, value in accelerations.items()))
+    return math.sqrt(sum((axis_factors[axis] * value) ** 2 for axis, value in weighted_accelerations.items()))
 
 
 def _block_columns(column_vectors: Sequence[np.ndarray]) -> np.ndarray:

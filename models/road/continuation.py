@@ -28,7 +28,7 @@ MOST_POINTS = 5_000_000
 
 
 def continued_road(
-    profile: RoadProfile, continuation_rule: str, needed_distance: float, file: object = ""
+    profile: RoadProfile, continuation_rule: str, needed_distance: float, scene_path: object = ""
 ) -> RoadProfile:
     """Road that reaches at least to ``needed_distance``; a road that is long enough is returned unchanged.
 
@@ -37,7 +37,7 @@ def continued_road(
     profile : any road; one without end is never changed
     continuation_rule : "mirrored" or "refused", see the top of this file
     needed_distance : last arc length that the run reads, m
-    file : the user's file, for the message
+    scene_path : the user's file, for the message
 
     Raises
     ------
@@ -45,23 +45,31 @@ def continued_road(
     """
     if continuation_rule not in CONTINUATION_RULES:
         raise InputError(
-            file, "continuation", continuation_rule, "must be a rule for what follows a road's end", CONTINUATION_RULES
+            scene_path,
+            "continuation",
+            continuation_rule,
+            "must be a rule for what follows a road's end",
+            CONTINUATION_RULES,
         )
     if not math.isfinite(needed_distance):
-        raise InputError(file, "distance", needed_distance, "must be a finite distance in m")
+        raise InputError(scene_path, "distance", needed_distance, "must be a finite distance in m")
     if not isinstance(profile, SplineProfile) or needed_distance <= profile.end + OVERRUN_SHARE * (
         profile.end - profile.start
     ):
         return profile
     if continuation_rule == "refused":
         allowed = f"the road ends at s = {profile.end:.6g} m and the run needs {needed_distance:.6g} m"
-        raise InputError(file, profile.name, None, f"{allowed}: shorten the run or declare continuation 'mirrored'")
-    station, height = _mirrored_points(profile, needed_distance, file)
+        raise InputError(
+            scene_path, profile.name, None, f"{allowed}: shorten the run or declare continuation 'mirrored'"
+        )
+    station, height = _mirrored_points(profile, needed_distance, scene_path)
     longer = type(profile).through(station, height, f"{profile.name}, mirrored")
     return replace(longer, window_length=profile.window_length)
 
 
-def _mirrored_points(profile: SplineProfile, needed_distance: float, file: object) -> tuple[np.ndarray, np.ndarray]:
+def _mirrored_points(
+    profile: SplineProfile, needed_distance: float, scene_path: object
+) -> tuple[np.ndarray, np.ndarray]:
     """Stations (m) and heights (m) of the road, reflected at its ends repeatedly until it reaches
     ``needed_distance``."""
     station, height = profile.points
@@ -69,7 +77,7 @@ def _mirrored_points(profile: SplineProfile, needed_distance: float, file: objec
     copies = math.ceil((needed_distance - profile.start) / length)
     if copies * gaps.size > MOST_POINTS:
         allowed = f"mirroring {profile.name!r} that far takes more than {MOST_POINTS} points"
-        raise InputError(file, "distance (m)", needed_distance, allowed)
+        raise InputError(scene_path, "distance (m)", needed_distance, allowed)
     stations, heights = [station], [height]
     for i in range(1, copies):
         points, back = (station, height), (profile.end - (station[::-1] - profile.start), height[::-1])
@@ -79,36 +87,38 @@ def _mirrored_points(profile: SplineProfile, needed_distance: float, file: objec
     return np.concatenate(stations), np.concatenate(heights)
 
 
-def run_in(profile: SplineProfile, length: float = RUN_IN_LENGTH, reference: float | None = None) -> SplineProfile:
+def run_in(
+    profile: SplineProfile, transition_length: float = RUN_IN_LENGTH, reference_height_value: float | None = None
+) -> SplineProfile:
     """Road that rises from the flat: height 0 up to its first point, then w(s / length) (zeta - reference).
 
-    w is the quintic smoothstep, so height, slope and curvature are continuous; beyond ``length`` the road
-    is the measured one, moved by ``reference``. Without moving it, a road surveyed at 200 m above the sea
+    w is the quintic smoothstep, so height, slope and curvature are continuous; beyond ``transition_length`` the road
+    is the measured one, moved by ``reference_height_value``. Without moving it, a road surveyed at 200 m above the sea
     would begin with a cliff.
 
     Parameters
     ----------
     profile : spline through measured points
-    length : of the run-in, m
-    reference : height (m, positive down) that becomes 0. None takes the mean over the run-in, which puts
+    transition_length : of the run-in, m
+    reference_height_value : height (m, positive down) that becomes 0. None takes the mean over the run-in, which puts
         the least step into it. Two tracks of one road must share one value, or the bank between them is
         lost: pass ``reference_height`` of their mean track.
 
     Raises
     ------
-    InputError : ``length`` is not positive or is longer than the road
+    InputError : ``transition_length`` is not positive or is longer than the road
     """
-    mean = reference_height(profile, length)  # also checks the length
-    level = mean if reference is None else float(reference)
+    mean = reference_height(profile, transition_length)  # also checks the length
+    level = mean if reference_height_value is None else float(reference_height_value)
     coefficients = profile.coefficients.copy()
     coefficients[:, 3] -= level
-    return replace(profile, coefficients=coefficients, window_length=float(length))
+    return replace(profile, coefficients=coefficients, window_length=float(transition_length))
 
 
-def reference_height(profile: SplineProfile, length: float = RUN_IN_LENGTH) -> float:
-    """Mean height (m, positive down) over the first ``length`` m of a road, which must be as long."""
-    if not 0.0 < length <= profile.end - profile.start:
+def reference_height(profile: SplineProfile, averaging_length: float = RUN_IN_LENGTH) -> float:
+    """Mean height (m, positive down) over the first ``averaging_length`` m of a road, which must be as long."""
+    if not 0.0 < averaging_length <= profile.end - profile.start:
         allowed = f"must be above 0 and at most the road's own {profile.end - profile.start:.6g} m"
-        raise InputError(profile.name, "run-in length (m)", length, allowed)
+        raise InputError(profile.name, "run-in length (m)", averaging_length, allowed)
     raw = replace(profile, window_length=0.0)
-    return float(raw.sample_uniform(profile.start, length / 512, 513)[0].mean())
+    return float(raw.sample_uniform(profile.start, averaging_length / 512, 513)[0].mean())

@@ -47,27 +47,27 @@ class GradedRoad:
         """Length (m) of the finest detail: that of the profile, or a quarter of the transition."""
         return min(self.profile.finest, TRANSITION_LENGTH / 4.0)
 
-    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
-        height, slope = self.profile.height_and_slope(s)
-        climb_and_slope = self._climb_and_slope(np.asarray(s, dtype=float))
+    def height_and_slope(self, stations: ArrayLike) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at the arc lengths ``stations`` (m), in the shape of ``stations``."""
+        height, slope = self.profile.height_and_slope(stations)
+        climb_and_slope = self._climb_and_slope(np.asarray(stations, dtype=float))
         return height + climb_and_slope[0], slope + climb_and_slope[1]
 
-    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start_station: float, station_step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
-        height, slope = self.profile.sample_uniform(start_station, step, sample_count)
-        climb_and_slope = self._climb_and_slope(start_station + step * np.arange(sample_count))
+        height, slope = self.profile.sample_uniform(start_station, station_step, sample_count)
+        climb_and_slope = self._climb_and_slope(start_station + station_step * np.arange(sample_count))
         return height + climb_and_slope[0], slope + climb_and_slope[1]
 
-    def height_slope_at(self, s: float) -> tuple[float, float]:
-        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
-        height, slope = self.profile.height_slope_at(s)
-        climb_and_slope = self._climb_and_slope(np.asarray(s, dtype=float))
+    def height_slope_at(self, stations: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``stations`` (m)."""
+        height, slope = self.profile.height_slope_at(stations)
+        climb_and_slope = self._climb_and_slope(np.asarray(stations, dtype=float))
         return height + float(climb_and_slope[0]), slope + float(climb_and_slope[1])
 
-    def _climb_and_slope(self, s: np.ndarray) -> HeightsAndSlopes:
-        """Heights (m) and slopes that the grade adds at stations ``s``."""
-        beyond = (s - self.start) / TRANSITION_LENGTH
+    def _climb_and_slope(self, stations: np.ndarray) -> HeightsAndSlopes:
+        """Heights (m) and slopes that the grade adds at stations ``stations``."""
+        beyond = (stations - self.start) / TRANSITION_LENGTH
         x, steepness = np.clip(beyond, 0.0, 1.0), math.tan(self.grade)
         risen = x**4 * (2.5 - x * (3.0 - x)) + np.maximum(beyond - 1.0, 0.0)
         return -steepness * TRANSITION_LENGTH * risen, -steepness * x**3 * (10.0 - x * (15.0 - 6.0 * x))

@@ -46,15 +46,15 @@ class DensityTerm:
         if not (math.isfinite(self.waviness) and self.waviness > 1.0):
             raise InputError("", "waviness", self.waviness, "must be above 1: else the heights have no variance")
 
-    def density(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
-        """Cross density (m^3) of tracks ``distance`` (m) apart, or the density of one track at distance 0; infinite
+    def density(self, wavenumber: np.ndarray, track_distance: float) -> np.ndarray:
+        """Cross density (m^3) of tracks ``track_distance`` (m) apart, or the density of one track at distance 0; infinite
         where wavenumber and corner are both 0."""
         from scipy.special import gamma, kv
 
         sigma, order = np.hypot(self.corner, wavenumber), self.waviness / 2.0
         with np.errstate(divide="ignore"):
             track = self.level * sigma**-self.waviness
-        x = np.asarray(sigma * abs(distance))
+        x = np.asarray(sigma * abs(track_distance))
         coherency = np.ones(x.shape)
         is_distant = x > 1e-8  # below, the coherency is 1 to rounding
         coherency[is_distant] = 2.0 * (x[is_distant] / 2.0) ** order * kv(order, x[is_distant]) / gamma(order)
@@ -72,21 +72,23 @@ class IsotropicRoad:
         """Two-sided spectral density (m^3) of any track over the wavenumber (rad/m)."""
         return self.cross_spectrum(wavenumber, 0.0)
 
-    def cross_spectrum(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
-        """Two-sided cross density (m^3) of two tracks ``distance`` (m) apart; real."""
-        return np.sum([density_part.density(wavenumber, distance) for density_part in self.parts], axis=0)
+    def cross_spectrum(self, wavenumber: np.ndarray, track_distance: float) -> np.ndarray:
+        """Two-sided cross density (m^3) of two tracks ``track_distance`` (m) apart; real."""
+        return np.sum([density_part.density(wavenumber, track_distance) for density_part in self.parts], axis=0)
 
-    def coherency(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
-        """Coherency of two tracks ``distance`` (m) apart: ratio of their cross density to the density of one track."""
-        return self.cross_spectrum(wavenumber, distance) / self.spectrum(wavenumber)
+    def coherency(self, wavenumber: np.ndarray, track_distance: float) -> np.ndarray:
+        """Coherency of two tracks ``track_distance`` (m) apart: ratio of their cross density to the density of one track."""
+        return self.cross_spectrum(wavenumber, track_distance) / self.spectrum(wavenumber)
 
 
-def isotropic_road_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
+def isotropic_road_like(two_track_road: TwoTrackRoad, lateral_position: float) -> IsotropicRoad:
     """Isotropic road with the same spectrum as the two-track road has on its track at y (m). Raises InputError
     unless both processes of that road are of first order."""
-    if road.mean.cutoff is not None or road.roll.cutoff is not None:
-        raise InputError("", "cutoff", road.mean.cutoff or road.roll.cutoff, "is not known to isotropic roads")
-    shares = ((road.mean, 1.0), (road.roll, y * y))
+    if two_track_road.mean.cutoff is not None or two_track_road.roll.cutoff is not None:
+        raise InputError(
+            "", "cutoff", two_track_road.mean.cutoff or two_track_road.roll.cutoff, "is not known to isotropic roads"
+        )
+    shares = ((two_track_road.mean, 1.0), (two_track_road.roll, lateral_position * lateral_position))
     return IsotropicRoad(
         tuple(
             DensityTerm(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity
@@ -94,12 +96,16 @@ def isotropic_road_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
     )
 
 
-def isotropic_class(road_class: str, corner: float = 0.0, level_convention: str = "one-sided") -> IsotropicRoad:
+def isotropic_class(
+    road_class: str, corner_wavenumber: float = 0.0, level_convention: str = "one-sided"
+) -> IsotropicRoad:
     """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
-    return IsotropicRoad((DensityTerm(level_of_class(road_class, level_convention), corner),))
+    return IsotropicRoad((DensityTerm(level_of_class(road_class, level_convention), corner_wavenumber),))
 
 
-def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:
+def cross_spectrum_of(
+    covariance: Callable[[float], float], wavenumber: Sequence[float], track_distance: float
+) -> np.ndarray:
     """Cross density (m^3) of two tracks by numerical integration, for any autocovariance R(r) in m^2 of a track;
     wavenumbers above 0 (rad/m).
 
@@ -107,15 +113,15 @@ def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence
     """
     from scipy.integrate import quad
 
-    scale = covariance(abs(distance))
+    scale = covariance(abs(track_distance))
 
-    def density_at(k: float) -> float:
+    def density_at(single_wavenumber: float) -> float:
         integral = quad(
-            lambda x: covariance(math.hypot(x, distance)) / scale,
+            lambda x: covariance(math.hypot(x, track_distance)) / scale,
             0.0,
             math.inf,
             weight="cos",
-            wvar=k,
+            wvar=single_wavenumber,
             epsabs=1e-12,
             limlst=500,
         )

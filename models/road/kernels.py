@@ -33,49 +33,51 @@ class Waves(NamedTuple):
 
 
 @njit(cache=True)
-def smoothstep(x: float) -> tuple[float, float]:
+def smoothstep(share_of_transition: float) -> tuple[float, float]:
     """Quintic smoothstep 10 x^3 - 15 x^4 + 6 x^5 and its derivative; 0 before x = 0, 1 after x = 1, C2 at both ends."""
-    if x <= 0.0:
+    if share_of_transition <= 0.0:
         return 0.0, 0.0
-    if x >= 1.0:
+    if share_of_transition >= 1.0:
         return 1.0, 0.0
-    return x * x * x * (10.0 - x * (15.0 - 6.0 * x)), 30.0 * x * x * (1.0 - x) * (1.0 - x)
+    return share_of_transition * share_of_transition * share_of_transition * (
+        10.0 - share_of_transition * (15.0 - 6.0 * share_of_transition)
+    ), 30.0 * share_of_transition * share_of_transition * (1.0 - share_of_transition) * (1.0 - share_of_transition)
 
 
 @njit(cache=True)
-def fade_in(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
+def fade_in(distance: float, window_length: float, height: float, slope: float) -> tuple[float, float]:
     """Height (m) and slope of ``w(distance / window) * height``, w the smoothstep; 0 for distances up to 0; a window of
     0 means no windowing."""
     if distance <= 0.0:
         return 0.0, 0.0
-    if distance >= window:
+    if distance >= window_length:
         return height, slope
-    weight, rate = smoothstep(distance / window)
-    return weight * height, weight * slope + rate / window * height
+    weight, rate = smoothstep(distance / window_length)
+    return weight * height, weight * slope + rate / window_length * height
 
 
 @njit(cache=True)
-def sines_at(s, amplitude, wavenumber, phase, window):
+def sines_at(station, amplitude, wavenumber, phase, window_length):
     """Height (m, down) and slope of a sum of sines at a station s (m). The arrays of ``Waves`` are separate arguments,
     since passing the tuple from Python doubles the time."""
     height, slope = 0.0, 0.0
-    if s > 0.0:
+    if station > 0.0:
         for i in range(amplitude.size):
-            angle = wavenumber[i] * s + phase[i]
+            angle = wavenumber[i] * station + phase[i]
             height -= amplitude[i] * math.sin(angle)
             slope -= amplitude[i] * wavenumber[i] * math.cos(angle)
-    return fade_in(s, window, height, slope)
+    return fade_in(station, window_length, height, slope)
 
 
 @njit(cache=True)
-def fill_sines(s, waves, height, slope):
-    """Fill ``height`` (m, down) and ``slope`` of a sum of sines at every station of the flat array ``s`` (m)."""
-    for j in range(s.size):
-        height[j], slope[j] = sines_at(s[j], waves.amplitude, waves.wavenumber, waves.phase, waves.window)
+def fill_sines(station, waves, height, slope):
+    """Fill ``height`` (m, down) and ``slope`` of a sum of sines at every station of the flat array ``station`` (m)."""
+    for j in range(station.size):
+        height[j], slope[j] = sines_at(station[j], waves.amplitude, waves.wavenumber, waves.phase, waves.window)
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
+def _rotate_waves(sine, cosine, step_sine, step_cosine, wavenumber):
     """Sums of all waves and of their slopes at the present sample; rotates every wave to the next sample.
 
     The waves are the inner loop because they are independent: the sums may be reordered (``reassoc``),
@@ -86,13 +88,13 @@ def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
         u, v = sine[i], cosine[i]
         height -= u
         slope -= wavenumber[i] * v
-        sine[i] = u * turn_cosine[i] + v * turn_sine[i]
-        cosine[i] = v * turn_cosine[i] - u * turn_sine[i]
+        sine[i] = u * step_cosine[i] + v * step_sine[i]
+        cosine[i] = v * step_cosine[i] - u * step_sine[i]
     return height, slope
 
 
 @njit(cache=True)
-def sines_uniform(start_station, step, waves, height, slope):
+def sines_uniform(start_station, station_step, waves, height, slope):
     """Fill ``height`` (m, down) and ``slope`` of a sum of sines at ``start_station + j step`` by complex rotation,
     exact every 128 samples."""
     amplitude, wavenumber, phase, window = waves
@@ -101,29 +103,29 @@ def sines_uniform(start_station, step, waves, height, slope):
     sine, cosine, turn_sine, turn_cosine, number = work[0], work[1], work[2], work[3], work[4]
     for i in range(n):  # a slice assigned at once takes seconds to compile
         number[i] = wavenumber[i]
-        turn_sine[i], turn_cosine[i] = math.sin(number[i] * step), math.cos(number[i] * step)
+        turn_sine[i], turn_cosine[i] = math.sin(number[i] * station_step), math.cos(number[i] * station_step)
     for first in range(0, height.size, RESYNCHRONISE):
-        s = start_station + first * step
+        s = start_station + first * station_step
         for i in range(n):
             angle = number[i] * s + phase[i]
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
         for j in range(first, min(first + RESYNCHRONISE, height.size)):
             value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
-            height[j], slope[j] = fade_in(start_station + j * step, window, value, rate)
+            height[j], slope[j] = fade_in(start_station + j * station_step, window, value, rate)
 
 
 @njit(cache=True)
-def piece_index(stations, s, guessed_piece):
-    """Index of the spline's piece that contains station ``s``; the search starts at the piece found last,
+def piece_index(stations, station, guessed_piece):
+    """Index of the spline's piece that contains station ``station``; the search starts at the piece found last,
     ``guessed_piece``."""
     last_piece = stations.size - 2
     for i in range(guessed_piece, min(guessed_piece + 2, last_piece + 1)):
-        if stations[i] <= s < stations[i + 1]:
+        if stations[i] <= station < stations[i + 1]:
             return i
     low, high = 0, last_piece
     while low < high:
         middle = (low + high + 1) // 2
-        if stations[middle] <= s:
+        if stations[middle] <= station:
             low = middle
         else:
             high = middle - 1
@@ -131,39 +133,44 @@ def piece_index(stations, s, guessed_piece):
 
 
 @njit(cache=True)
-def cubic_at(s, piece, stations, coefficients, window):
+def cubic_at(station, piece_number, stations, coefficients, window_length):
     """Height (m, down) and slope of a cubic piece (coefficient rows from the highest power), multiplied by the window
     that starts at the first station."""
-    d = s - stations[piece]
-    a, b, c, e = coefficients[piece, 0], coefficients[piece, 1], coefficients[piece, 2], coefficients[piece, 3]
+    d = station - stations[piece_number]
+    a, b, c, e = (
+        coefficients[piece_number, 0],
+        coefficients[piece_number, 1],
+        coefficients[piece_number, 2],
+        coefficients[piece_number, 3],
+    )
     height = ((a * d + b) * d + c) * d + e
     slope = (3.0 * a * d + 2.0 * b) * d + c
-    if window > 0.0:
-        return fade_in(s - stations[0], window, height, slope)
+    if window_length > 0.0:
+        return fade_in(station - stations[0], window_length, height, slope)
     return height, slope
 
 
 @njit(cache=True)
-def cubic_at_station(s, stations, coefficients, window):
+def cubic_at_station(station, stations, coefficients, window_length):
     """Height (m, down) and slope of a piecewise cubic road at a station s (m)."""
-    return cubic_at(s, piece_index(stations, s, 0), stations, coefficients, window)
+    return cubic_at(station, piece_index(stations, station, 0), stations, coefficients, window_length)
 
 
 @njit(cache=True)
-def fill_cubics(s, stations, coefficients, window, height, slope):
-    """Fill ``height`` (m, down) and ``slope`` of a piecewise cubic road at every station of the flat array ``s``
+def fill_cubics(station, stations, coefficients, window_length, height, slope):
+    """Fill ``height`` (m, down) and ``slope`` of a piecewise cubic road at every station of the flat array ``station``
     (m)."""
     piece = 0
-    for j in range(s.size):
-        piece = piece_index(stations, s[j], piece)
-        height[j], slope[j] = cubic_at(s[j], piece, stations, coefficients, window)
+    for j in range(station.size):
+        piece = piece_index(stations, station[j], piece)
+        height[j], slope[j] = cubic_at(station[j], piece, stations, coefficients, window_length)
 
 
 @njit(cache=True)
-def cubics_uniform(start_station, step, stations, coefficients, window, height, slope):
+def cubics_uniform(start_station, station_step, stations, coefficients, window_length, height, slope):
     """Fill ``height`` (m, down) and ``slope`` of a piecewise cubic road at ``start_station + j step`` (m)."""
     piece = 0
     for j in range(height.size):
-        s = start_station + j * step
+        s = start_station + j * station_step
         piece = piece_index(stations, s, piece)
-        height[j], slope[j] = cubic_at(s, piece, stations, coefficients, window)
+        height[j], slope[j] = cubic_at(s, piece, stations, coefficients, window_length)

@@ -75,7 +75,7 @@ class TrackSpectra:
 
 
 def read_tracks(
-    path: str | Path,
+    road_path: str | Path,
     track_width: float = TRACK_WIDTH,
     *,
     lateral_offset: float = 0.0,
@@ -92,54 +92,59 @@ def read_tracks(
     InputError : as the readers; a file of another kind; a section that is not on the road; no width
     """
     if not (math.isfinite(track_width) and track_width > 0.0):
-        raise InputError(path, "track_width", track_width, "must be above 0, in m")
-    suffix = Path(path).suffix.lower()
+        raise InputError(road_path, "track_width", track_width, "must be above 0, in m")
+    suffix = Path(road_path).suffix.lower()
     if suffix == ".csv":
-        left, right = read_csv_tracks(path)
+        left, right = read_csv_tracks(road_path)
     elif suffix == ".crg":
         left, right = (
-            read_opencrg(path, side, lateral_offset=lateral_offset, track_width=track_width)
+            read_opencrg(road_path, side, lateral_offset=lateral_offset, track_width=track_width)
             for side in ("left", "right")
         )
     else:
-        raise InputError(path, "", None, "must be a road in OpenCRG (.crg) or in CSV (.csv)")
+        raise InputError(road_path, "", None, "must be a road in OpenCRG (.crg) or in CSV (.csv)")
     start, end = (
         (left.start if first_station is None else first_station),
         (left.end if last_station is None else last_station),
     )
     if not left.start <= start < end <= left.end:
-        raise InputError(path, "section (m)", (start, end), f"must lie between {left.start:g} and {left.end:g}")
+        raise InputError(road_path, "section (m)", (start, end), f"must lie between {left.start:g} and {left.end:g}")
     step = left.finest
     count = math.floor((end - start) / step * (1.0 + 1e-12)) + 1
     heights_up = [-track.sample_uniform(start, step, count)[0] for track in (left, right)]
-    return MeasuredTracks(heights_up[0], heights_up[1], step, track_width / 2.0, Path(path).name)
+    return MeasuredTracks(heights_up[0], heights_up[1], step, track_width / 2.0, Path(road_path).name)
 
 
-def track_spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
+def track_spectra(measured_tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
     """Spectral densities of two tracks by Welch's method; ``window_length`` in m, by default such that eight windows
     fit.
 
     Raises InputError for windows of fewer than 16 stations or fewer than two of them: no density at all.
     """
-    count = len(tracks.left)
-    wanted = 2.0 * tracks.length / (WELCH_WINDOWS + 1) if window_length is None else window_length
-    size = math.floor(wanted / tracks.increment + 1e-9)
+    count = len(measured_tracks.left)
+    wanted = 2.0 * measured_tracks.length / (WELCH_WINDOWS + 1) if window_length is None else window_length
+    size = math.floor(wanted / measured_tracks.increment + 1e-9)
     windows = (count - size // 2) // (size - size // 2) if size >= 16 else 0
     if windows < 2:
-        allowed = f"two windows or more must fit on the {tracks.length:g} m, each of 16 stations or more"
-        raise InputError(tracks.name, "window_length (m)", wanted, allowed)
-    b = tracks.half_track
+        allowed = f"two windows or more must fit on the {measured_tracks.length:g} m, each of 16 stations or more"
+        raise InputError(measured_tracks.name, "window_length (m)", wanted, allowed)
+    b = measured_tracks.half_track
 
-    def density(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def density(first_signal: np.ndarray, second_signal: np.ndarray) -> np.ndarray:
         from scipy.signal import csd
 
-        n, cross_density = csd(x, y, 1.0 / tracks.increment, "hann", size, size // 2, detrend="linear")
+        n, cross_density = csd(
+            first_signal, second_signal, 1.0 / measured_tracks.increment, "hann", size, size // 2, detrend="linear"
+        )
         inner = (n > 0.0) & (n < n[-1])  # the ends stand once where all others stand for +- n
         return np.asarray(cross_density[inner] / (4.0 * math.pi))  # one-sided over n, to two-sided over 2 pi n
 
-    left, right = density(tracks.left, tracks.left).real, density(tracks.right, tracks.right).real
-    cross = density(tracks.left, tracks.right)
-    wavenumber = 2.0 * math.pi / (size * tracks.increment) * np.arange(1, len(left) + 1)
+    left, right = (
+        density(measured_tracks.left, measured_tracks.left).real,
+        density(measured_tracks.right, measured_tracks.right).real,
+    )
+    cross = density(measured_tracks.left, measured_tracks.right)
+    wavenumber = 2.0 * math.pi / (size * measured_tracks.increment) * np.arange(1, len(left) + 1)
     mean, roll = (left + right + 2.0 * cross.real) / 4.0, (left + right - 2.0 * cross.real) / (4.0 * b**2)
     mean_roll = (left - right - 2j * cross.imag) / (4.0 * b)
     freedom = 2.0 * windows / (1.0 + (1.0 - 1.0 / windows) / 18.0)

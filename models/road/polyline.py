@@ -26,8 +26,8 @@ class PolylineProfile(SplineProfile):
         return cls(s, pieces, name=name)
 
 
-def polyline_through(road: SplineProfile | tuple[ArrayLike, ArrayLike]) -> PolylineProfile:
+def polyline_through(road_points: SplineProfile | tuple[ArrayLike, ArrayLike]) -> PolylineProfile:
     """Polyline through the points of a spline, or through (stations, heights) in m."""
-    if isinstance(road, SplineProfile):
-        return PolylineProfile.through(*road.points, f"{road.name}, polyline")
-    return PolylineProfile.through(*road)
+    if isinstance(road_points, SplineProfile):
+        return PolylineProfile.through(*road_points.points, f"{road_points.name}, polyline")
+    return PolylineProfile.through(*road_points)

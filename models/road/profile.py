@@ -39,16 +39,16 @@ class RoadProfile(Protocol):
         """Length (m) of the finest detail, which limits the step of adaptive solvers."""
         ...
 
-    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
+    def height_and_slope(self, stations: ArrayLike) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at the arc lengths ``stations`` (m), in the shape of ``stations``."""
         ...
 
-    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start_station: float, station_step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
         ...
 
-    def height_slope_at(self, s: float) -> tuple[float, float]:
-        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
+    def height_slope_at(self, stations: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``stations`` (m)."""
         ...
 
 
@@ -98,28 +98,28 @@ class SineProfile:
         """Length (m) of the finest detail: a quarter of the shortest wavelength."""
         return float(0.5 * math.pi / np.abs(self.wavenumber).max())
 
-    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
-        flat, shape = _flat_stations(s)
+    def height_and_slope(self, stations: ArrayLike) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at the arc lengths ``stations`` (m), in the shape of ``stations``."""
+        flat, shape = _flat_stations(stations)
         height, slope = np.empty_like(flat), np.empty_like(flat)
         kernels.fill_sines(flat, self.waves, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start_station: float, station_step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1.
 
         Agrees with :meth:`height_and_slope` to about 1e-14 of the sum of the amplitudes (slopes: of the
         sum of amplitude times wavenumber), as long as the rounding of s itself, 1e-16 of s times the
         wavenumber, stays below that.
         """
-        start_station, step = _checked_number(start_station, "start"), _checked_number(step, "step")
+        start_station, station_step = _checked_number(start_station, "start"), _checked_number(station_step, "step")
         height, slope = np.empty(sample_count), np.empty(sample_count)
-        kernels.sines_uniform(start_station, step, self.waves, height, slope)
+        kernels.sines_uniform(start_station, station_step, self.waves, height, slope)
         return height, slope
 
-    def height_slope_at(self, s: float) -> tuple[float, float]:
-        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
-        return kernels.sines_at(float(s), self.amplitude, self.wavenumber, self.phase, self.window_length)
+    def height_slope_at(self, stations: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``stations`` (m)."""
+        return kernels.sines_at(float(stations), self.amplitude, self.wavenumber, self.phase, self.window_length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,29 +198,29 @@ class SplineProfile:
         end_height = kernels.cubic_at_station(self.end, self.station, self.coefficients, 0.0)[0]
         return self.station, np.append(self.coefficients[:, 3], end_height)
 
-    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
-        flat, shape = _flat_stations(s)
+    def height_and_slope(self, stations: ArrayLike) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at the arc lengths ``stations`` (m), in the shape of ``stations``."""
+        flat, shape = _flat_stations(stations)
         if flat.size:
             self._check_extent(float(flat.min()), float(flat.max()))
         height, slope = np.empty_like(flat), np.empty_like(flat)
         kernels.fill_cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start_station: float, station_step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
-        start_station, step = _checked_number(start_station, "start"), _checked_number(step, "step")
-        last_station = start_station + max(sample_count - 1, 0) * step
+        start_station, station_step = _checked_number(start_station, "start"), _checked_number(station_step, "step")
+        last_station = start_station + max(sample_count - 1, 0) * station_step
         self._check_extent(min(start_station, last_station), max(start_station, last_station))
         height, slope = np.empty(sample_count), np.empty(sample_count)
         road = (self.station, self.coefficients, self.window_length)
-        kernels.cubics_uniform(start_station, step, *road, height, slope)
+        kernels.cubics_uniform(start_station, station_step, *road, height, slope)
         return height, slope
 
-    def height_slope_at(self, s: float) -> tuple[float, float]:
-        """Height (m, positive down) and slope at one arc length ``s`` (m)."""
-        self._check_extent(s, s)
-        return kernels.cubic_at_station(float(s), self.station, self.coefficients, self.window_length)
+    def height_slope_at(self, stations: float) -> tuple[float, float]:
+        """Height (m, positive down) and slope at one arc length ``stations`` (m)."""
+        self._check_extent(stations, stations)
+        return kernels.cubic_at_station(float(stations), self.station, self.coefficients, self.window_length)
 
     def _check_extent(self, first_station: float, last_station: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
@@ -236,37 +236,39 @@ class SplineProfile:
             )
 
 
-def _read_only_copy(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
+def _read_only_copy(values: ArrayLike, field_name: str, dimension_count: int) -> np.ndarray:
     """Read-only, contiguous copy of an array, checked to have finite values only."""
     array = np.array(values, dtype=float, order="C")
-    if array.ndim != dimensions or not np.isfinite(array).all():
-        raise InputError("", field, None, f"must be an array of finite numbers with {dimensions} dimension(s)")
+    if array.ndim != dimension_count or not np.isfinite(array).all():
+        raise InputError(
+            "", field_name, None, f"must be an array of finite numbers with {dimension_count} dimension(s)"
+        )
     array.setflags(write=False)
     return array
 
 
-def _flat_stations(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
+def _flat_stations(stations: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
     """Arc lengths as a flat contiguous array, and the original shape."""
-    array = np.asarray(s, dtype=float)
+    array = np.asarray(stations, dtype=float)
     return np.ascontiguousarray(array).reshape(-1), array.shape
 
 
-def _checked_number(number: float, field: str) -> float:
-    if not math.isfinite(number):
-        raise InputError("", field, number, "must be a finite number")
-    return float(number)
+def _checked_number(field_value: float, field_name: str) -> float:
+    if not math.isfinite(field_value):
+        raise InputError("", field_name, field_value, "must be a finite number")
+    return float(field_value)
 
 
-def _checked_window(length: float) -> float:
-    if not (math.isfinite(length) and length >= 0.0):
-        raise InputError("", "window_length", length, "must be a finite length in m, 0 or more")
-    return float(length)
+def _checked_window(window_length: float) -> float:
+    if not (math.isfinite(window_length) and window_length >= 0.0):
+        raise InputError("", "window_length", window_length, "must be a finite length in m, 0 or more")
+    return float(window_length)
 
 
-def _check_order(name: str, stations: np.ndarray) -> None:
+def _check_order(road_name: str, stations: np.ndarray) -> None:
     wrong = np.flatnonzero(np.diff(stations) <= 0.0)
     if wrong.size:
         i = int(wrong[0]) + 1
         raise InputError(
-            name, f"station {i}", float(stations[i]), f"must be greater than {stations[i - 1]:g} before it"
+            road_name, f"station {i}", float(stations[i]), f"must be greater than {stations[i - 1]:g} before it"
         )

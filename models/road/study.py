@@ -52,18 +52,20 @@ def study_road(gd: float = STUDY_GD) -> SineProfile:
     )
 
 
-def road_waves(gd: float, n_min: float, n_max: float, waves: int) -> tuple[np.ndarray, np.ndarray]:
+def road_waves(
+    gd: float, lowest_spatial_frequency: float, highest_spatial_frequency: float, wave_count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Amplitudes (m) and wavenumbers (rad/m) of a road with the one-sided density gd (n / 0.1)^-2.
 
-    Each wave stands for one of ``waves`` bins between ``n_min`` and ``n_max`` (waves per metre), spaced
+    Each wave stands for one of ``wave_count`` bins between ``lowest_spatial_frequency`` and ``highest_spatial_frequency`` (waves per metre), spaced
     by equal ratios, at the bin's geometric mean n: amplitude = sqrt(2 Gd(n) dn). For a density that falls
     with n^-2 this keeps the power of every bin exactly, because (e2 - e1) / (e1 e2) = 1/e1 - 1/e2.
     """
-    edges = np.geomspace(n_min, n_max, waves + 1)
+    edges = np.geomspace(lowest_spatial_frequency, highest_spatial_frequency, wave_count + 1)
     n = np.sqrt(edges[:-1] * edges[1:])
     return np.sqrt(2.0 * gd * (n / 0.1) ** -2 * np.diff(edges)), 2.0 * math.pi * n
 
 
-def golden_phases(waves: int) -> np.ndarray:
-    """Phases 2 pi frac(i (sqrt(5) - 1) / 2), i = 1 .. waves, rad: evenly spread without random numbers."""
-    return 2.0 * math.pi * np.modf(np.arange(1, waves + 1) * (math.sqrt(5.0) - 1.0) / 2.0)[0]
+def golden_phases(wave_count: int) -> np.ndarray:
+    """Phases 2 pi frac(i (sqrt(5) - 1) / 2), i = 1 .. wave_count, rad: evenly spread without random numbers."""
+    return 2.0 * math.pi * np.modf(np.arange(1, wave_count + 1) * (math.sqrt(5.0) - 1.0) / 2.0)[0]

@@ -48,81 +48,103 @@ class TwoTrackRoad:
     mean: ShapeFilter
     roll: ShapeFilter
 
-    def spectrum(self, wavenumber: np.ndarray, y: float) -> np.ndarray:
+    def spectrum(self, wavenumber: np.ndarray, lateral_position: float) -> np.ndarray:
         """Two-sided spectral density (m^3) of the height at lateral position y (m) over the wavenumber (rad/m)."""
-        return self.cross_spectrum(wavenumber, y, y)
+        return self.cross_spectrum(wavenumber, lateral_position, lateral_position)
 
-    def cross_spectrum(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
+    def cross_spectrum(
+        self, wavenumber: np.ndarray, first_lateral_position: float, second_lateral_position: float
+    ) -> np.ndarray:
         """Two-sided cross density (m^3) of the heights at lateral positions y1 and y2 (m); it is real, because both
         points lie at the same station."""
-        return self.mean.spectrum(wavenumber) + y1 * y2 * self.roll.spectrum(wavenumber)
+        return self.mean.spectrum(wavenumber) + first_lateral_position * second_lateral_position * self.roll.spectrum(
+            wavenumber
+        )
 
-    def coherency(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
+    def coherency(
+        self, wavenumber: np.ndarray, first_lateral_position: float, second_lateral_position: float
+    ) -> np.ndarray:
         """Coherency |S12| / sqrt(S1 S2), 0 to 1, of the heights at lateral positions y1 and y2 (m)."""
-        cross = self.cross_spectrum(wavenumber, y1, y2)
-        return np.abs(cross) / np.sqrt(self.spectrum(wavenumber, y1) * self.spectrum(wavenumber, y2))
+        cross = self.cross_spectrum(wavenumber, first_lateral_position, second_lateral_position)
+        return np.abs(cross) / np.sqrt(
+            self.spectrum(wavenumber, first_lateral_position) * self.spectrum(wavenumber, second_lateral_position)
+        )
 
-    def covariance(self, distance: np.ndarray, y1: float, y2: float) -> np.ndarray:
+    def covariance(
+        self, distance: np.ndarray, first_lateral_position: float, second_lateral_position: float
+    ) -> np.ndarray:
         """Covariance (m^2) of the height at y1 with that at y2, ``distance`` (m) farther along the path."""
-        roll = y1 * y2 * self.roll.covariance(distance) if y1 * y2 else 0.0
+        roll = (
+            first_lateral_position * second_lateral_position * self.roll.covariance(distance)
+            if first_lateral_position * second_lateral_position
+            else 0.0
+        )
         return self.mean.covariance(distance) + roll
 
-    def level(self, y: float) -> float:
-        """Level S0 (m) of the road's spectrum at lateral position y (m): without cutoffs the two-sided spectrum there
+    def level(self, lateral_position: float) -> float:
+        """Level S0 (m) of the road's spectrum at lateral position lateral_position (m): without cutoffs the two-sided spectrum there
         tends to S0 / Omega^2."""
-        return (self.mean.intensity + y * y * self.roll.intensity) / (2.0 * math.pi)
+        return (self.mean.intensity + lateral_position * lateral_position * self.roll.intensity) / (2.0 * math.pi)
 
-    def label(self, y: float) -> str:
+    def label(self, lateral_position: float) -> str:
         """Text with the name of the road at lateral position y (m) and the convention of its level."""
         cutoffs = {f.cutoff for f in (self.mean, self.roll) if f.cutoff is not None}
         steep = f", cut off at {' and '.join(f'{c:g}' for c in sorted(cutoffs))} rad/m" if cutoffs else ""
         return (
-            f"two tracks, corners {self.mean.corner:g} and {self.roll.corner:g} rad/m{steep}; at y = {y:g} m the "
-            f"spectrum tends to {self.level(y):.4g} m / Omega^2 two-sided, {2.0 * self.level(y):.4g} m^3 one-sided at "
-            f"1 rad/m ({class_at_level(self.level(y))})"
+            f"two tracks, corners {self.mean.corner:g} and {self.roll.corner:g} rad/m{steep}; at y = {lateral_position:g} m the "
+            f"spectrum tends to {self.level(lateral_position):.4g} m / Omega^2 two-sided, {2.0 * self.level(lateral_position):.4g} m^3 one-sided at "
+            f"1 rad/m ({class_at_level(self.level(lateral_position))})"
         )
 
 
 def road_of_level(
-    half_track: float,
+    half_track_width: float,
     density_level: float = TRACK_DENSITY_LEVEL,
     *,
-    corners: tuple[float, float] = (MEAN_CORNER, ROLL_CORNER),
-    cutoff: float | None = None,
+    corner_wavenumbers: tuple[float, float] = (MEAN_CORNER, ROLL_CORNER),
+    cutoff_wavenumber: float | None = None,
 ) -> TwoTrackRoad:
     """Road whose tracks at y = +- half_track (m) have the level S0 (m, two-sided); the default is the paper's road.
 
     Mean and roll share the level in halves, q1 = half_track^2 q2 = pi S0: only then does the coherency fall to 0 at
     short waves, as the paper's Fig. 3 shows. The paper leaves the split open. Raises InputError for no track.
     """
-    if not (math.isfinite(half_track) and half_track > 0.0):
-        raise InputError("", "half_track", half_track, "must be above 0, in m: half the distance of the two tracks")
+    if not (math.isfinite(half_track_width) and half_track_width > 0.0):
+        raise InputError(
+            "", "half_track", half_track_width, "must be above 0, in m: half the distance of the two tracks"
+        )
     half = math.pi * density_level
-    return TwoTrackRoad(ShapeFilter(corners[0], half, cutoff), ShapeFilter(corners[1], half / half_track**2, cutoff))
+    return TwoTrackRoad(
+        ShapeFilter(corner_wavenumbers[0], half, cutoff_wavenumber),
+        ShapeFilter(corner_wavenumbers[1], half / half_track_width**2, cutoff_wavenumber),
+    )
 
 
-def half_track(wheels: Sequence[WheelPosition]) -> float:
+def half_track(wheel_positions: Sequence[WheelPosition]) -> float:
     """Half the lateral distance (m) between the outermost wheels of the first axle; 0 for wheels on the centre line."""
-    front = [wheel.y for wheel in wheels if wheel.axle == 0]
+    front = [wheel.y for wheel in wheel_positions if wheel.axle == 0]
     return (max(front) - min(front)) / 2.0
 
 
-def wheels_on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
+def wheels_on_track(wheel_positions: Sequence[WheelPosition], lateral_position: float) -> tuple[WheelPosition, ...]:
     """The wheels moved laterally to the track at y (m); so a quarter or half car, drawn on the centre line, drives on
     one track of a road."""
-    return tuple(replace(wheel, y=y) for wheel in wheels)
+    return tuple(replace(wheel, y=lateral_position) for wheel in wheel_positions)
 
 
 def road_excitation(
-    road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
+    two_track_road: TwoTrackRoad,
+    wheel_positions: Sequence[WheelPosition],
+    left_right_correlation: str = "modelled",
+    front_rear_correlation: str = "delayed",
 ) -> Excitation:
-    """Excitation of the wheels by a two-track road: one filter per axle, with each wheel at its own lateral position.
+    """Excitation of the wheels by a two-track two_track_road: one filter per axle, with each wheel at its own lateral position.
 
     Parameters
     ----------
-    left_right : "modelled", z = z_M + y theta; "uncorrelated", the left wheels and the right wheels each with a pair
+    left_right_correlation : "modelled", z = z_M + y theta; "uncorrelated", the left wheels and the right wheels each with a pair
         (z_M, theta) of their own; "equal", z = z_M + abs(y) theta
-    front_rear : "delayed", every axle meets the noise of the first, its distance later; "uncorrelated", every axle
+    front_rear_correlation : "delayed", every axle meets the noise of the first, its distance later; "uncorrelated", every axle
         has noise of its own; "equal", every axle meets the noise of the first at once
 
     Raises
@@ -130,58 +152,71 @@ def road_excitation(
     InputError : an unknown word; axles not numbered from the front, wheels of one axle at different x; wheels both on
         and beside the centre line where left and right are uncorrelated
     """
-    _check_word("left_right", left_right, TRACK_CORRELATIONS)
-    _check_word("front_rear", front_rear, FRONT_REAR)
-    behind = _axle_distances(wheels)
-    F, G, mean, roll = _both_filters(road)
-    if left_right == "uncorrelated":
+    _check_word("left_right", left_right_correlation, TRACK_CORRELATIONS)
+    _check_word("front_rear", front_rear_correlation, FRONT_REAR)
+    behind = _axle_distances(wheel_positions)
+    F, G, mean, roll = _both_filters(two_track_road)
+    if left_right_correlation == "uncorrelated":
         F, G = block_diag(F, F), block_diag(G, G)
-    rows = np.array([_height_row(wheel, mean, roll, left_right, wheels) for wheel in wheels])
-    axle = np.array([wheel.axle for wheel in wheels])
+    rows = np.array(
+        [_height_row(wheel, mean, roll, left_right_correlation, wheel_positions) for wheel in wheel_positions]
+    )
+    axle = np.array([wheel.axle for wheel in wheel_positions])
     heights = tuple(np.where((axle == i)[:, None], rows, 0.0) for i in range(len(behind)))
-    lengths = tuple(0.0 for _ in behind) if front_rear == "equal" else behind
-    return Excitation(F, G, heights, lengths, front_rear == "uncorrelated")
+    lengths = tuple(0.0 for _ in behind) if front_rear_correlation == "equal" else behind
+    return Excitation(F, G, heights, lengths, front_rear_correlation == "uncorrelated")
 
 
 def input_covariance(
-    road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
+    two_track_road: TwoTrackRoad,
+    wheel_positions: Sequence[WheelPosition],
+    left_right_correlation: str = "modelled",
+    front_rear_correlation: str = "delayed",
 ) -> np.ndarray:
     """Covariance (w, w) in m^2 of the heights under the wheels, in closed form; arguments and errors as above."""
-    behind = road_excitation(road, wheels, left_right, front_rear).lengths
-    covariances = np.zeros((len(wheels), len(wheels)))
-    for i, first in enumerate(wheels):
-        for j, second_wheel in enumerate(wheels):
-            if left_right == "uncorrelated" and (first.y < 0.0) != (second_wheel.y < 0.0):
+    behind = road_excitation(two_track_road, wheel_positions, left_right_correlation, front_rear_correlation).lengths
+    covariances = np.zeros((len(wheel_positions), len(wheel_positions)))
+    for i, first in enumerate(wheel_positions):
+        for j, second_wheel in enumerate(wheel_positions):
+            if left_right_correlation == "uncorrelated" and (first.y < 0.0) != (second_wheel.y < 0.0):
                 continue
-            if front_rear == "uncorrelated" and first.axle != second_wheel.axle:
+            if front_rear_correlation == "uncorrelated" and first.axle != second_wheel.axle:
                 continue
-            y1, y2 = (abs(first.y), abs(second_wheel.y)) if left_right == "equal" else (first.y, second_wheel.y)
-            covariances[i, j] = float(road.covariance(np.array(behind[first.axle] - behind[second_wheel.axle]), y1, y2))
+            y1, y2 = (
+                (abs(first.y), abs(second_wheel.y)) if left_right_correlation == "equal" else (first.y, second_wheel.y)
+            )
+            covariances[i, j] = float(
+                two_track_road.covariance(np.array(behind[first.axle] - behind[second_wheel.axle]), y1, y2)
+            )
     return covariances
 
 
-def _both_filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _both_filters(two_track_road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Filter matrices F, G of both processes together, and the rows that read z_M and theta; a roll process of
     zero intensity is left out."""
-    parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
+    parts = [two_track_road.mean, two_track_road.roll] if two_track_road.roll.intensity else [two_track_road.mean]
     F, G, H = (block_diag(*matrices) for matrices in zip(*(process.matrices() for process in parts), strict=True))
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
 
 
 def _height_row(
-    wheel: WheelPosition, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[WheelPosition]
+    wheel_position: WheelPosition,
+    mean_row: np.ndarray,
+    roll_row: np.ndarray,
+    left_right_correlation: str,
+    wheel_positions: Sequence[WheelPosition],
 ) -> np.ndarray:
     """Factors of the filter states in the road height under a wheel."""
-    if left_right == "equal":
-        return mean + abs(wheel.y) * roll
-    height = mean + wheel.y * roll
-    if left_right == "modelled":
+    if left_right_correlation == "equal":
+        return mean_row + abs(wheel_position.y) * roll_row
+    height = mean_row + wheel_position.y * roll_row
+    if left_right_correlation == "modelled":
         return height
-    if wheel.y == 0.0 and any(other_wheel.y for other_wheel in wheels):
-        allowed = f"wheel {wheel.name!r} stands at y = 0, neither left nor right"
-        raise InputError("", "left_right", left_right, allowed)
+    if wheel_position.y == 0.0 and any(other_wheel.y for other_wheel in wheel_positions):
+        allowed = f"wheel {wheel_position.name!r} stands at y = 0, neither left nor right"
+        raise InputError("", "left_right", left_right_correlation, allowed)
     zeros_of_other = np.zeros(len(height))
-    return np.concatenate([height, zeros_of_other] if wheel.y >= 0.0 else [zeros_of_other, height])
+    return np.concatenate([height, zeros_of_other] if wheel_position.y >= 0.0 else [zeros_of_other, height])
 
 
 def _axle_distances(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:

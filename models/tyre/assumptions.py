@@ -6,8 +6,8 @@ from models.core.assumptions import Assumption
 from models.tyre.tyre_table import TyreTable
 
 
-def assumptions(table: TyreTable, load: float) -> list[Assumption]:
-    """Assumptions of a result over "slip_angle" (deg) under a load (N): that both lie within the tyre table.
+def assumptions(tyre_table: TyreTable, wheel_load: float) -> list[Assumption]:
+    """Assumptions of a result over "slip_angle" (deg) under a wheel_load (N): that both lie within the tyre table.
 
     A table of one load holds for all of them.
     """
@@ -18,19 +18,19 @@ def assumptions(table: TyreTable, load: float) -> list[Assumption]:
             "ask for smaller options.slip_angles, or name a table in tyres.files that reaches farther",
             lambda run: {"slip angles": run["slip_angle"]},
             "deg",
-            upper_limit=float(np.rad2deg(table.angles[-1])) * (1.0 + 1e-9),
+            upper_limit=float(np.rad2deg(tyre_table.angles[-1])) * (1.0 + 1e-9),
         )
     ]
-    if table.loads.size > 1:
+    if tyre_table.loads.size > 1:
         listed.append(
             Assumption(
                 "loads in the table",
                 "the load lies within the tyre's table, whose last value holds beyond",
                 "ask for another options.load, or name a table in tyres.files that reaches farther",
-                lambda run: {"load": np.array([load])},
+                lambda run: {"load": np.array([wheel_load])},
                 "N",
-                float(table.loads[0]),
-                float(table.loads[-1]),
+                float(tyre_table.loads[0]),
+                float(tyre_table.loads[-1]),
             )
         )
     return listed

@@ -17,10 +17,10 @@ from functools import cache
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, MARCHES
-from models.contact.fastsim_grid import Grid, grid, strips_of
-from models.contact.fastsim_many import forces, forces_within
-from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
+from models.contact.fastsim import FLEXIBILITY_KINDS, MARCH_KINDS
+from models.contact.fastsim_grid import FastsimGrid, count_of_strips, ellipse_grid
+from models.contact.fastsim_many import fill_contact_forces, fill_contact_forces_in_place
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, MarchWorkspace, cells_in, strips_in
 from models.core.errors import InputError
 from models.machine.compiled import lean
 from models.machine.records import records, stacked
@@ -28,7 +28,7 @@ from models.machine.stack import start
 
 FADING_SPEED = 0.1
 """Speed (m/s) of the tread below which slip is taken relative to this speed instead."""
-THREE_BRISTLES, SECOND_ORDER_MARCH = KINDS["three"], MARCHES["second-order"]
+THREE_BRISTLES, SECOND_ORDER_MARCH = FLEXIBILITY_KINDS["three"], MARCH_KINDS["second-order"]
 FIRST_FLEXIBILITY = 7
 """Index of the first flexibility among the numbers of a contact."""
 UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
@@ -36,55 +36,55 @@ UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1
 
 
 @cache
-def net(cells: int) -> Grid:
-    """Grid of a contact patch with ``cells`` cells per strip, from 3 to 200. Raises InputError otherwise."""
-    if isinstance(cells, bool) or not isinstance(cells, int) or not 3 <= cells <= 200:
-        raise InputError("", "cells", cells, "must be a whole number from 3 to 200")
-    return grid(cells, int(strips_of(np.array(1.0), cells)), "parabolic")
+def net(cell_count: int) -> FastsimGrid:
+    """Grid of a contact patch with ``cell_count`` cells per strip, from 3 to 200. Raises InputError otherwise."""
+    if isinstance(cell_count, bool) or not isinstance(cell_count, int) or not 3 <= cell_count <= 200:
+        raise InputError("", "cells", cell_count, "must be a whole number from 3 to 200")
+    return ellipse_grid(cell_count, int(count_of_strips(np.array(1.0), cell_count)), "parabolic")
 
 
-def cornering_stiffness_factor(cells: int) -> float:
+def cornering_stiffness_factor(cell_count: int) -> float:
     """Ratio, near the exact 8/3, of the cornering stiffness to a^2 b k (half length a, half width b, bristle stiffness
-    k), for a patch with ``cells`` cells."""
+    k), for a patch with ``cell_count`` cells."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT_CONTACT.items():
         contacts[name] = value
-    forces(contacts, *net(cells).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
+    fill_contact_forces(contacts, *net(cell_count).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
     return -float(answers["fy"][0])
 
 
 @lean
-def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces_out):
+def tyre_forces(patch_contacts, sliding_velocities, grid_strips, cell_count, middle_pressure, forces_out):
     """Fill ``forces_out`` (w, 4) with the creep forces fx, fy (N) and moments mz (N m) on w tyres; the last column has
     no meaning. No array is allocated.
 
-    contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
+    patch_contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
     sliding_velocities (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the
-    tread (m/s); strips, cells, middle_cells : the patch's net as ``Grid`` holds it.
+    tread (m/s); grid_strips, cell_count, middle_pressure : the patch's net as ``FastsimGrid`` holds it.
     """
-    w = len(contacts)
-    patches, answers = records(start(contacts), w, CONTACT), records(start(forces_out), w, FORCES)
-    lines, cell_table = strips_in(strips), cells_in(cells, middle_cells)
-    room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
+    w = len(patch_contacts)
+    patches, answers = records(start(patch_contacts), w, CONTACT), records(start(forces_out), w, FORCES)
+    lines, cell_table = strips_in(grid_strips), cells_in(cell_count, middle_pressure)
+    room, slowest = MarchWorkspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, sliding_velocities[i, 3])
     _creepages(1.0, patches, sliding_velocities)
-    forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
+    fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
         backwards = stacked(w, FORCES)
         _creepages(-1.0, patches, sliding_velocities)
-        forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
+        fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
         _blend_directions(sliding_velocities, backwards, answers)
 
 
 @lean
-def _creepages(sign, patches, sliding_velocities):
+def _creepages(direction_sign, patch_contacts, sliding_velocities):
     """Fill the creepages of tyres that roll forwards (sign 1) or backwards (sign -1), from the sliding velocities
     (m/s)."""
-    for i in range(len(patches)):
-        patch, speed = patches[i], max(abs(sliding_velocities[i, 3]), FADING_SPEED)
-        patch.xi_x, patch.xi_y = sign * sliding_velocities[i, 0] / speed, sliding_velocities[i, 1] / speed
-        patch.spin = sign * sliding_velocities[i, 2] / speed
+    for i in range(len(patch_contacts)):
+        patch, speed = patch_contacts[i], max(abs(sliding_velocities[i, 3]), FADING_SPEED)
+        patch.xi_x, patch.xi_y = direction_sign * sliding_velocities[i, 0] / speed, sliding_velocities[i, 1] / speed
+        patch.spin = direction_sign * sliding_velocities[i, 2] / speed
 
 
 @lean
@@ -107,9 +107,9 @@ def brush_forces(
     mu: float,
     half_length: float,
     half_width: float,
-    stiffness: float,
+    bristle_stiffness: float,
     sliding_velocities: np.ndarray,
-    cells: int = 21,
+    cell_count: int = 21,
 ) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m), (m, 3), of a tyre at sliding velocities (m, 4) as in
     ``tyre_forces``.
@@ -120,10 +120,10 @@ def brush_forces(
     contacts, forces, cell_net = (
         np.zeros((len(sliding_velocities), 10)),
         np.empty((len(sliding_velocities), 4)),
-        net(cells),
+        net(cell_count),
     )
     patches = contacts.view(CONTACT)
     patches["a"], patches["b"], patches["load"], patches["mu"] = half_length, half_width, load, mu
-    patches["l1"] = patches["l2"] = patches["l3"] = 1.0 / stiffness
+    patches["l1"] = patches["l2"] = patches["l3"] = 1.0 / bristle_stiffness
     tyre_forces(contacts, sliding_velocities, cell_net.strips, cell_net.cells, cell_net.middle, forces)
     return forces[:, :3]

@@ -19,9 +19,9 @@ Friction = Callable[[np.ndarray, float], np.ndarray]
 load (N)."""
 
 
-def graded_nodes(last_node: float, first: float, node_count: int) -> np.ndarray:
-    """Nodes of a table from 0 to ``last_node`` with spacings that grow in proportion to x + ``first``."""
-    nodes = first * np.expm1(np.linspace(0.0, np.log1p(last_node / first), node_count))
+def graded_nodes(last_node: float, grading_offset: float, node_count: int) -> np.ndarray:
+    """Nodes of a table from 0 to ``last_node`` with spacings that grow in proportion to x + ``grading_offset``."""
+    nodes = grading_offset * np.expm1(np.linspace(0.0, np.log1p(last_node / grading_offset), node_count))
     nodes[-1] = last_node
     return nodes
 
@@ -37,7 +37,7 @@ def table_by_similarity(
     loads: np.ndarray,
     angles: np.ndarray = ANGLE_NODES,
     slips: np.ndarray = SLIP_NODES,
-    name: str = "",
+    table_name: str = "",
 ) -> TyreTable:
     """Tyre table from a friction curve along the wheel and another across it, combined by similarity.
 
@@ -52,7 +52,7 @@ def table_by_similarity(
     g, h = product_factors(mu_y)
     g[0] = _limit_at_zero_angle(friction_across, slips, loads)
     excess = np.maximum(np.hypot(mu_x, g[:, None, :] * h[:, :, None]) / max(mu_x.max(), mu_y.max()), 1.0)
-    return TyreTable(angles, slips, loads, mu_x / excess, g / excess.max(axis=1), h, name)
+    return TyreTable(angles, slips, loads, mu_x / excess, g / excess.max(axis=1), h, table_name)
 
 
 def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,25 +146,27 @@ NAMED_SURFACES: dict[str, tuple[PureSlipCurve, PureSlipCurve]] = {
 """Friction curves along and across the wheel for all surfaces that have a name."""
 
 
-def table_of_surface(name: str, friction_scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
+def table_of_surface(
+    surface_name: str, friction_scale: float = 1.0, load: float = 1e4, friction_loss: float = 0.0
+) -> TyreTable:
     """Tyre table of one of ``NAMED_SURFACES``, its friction times ``friction_scale`` at a load (N).
 
-    fall : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
+    friction_loss : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
     quarter of it to twice it, and constant beyond.
     """
-    if name not in NAMED_SURFACES:
-        raise InputError("", "surface", name, "no such surface", tuple(NAMED_SURFACES))
-    law_along, across = NAMED_SURFACES[name]
-    if not 0.0 <= fall < 1.0:
-        raise InputError(name, "fall", fall, "must be from 0 to below 1")
-    loads = load * np.array([0.25, 1.0, 2.0]) if fall > 0.0 else np.array([load])
+    if surface_name not in NAMED_SURFACES:
+        raise InputError("", "surface", surface_name, "no such surface", tuple(NAMED_SURFACES))
+    law_along, across = NAMED_SURFACES[surface_name]
+    if not 0.0 <= friction_loss < 1.0:
+        raise InputError(surface_name, "fall", friction_loss, "must be from 0 to below 1")
+    loads = load * np.array([0.25, 1.0, 2.0]) if friction_loss > 0.0 else np.array([load])
 
-    def load_factor(load_there: float) -> float:
-        return friction_scale * (1.0 - fall * (load_there / load - 1.0))
+    def load_factor(wheel_load: float) -> float:
+        return friction_scale * (1.0 - friction_loss * (wheel_load / load - 1.0))
 
     return table_by_similarity(
         lambda k, load_there: load_factor(load_there) * law_along(k),
         lambda k, load_there: load_factor(load_there) * across(k),
         loads,
-        name=name,
+        table_name=surface_name,
     )

@@ -39,116 +39,130 @@ class TirProperty:
     line: int
 
 
-def tir_table(path: str | Path) -> TyreTable:
+def tir_table(tir_path: str | Path) -> TyreTable:
     """Tyre table from a `.tir` file. Raises InputError with file, line, key, value and the allowed values."""
-    properties = _keys_of_sections(path)
-    _check_properties(path, properties)
+    properties = _keys_of_sections(tir_path)
+    _check_properties(tir_path, properties)
     named = (
         name for name in properties if name in (*NEEDED_KEYS, *SCALING_FACTORS) or COEFFICIENT_PATTERN.fullmatch(name)
     )
     c = defaultdict(float, dict.fromkeys(SCALING_FACTORS, 1.0)) | {
-        name: _number_of(path, properties, name) for name in named
+        name: _number_of(tir_path, properties, name) for name in named
     }
     least_load, largest_load, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:
-            raise _wrong_value(path, properties, name, "must be a load above 0 and at most 1e7 N")
+            raise _wrong_value(tir_path, properties, name, "must be a load above 0 and at most 1e7 N")
     if not least_load < largest_load:
-        raise _wrong_value(path, properties, "FZMAX", f"must be above FZMIN, {least_load:g}")
+        raise _wrong_value(tir_path, properties, "FZMAX", f"must be above FZMIN, {least_load:g}")
     loads = np.unique(
         np.concatenate(
             (np.linspace(least_load, largest_load, LOAD_NODES), np.clip([nominal], least_load, largest_load))
         )
     )
     curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
-    _check_curves(path, curves)
+    _check_curves(tir_path, curves)
     return table_by_similarity(
-        lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
+        lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, table_name=Path(tir_path).name
     )
 
 
-def longitudinal_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
+def longitudinal_formula(coefficients: dict[str, float], wheel_load: float) -> MagicFormulaCurve:
     """Magic formula of braking under a load (N) from the coefficients of a property file."""
-    _, load_excess = _load_excess(c, load)
-    peak = (c["PDX1"] + c["PDX2"] * load_excess) * c["LMUX"]
-    shape = c["PCX1"] * c["LCX"]
-    bend = (c["PEX1"] + c["PEX2"] * load_excess + c["PEX3"] * load_excess**2) * (1.0 + c["PEX4"]) * c["LEX"]
-    stiffness = (c["PKX1"] + c["PKX2"] * load_excess) * math.exp(c["PKX3"] * load_excess) * c["LKX"]
+    _, load_excess = _load_excess(coefficients, wheel_load)
+    peak = (coefficients["PDX1"] + coefficients["PDX2"] * load_excess) * coefficients["LMUX"]
+    shape = coefficients["PCX1"] * coefficients["LCX"]
+    bend = (
+        (coefficients["PEX1"] + coefficients["PEX2"] * load_excess + coefficients["PEX3"] * load_excess**2)
+        * (1.0 + coefficients["PEX4"])
+        * coefficients["LEX"]
+    )
+    stiffness = (
+        (coefficients["PKX1"] + coefficients["PKX2"] * load_excess)
+        * math.exp(coefficients["PKX3"] * load_excess)
+        * coefficients["LKX"]
+    )
     return MagicFormulaCurve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-def lateral_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
+def lateral_formula(coefficients: dict[str, float], wheel_load: float) -> MagicFormulaCurve:
     """Magic formula of cornering under a load (N) from the coefficients of a property file, without their signs."""
-    nominal, load_excess = _load_excess(c, load)
-    peak = abs(c["PDY1"] + c["PDY2"] * load_excess) * c["LMUY"]
-    shape = c["PCY1"] * c["LCY"]
-    bend = (c["PEY1"] + c["PEY2"] * load_excess) * c["LEY"]
-    turn = math.sin(2.0 * math.atan2(load, c["PKY2"] * nominal))
-    stiffness = abs(c["PKY1"]) * nominal * turn * c["LKY"] / load
+    nominal, load_excess = _load_excess(coefficients, wheel_load)
+    peak = abs(coefficients["PDY1"] + coefficients["PDY2"] * load_excess) * coefficients["LMUY"]
+    shape = coefficients["PCY1"] * coefficients["LCY"]
+    bend = (coefficients["PEY1"] + coefficients["PEY2"] * load_excess) * coefficients["LEY"]
+    turn = math.sin(2.0 * math.atan2(wheel_load, coefficients["PKY2"] * nominal))
+    stiffness = abs(coefficients["PKY1"]) * nominal * turn * coefficients["LKY"] / wheel_load
     return MagicFormulaCurve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
+def _load_excess(coefficients: dict[str, float], wheel_load: float) -> tuple[float, float]:
     """Scaled nominal load (N), and relative excess of a load above it."""
-    nominal = c["FNOMIN"] * c["LFZO"]
-    return nominal, (load - nominal) / nominal
+    nominal = coefficients["FNOMIN"] * coefficients["LFZO"]
+    return nominal, (wheel_load - nominal) / nominal
 
 
-def _keys_of_sections(path: str | Path) -> dict[str, TirProperty]:
+def _keys_of_sections(tir_path: str | Path) -> dict[str, TirProperty]:
     """Keys of all sections of a property file, in capital letters."""
     properties: dict[str, TirProperty] = {}
-    for line, row in enumerate(whole_text(path).splitlines(), start=1):
+    for line, row in enumerate(whole_text(tir_path).splitlines(), start=1):
         plain = row.partition("$")[0].partition("!")[0].strip()
         name, equals, value = plain.partition("=")
         if equals:
             key = name.strip().upper()
             if key in properties and key in (*NEEDED_KEYS, *ACCEPTED_UNITS):
                 raise InputError(
-                    path, f"line {line}, {key}", value.strip(), f"stands in line {properties[key].line} already"
+                    tir_path, f"line {line}, {key}", value.strip(), f"stands in line {properties[key].line} already"
                 )
             properties[key] = TirProperty(value.strip().strip("'\""), line)
     return properties
 
 
-def _check_properties(path: str | Path, properties: dict[str, TirProperty]) -> None:
+def _check_properties(tir_path: str | Path, properties: dict[str, TirProperty]) -> None:
     for name, allowed in ACCEPTED_UNITS.items():
         if name not in properties:
-            raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
+            raise InputError(tir_path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
         if properties[name].text.lower() not in allowed:
-            raise _wrong_value(path, properties, name, f"must be '{allowed[0]}'")
-    if "FITTYP" in properties and _number_of(path, properties, "FITTYP") not in FITTYP_VERSIONS:
+            raise _wrong_value(tir_path, properties, name, f"must be '{allowed[0]}'")
+    if "FITTYP" in properties and _number_of(tir_path, properties, "FITTYP") not in FITTYP_VERSIONS:
         raise _wrong_value(
-            path,
+            tir_path,
             properties,
             "FITTYP",
             "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, 50, 51, 52)",
         )
     for name in NEEDED_KEYS:
         if name not in properties:
-            raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED_KEYS))
+            raise InputError(tir_path, name, None, "is missing; needed are " + ", ".join(NEEDED_KEYS))
 
 
-def _number_of(path: str | Path, properties: dict[str, TirProperty], name: str) -> float:
+def _number_of(tir_path: str | Path, properties: dict[str, TirProperty], key_name: str) -> float:
     try:
-        value = float(properties[name].text)
+        value = float(properties[key_name].text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise _wrong_value(path, properties, name, "must be a finite number")
+        raise _wrong_value(tir_path, properties, key_name, "must be a finite number")
     return value
 
 
-def _wrong_value(path: str | Path, properties: dict[str, TirProperty], name: str, allowed: str) -> InputError:
-    return InputError(path, f"line {properties[name].line}, {name}", properties[name].text, allowed)
+def _wrong_value(
+    tir_path: str | Path, properties: dict[str, TirProperty], key_name: str, allowed_text: str
+) -> InputError:
+    return InputError(
+        tir_path, f"line {properties[key_name].line}, {key_name}", properties[key_name].text, allowed_text
+    )
 
 
-def _check_curves(path: str | Path, curves: dict[float, tuple[MagicFormulaCurve, MagicFormulaCurve]]) -> None:
+def _check_curves(
+    tir_path: str | Path, curves_by_load: dict[float, tuple[MagicFormulaCurve, MagicFormulaCurve]]
+) -> None:
     """Raise InputError for coefficients that give no friction, or friction that changes its sign."""
-    for load, pair in curves.items():
+    for load, pair in curves_by_load.items():
         for letter, curve in zip("XY", pair, strict=True):
             if not (0.0 < curve.D <= 3.0 and 0.0 < curve.C <= 2.0 and 0.0 < curve.B < 1e4):
                 raise InputError(
-                    path,
+                    tir_path,
                     f"P*{letter}* at {load:g} N",
                     [curve.D, curve.B, curve.C],
                     "give no friction: peak from 0 to 3, B above 0, C from 0 to 2",

@@ -28,45 +28,45 @@ PRODUCT_TOLERANCE = 0.03
 MOST_NODES = 3_000_000
 
 
-def tyre_table(path: str | Path) -> TyreTable:
+def tyre_table(table_path: str | Path) -> TyreTable:
     """Tyre table from a CSV file. Raises InputError that names file, line, column, value and what is allowed."""
-    lines, columns = _columns_in_si(Path(path))
+    lines, columns = _columns_in_si(Path(table_path))
     columns.setdefault("load", np.full(len(lines), LOAD_OF_SINGLE_NODE))
-    _check_ranges(path, lines, columns)
+    _check_ranges(table_path, lines, columns)
     axes = [np.unique(columns[name], return_inverse=True) for name in ("slip angle", "load", "slip")]
     angles, loads, slips = (nodes for nodes, _ in axes)
     shape = angles.size, loads.size, slips.size
     if np.prod(shape) > MOST_NODES:
         raise InputError(
-            path,
+            table_path,
             "rows",
             int(np.prod(shape)),
             "combinations of slip angle, load and slip are too many: are the same values repeated with other digits?",
         )
     row = _row_of_each_combination(
-        path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes
+        table_path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes
     )
     mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
     g, h = product_factors(mu_y)
-    _check_product(path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
-    return TyreTable(angles, slips, loads, mu_x, g, h, Path(path).name)
+    _check_product(table_path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
+    return TyreTable(angles, slips, loads, mu_x, g, h, Path(table_path).name)
 
 
-def _columns_in_si(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _columns_in_si(table_path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Line number (n,) of every row of the file, and its columns (n,) in SI units. Raises InputError for the first row
     with an error."""
     parts: list[RowBlock] = []
-    for block in table_blocks(path, COLUMN_SETS):
+    for block in table_blocks(table_path, COLUMN_SETS):
         for row, wrong in block.faulty_rows.items():
-            raise InputError(path, f"line {block.lines[row]}", None, wrong)
+            raise InputError(table_path, f"line {block.lines[row]}", None, wrong)
         parts.append(block)
     if not parts:
-        raise InputError(path, "rows", 0, "at least one row of numbers is needed")
+        raise InputError(table_path, "rows", 0, "at least one row of numbers is needed")
     columns = {name: np.concatenate([row_block.values[name] for row_block in parts]) for name in parts[0].values}
     return np.concatenate([row_block.lines for row_block in parts]), columns
 
 
-def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+def _check_ranges(table_path: str | Path, line_numbers: np.ndarray, columns: dict[str, np.ndarray]) -> None:
     for name, least_value, largest_value, allowed in (
         ("slip angle", 0.0, np.pi / 2.0, "must be from 0 to 90 deg"),
         ("slip", 0.0, 1.0, "must be from 0 to 1"),
@@ -76,34 +76,48 @@ def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.nda
     ):
         wrong = np.flatnonzero(~((columns[name] >= least_value) & (columns[name] <= largest_value * (1.0 + 1e-12))))
         if wrong.size:
-            raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], allowed)
+            raise _error_in_row(table_path, line_numbers, name, wrong[0], columns[name][wrong[0]], allowed)
     for name, zero in (("mu_x", "slip"), ("mu_y", "slip angle")):
         wrong = np.flatnonzero((columns[zero] == 0.0) & (columns[name] != 0.0))
         if wrong.size:
-            raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0")
+            raise _error_in_row(
+                table_path, line_numbers, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0"
+            )
 
 
 def _error_in_row(
-    path: str | Path, lines: np.ndarray, name: str, row: int, wrong_value: float, allowed: str
+    table_path: str | Path,
+    line_numbers: np.ndarray,
+    column_name: str,
+    row_index: int,
+    wrong_value: float,
+    allowed_text: str,
 ) -> InputError:
-    return InputError(path, f"line {lines[row]}, column {name!r}", float(wrong_value), f"{allowed} (in SI units)")
+    return InputError(
+        table_path,
+        f"line {line_numbers[row_index]}, column {column_name!r}",
+        float(wrong_value),
+        f"{allowed_text} (in SI units)",
+    )
 
 
 def _row_of_each_combination(
-    path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list
+    table_path: str | Path, line_numbers: np.ndarray, combination_number: np.ndarray, node_axes: list
 ) -> np.ndarray:
     """Index of the row for each combination of nodes; every combination must occur exactly once."""
-    shape = tuple(nodes.size for nodes, _ in axes)
+    shape = tuple(nodes.size for nodes, _ in node_axes)
     order = np.argsort(combination_number, kind="stable")
     twice = np.flatnonzero(np.diff(combination_number[order]) == 0)
     if twice.size:
-        first, repeated = lines[order[twice[0]]], lines[order[twice[0] + 1]]
-        raise InputError(path, f"line {repeated}", None, f"has the slip angle, load and slip of line {first}")
+        first, repeated = line_numbers[order[twice[0]]], line_numbers[order[twice[0] + 1]]
+        raise InputError(table_path, f"line {repeated}", None, f"has the slip angle, load and slip of line {first}")
     missing = np.flatnonzero(np.bincount(combination_number, minlength=int(np.prod(shape))) == 0)
     if missing.size:
-        angle, load, slip = (nodes[i] for (nodes, _), i in zip(axes, np.unravel_index(missing[0], shape), strict=True))
+        angle, load, slip = (
+            nodes[i] for (nodes, _), i in zip(node_axes, np.unravel_index(missing[0], shape), strict=True)
+        )
         raise InputError(
-            path,
+            table_path,
             "rows",
             None,
             f"{missing.size} of {np.prod(shape)} combinations are missing, the first: "
@@ -113,19 +127,24 @@ def _row_of_each_combination(
 
 
 def _check_product(
-    path: str | Path, lines: np.ndarray, row: np.ndarray, mu_x: np.ndarray, mu_y: np.ndarray, product: np.ndarray
+    table_path: str | Path,
+    line_numbers: np.ndarray,
+    row_indices: np.ndarray,
+    mu_x: np.ndarray,
+    mu_y: np.ndarray,
+    mu_y_product: np.ndarray,
 ) -> None:
-    deviation = np.abs(product - mu_y)
+    deviation = np.abs(mu_y_product - mu_y)
     worst = int(deviation.argmax())
     if deviation.flat[worst] > PRODUCT_TOLERANCE * max(mu_x.max(), mu_y.max()):
         raise _error_in_row(
-            path,
-            lines,
+            table_path,
+            line_numbers,
             "mu_y",
-            row.flat[worst],
+            row_indices.flat[worst],
             mu_y.flat[worst],
             "is no product of g(slip angle, slip) and "
-            f"h(slip angle, load): the best has {product.flat[worst]:.4g} here, more than "
+            f"h(slip angle, load): the best has {mu_y_product.flat[worst]:.4g} here, more than "
             f"{PRODUCT_TOLERANCE:.0%} of the "
             "largest away",
         )

@@ -13,17 +13,17 @@ SCALE_BOUNDS = (0.0, 2.0)
 """Bounds of a factor on friction: above the first and up to the second."""
 
 
-def table_from_file(path: Path) -> TyreTable:
+def table_from_file(table_path: Path) -> TyreTable:
     """Tyre table from a file whose extension gives the format. Raises InputError if the file contains no such table."""
-    if path.suffix.lower() not in READER_OF_EXTENSION:
-        raise InputError(path.name, "", path.suffix, "is no file of a tyre", tuple(READER_OF_EXTENSION))
-    return READER_OF_EXTENSION[path.suffix.lower()](path)
+    if table_path.suffix.lower() not in READER_OF_EXTENSION:
+        raise InputError(table_path.name, "", table_path.suffix, "is no file of a tyre", tuple(READER_OF_EXTENSION))
+    return READER_OF_EXTENSION[table_path.suffix.lower()](table_path)
 
 
-def table_of_named_tyre(name: str, rear: bool = False) -> TyreTable:
-    """Tyre table of a named surface; with ``rear``, the rear tyre's table if the surface has a separate one."""
-    rear_name = f"{name}/rear"
-    return table_of_surface(rear_name if rear and rear_name in PACEJKA else name)
+def table_of_named_tyre(tyre_name: str, is_rear: bool = False) -> TyreTable:
+    """Tyre table of a named surface; with ``is_rear``, the rear tyre's table if the surface has a separate one."""
+    rear_name = f"{tyre_name}/rear"
+    return table_of_surface(rear_name if is_rear and rear_name in PACEJKA else tyre_name)
 
 
 SURFACE_NAMES = tuple(name for name in NAMED_SURFACES if "/" not in name)

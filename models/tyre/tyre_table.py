@@ -106,9 +106,9 @@ class TyreTable:
         mu_x, g, h = self._at_nodes(angles, slips, loads)
         return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
 
-    def scaled(self, factor: float) -> "TyreTable":
-        """Returns a copy of the table in which friction is ``factor`` times as large."""
-        return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
+    def scaled(self, friction_factor: float) -> "TyreTable":
+        """Returns a copy of the table in which friction is ``friction_factor`` times as large."""
+        return replace(self, mu_x=friction_factor * self.mu_x, h=friction_factor * self.h)
 
     def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
         """Friction coefficients mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
@@ -141,14 +141,17 @@ class TyreTable:
         return [mu_x, g, _interpolate_axis(_interpolate_axis(self.h, 0, self.angles, angles), 1, self.loads, loads)]
 
 
-def _interpolate_axis(values: np.ndarray, axis: int, old_nodes: np.ndarray, new_nodes: np.ndarray) -> np.ndarray:
+def _interpolate_axis(table_values: np.ndarray, axis: int, old_nodes: np.ndarray, new_nodes: np.ndarray) -> np.ndarray:
     """Values at new nodes along one axis, linear between the old ones and constant beyond."""
     if np.array_equal(old_nodes, new_nodes):
-        return values
+        return table_values
     cell = np.interp(new_nodes, old_nodes, np.arange(old_nodes.size))
     low = np.minimum(cell.astype(int), max(old_nodes.size - 2, 0))
-    share = np.expand_dims(cell - low, tuple(range(1, values.ndim - axis)))
-    values_below, values_above = values.take(low, axis), values.take(np.minimum(low + 1, old_nodes.size - 1), axis)
+    share = np.expand_dims(cell - low, tuple(range(1, table_values.ndim - axis)))
+    values_below, values_above = (
+        table_values.take(low, axis),
+        table_values.take(np.minimum(low + 1, old_nodes.size - 1), axis),
+    )
     return (1.0 - share) * values_below + share * values_above
 
 
@@ -173,59 +176,67 @@ class TableCell(NamedTuple):
     load_share: float
 
 
-def stacked_tables(tables: Sequence[TyreTable]) -> Tables:
+def stacked_tables(tyre_tables: Sequence[TyreTable]) -> Tables:
     """``Tables`` of several tyres on the union of their nodes, which does not change their interpolated values."""
-    if not tables:
+    if not tyre_tables:
         raise InputError("", "tyres", [], "needs at least one table")
-    nodes = [np.unique(np.concatenate([getattr(t, name) for t in tables])) for name in ("angles", "slips", "loads")]
-    fine = [t.refined(*nodes) for t in tables]
+    nodes = [
+        np.unique(np.concatenate([getattr(t, name) for t in tyre_tables])) for name in ("angles", "slips", "loads")
+    ]
+    fine = [t.refined(*nodes) for t in tyre_tables]
     return Tables(*nodes, *(np.stack([getattr(t, name) for t in fine]) for name in ("mu_x", "g", "h")))
 
 
 @lean
-def cell_and_share(nodes, node_value):
+def cell_and_share(table_nodes, node_value):
     """Index of the table cell that contains a value, and the value's relative position in the cell; clamped at the
     ends."""
-    last_node = nodes.size - 1
-    if last_node == 0 or node_value <= nodes[0]:
+    last_node = table_nodes.size - 1
+    if last_node == 0 or node_value <= table_nodes[0]:
         return 0, 0.0
-    if node_value >= nodes[last_node]:
+    if node_value >= table_nodes[last_node]:
         return last_node - 1, 1.0
     low, high = 0, last_node
     while high - low > 1:
         middle = (low + high) // 2
-        if nodes[middle] <= node_value:
+        if table_nodes[middle] <= node_value:
             low = middle
         else:
             high = middle
-    return low, (node_value - nodes[low]) / (nodes[low + 1] - nodes[low])
+    return low, (node_value - table_nodes[low]) / (table_nodes[low + 1] - table_nodes[low])
 
 
 @lean
-def lateral_adhesion(table, cells, k, w, slip_factors, angle_factors):
-    """Lateral friction coefficient mu_y of a table at the slip angle and load of ``cells``, and at the slip in cell k
+def lateral_adhesion(table_index, table_cell, slip_cell, slip_share, slip_factors, angle_factors):
+    """Lateral friction coefficient mu_y of a table at the slip angle and load of ``table_cell``, and at the slip in cell k
     with relative position w."""
-    i, p, j, q = cells
+    i, p, j, q = table_cell
     i1, j1, k1 = (
         min(i + 1, angle_factors.shape[1] - 1),
         min(j + 1, angle_factors.shape[2] - 1),
-        min(k + 1, slip_factors.shape[2] - 1),
+        min(slip_cell + 1, slip_factors.shape[2] - 1),
     )
-    by_slip = (1.0 - p) * ((1.0 - w) * slip_factors[table, i, k] + w * slip_factors[table, i, k1])
-    by_slip += p * ((1.0 - w) * slip_factors[table, i1, k] + w * slip_factors[table, i1, k1])
+    by_slip = (1.0 - p) * (
+        (1.0 - slip_share) * slip_factors[table_index, i, slip_cell] + slip_share * slip_factors[table_index, i, k1]
+    )
+    by_slip += p * (
+        (1.0 - slip_share) * slip_factors[table_index, i1, slip_cell] + slip_share * slip_factors[table_index, i1, k1]
+    )
     if q == 0.0:  # at a node, as everywhere in a table of one load
-        return by_slip * ((1.0 - p) * angle_factors[table, i, j] + p * angle_factors[table, i1, j])
-    by_load = (1.0 - p) * ((1.0 - q) * angle_factors[table, i, j] + q * angle_factors[table, i, j1])
-    by_load += p * ((1.0 - q) * angle_factors[table, i1, j] + q * angle_factors[table, i1, j1])
+        return by_slip * ((1.0 - p) * angle_factors[table_index, i, j] + p * angle_factors[table_index, i1, j])
+    by_load = (1.0 - p) * ((1.0 - q) * angle_factors[table_index, i, j] + q * angle_factors[table_index, i, j1])
+    by_load += p * ((1.0 - q) * angle_factors[table_index, i1, j] + q * angle_factors[table_index, i1, j1])
     return by_slip * by_load
 
 
 @lean
-def longitudinal_adhesion(table, cells, k, mu_x):
-    """Longitudinal friction coefficient mu_x of a table at the slip angle and load of ``cells``, and at slip node k."""
-    i, p, j, q = cells
+def longitudinal_adhesion(table_index, table_cell, slip_node, mu_x):
+    """Longitudinal friction coefficient mu_x of a table at the slip angle and load of ``table_cell``, and at slip node k."""
+    i, p, j, q = table_cell
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
     if q == 0.0:
-        return (1.0 - p) * mu_x[table, i, j, k] + p * mu_x[table, i1, j, k]
-    low = (1.0 - q) * mu_x[table, i, j, k] + q * mu_x[table, i, j1, k]
-    return (1.0 - p) * low + p * ((1.0 - q) * mu_x[table, i1, j, k] + q * mu_x[table, i1, j1, k])
+        return (1.0 - p) * mu_x[table_index, i, j, slip_node] + p * mu_x[table_index, i1, j, slip_node]
+    low = (1.0 - q) * mu_x[table_index, i, j, slip_node] + q * mu_x[table_index, i, j1, slip_node]
+    return (1.0 - p) * low + p * (
+        (1.0 - q) * mu_x[table_index, i1, j, slip_node] + q * mu_x[table_index, i1, j1, slip_node]
+    )

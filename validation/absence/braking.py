@@ -50,7 +50,7 @@ def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dic
 def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
     """Counts of the components in the model of a braked vehicle and its controller, by kind."""
     from models.brake.controllers import CONTROLLERS
-    from models.brake.pressure import resting_chambers
+    from models.brake.pressure import air_at_rest
     from models.systems.braking.measured_pressures import MeasuredPressures
 
     plane, brakes, chambers = vehicle.plane, vehicle.brakes, vehicle.chambers
@@ -72,7 +72,7 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
         "lags": 0 if vehicle.relaxation is None else vehicle.relaxation.size,
         "moving loads": int(((plane.by_x != 0.0) | (plane.by_y != 0.0)).sum()),
         "time constants": int((chambers.fill_time > 0.0).sum() + (chambers.empty_time > 0.0).sum()),
-        "kept commands": (len(resting_chambers(chambers, vehicle.sample).commands) - 2) * plane.wheels,
+        "kept commands": (len(air_at_rest(chambers, vehicle.sample).commands) - 2) * plane.wheels,
         "slow fillings": chambers.slow.size,
         "volumes": chambers.volumes.size,
         "push-outs": int((brakes.push_out > 0.0).sum()),

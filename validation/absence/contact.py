@@ -25,7 +25,7 @@ HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the features that a scene's contact theory uses (spin, falling friction, contact search, ...), and the
     creep forces as bytes."""
-    from models.contact.theories import Exact, ExactOnEllipse, LinearTheory, Simplified
+    from models.contact.theories import ExactTheory, ExactTheoryOnEllipse, LinearTheory, SimplifiedTheory
     from models.systems.contact import run
 
     coarse = scene.model_copy(update={"method": scene.method.model_copy(update={"cells": 7})})
@@ -34,8 +34,8 @@ def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], b
     body = forces.detail.contact
     counts = {
         "bounded": int(not isinstance(body, LinearTheory)),
-        "areas of any shape": int(isinstance(body, Simplified)),
-        "half-spaces": int(isinstance(body, Exact | ExactOnEllipse)),
+        "areas of any shape": int(isinstance(body, SimplifiedTheory)),
+        "half-spaces": int(isinstance(body, ExactTheory | ExactTheoryOnEllipse)),
         "laws of friction": int(getattr(body, "choices", {}).get("falling") is not None),
         "searches": searched.call_count,
         "motions with spin": int((forces["spin"] != 0.0).sum()),

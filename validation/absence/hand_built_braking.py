@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.plane_records import REPORT_SIZE, Report, report_of
-from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
+from models.brake.plane_records import REPORT_SIZE, WheelReport, report_of
+from models.brake.wheel_step import BrakedWheel, TyreGrip, WheelStepInput, wheel_step
 from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
 from models.systems.braking.march import BrakingPath
@@ -138,11 +138,11 @@ def store_tyre_forces(i, step_input, truck_state, truck, workspace):
     )
     sign, cells = 1.0 if u0 >= 0.0 else -1.0, TableCell(workspace.cell[i], workspace.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
-        StepInput(
+        WheelStepInput(
             sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
         ),
-        Wheel(truck.radius[i], truck.spin[i], sign * truck_state.turning[i]),
-        Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
+        BrakedWheel(truck.radius[i], truck.spin[i], sign * truck_state.turning[i]),
+        TyreGrip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
     k, cell_share = cell_and_share(tables.slips, abs(slip))
     side = load * lateral_adhesion(0, cells, k, cell_share, tables.g, tables.h)
@@ -171,7 +171,7 @@ def accelerations_by_tyres(truck_state, torques_before, torques_after, step, tru
             + workspace.arm[i] * accelerations[2]
         )
         speed = workspace.initial_speed[i]
-        step_input = StepInput(speed, speed + step * rate, torques_before[i], torques_after[i], step)
+        step_input = WheelStepInput(speed, speed + step * rate, torques_before[i], torques_after[i], step)
         store_tyre_forces(i, step_input, truck_state, truck, workspace)
         fx, fy, e, f = report.force_x[i], report.force_y[i], workspace.east[i], workspace.north[i]
         ax, ay = ax + e * fx - f * fy, ay + f * fx + e * fy
@@ -357,7 +357,7 @@ def run(vehicle: Any, speed: float, steer: float, most_samples: int) -> Callable
             stop.turning[:n],
             pressure * applied * np.ones(4),
             torque * applied,
-            Report(*np.moveaxis(stop.reports[1:n], 1, 0)),
+            WheelReport(*np.moveaxis(stop.reports[1:n], 1, 0)),
             True,
             ("x", "y", "heading_0"),
         )

@@ -11,10 +11,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.contact.fastsim import Ellipse
-from models.contact.fastsim_grid import grid
+from models.contact.fastsim import FastsimEllipse
+from models.contact.fastsim_grid import ellipse_grid
 from models.contact.inputs import Array
-from models.contact.linear_theory import flexibilities
+from models.contact.linear_theory import fastsim_flexibilities
 from models.contact.material import MaterialPair
 from models.machine.compiled import njit
 from models.machine.timing import interleave, paired_ratio
@@ -55,9 +55,9 @@ def contact_jobs() -> tuple[Callable[[], Array], Callable[[], Array]]:
     """Two functions that compute the same contact CALLS_PER_JOB times, by twinrig and by hand-written code. Both return
     the creep forces fx, fy (N)."""
     pair = MaterialPair()
-    product = Ellipse(1.0, pair, cells=CELLS_PER_STRIP, march="plain", flexibilities="three")
-    flexible = tuple(float(value) for value in flexibilities(RADIUS, RADIUS, pair))[:2]
-    strips, cells = grid(CELLS_PER_STRIP, product.net.strips.shape[1], "intermediate").records
+    product = FastsimEllipse(1.0, pair, cells=CELLS_PER_STRIP, march="plain", flexibilities="three")
+    flexible = tuple(float(value) for value in fastsim_flexibilities(RADIUS, RADIUS, pair))[:2]
+    strips, cells = ellipse_grid(CELLS_PER_STRIP, product.net.strips.shape[1], "intermediate").records
     halves, shares, bound = strips.half, strips.part, cells.bound
 
     def run_twinrig() -> Array:

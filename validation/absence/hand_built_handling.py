@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from models.contact.fastsim_many import forces_within
-from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
+from models.contact.fastsim_many import fill_contact_forces_in_place
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, MarchWorkspace, cells_in, strips_in
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import principal_inertias
@@ -65,13 +65,13 @@ def add_car_forces(table, t, q, v, forces_out):
         moment = plus(moment, _wheel_forces(row(wheels, WHEEL_NUMBERS, i), frame, passing, q, v, i, left))
     _add_bar_forces((head[6], head[7], head[8]), 0, left, q, forces_out)
     _add_bar_forces((head[9], head[10], head[11]), 2, left, q, forces_out)
-    forces_within(
+    fill_contact_forces_in_place(
         records(contacts, 4, CONTACT),
         strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
         cells_in(array(cells, (5, CELLS)), head[13]),
         THREE_BRISTLES,
         SECOND_ORDER_MARCH,
-        Workspace(stacked(4, SLIP), stacked(1, BLOCK)),
+        MarchWorkspace(stacked(4, SLIP), stacked(1, BLOCK)),
         forces,
     )
     force_along, across, turn, lift = 0.0, 0.0, 0.0, 0.0

@@ -5,18 +5,20 @@ from collections.abc import Callable
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
-from models.brake.plane_records import Report, motion_of
-from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane, plane_of_truck
-from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road
+from models.brake.plane_records import WheelReport, motion_of
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, PlaneVehicle, plane_of_truck
+from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad
 from models.core.errors import RunFailed
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
 
-def on_road(plane: Plane, tables: Tables, road: Road = UNIFORM_ROAD, slope: float = 10.0) -> OnRoad:
+def on_road(
+    plane: PlaneVehicle, tables: Tables, road: RoadSurfaces = UNIFORM_ROAD, slope: float = 10.0
+) -> VehicleOnRoad:
     """A plane vehicle on a road, all of its wheels with the same tyre. slope: cornering slope of its friction
     (1/rad)."""
-    return OnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
+    return VehicleOnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
 
 
 class RollingTruck:
@@ -28,7 +30,7 @@ class RollingTruck:
 
     def __init__(
         self,
-        vehicle: OnRoad,
+        vehicle: VehicleOnRoad,
         speed: float,
         *,
         steer: float = 0.0,
@@ -52,9 +54,9 @@ class RollingTruck:
         return self.motion.turning
 
     @property
-    def report(self) -> Report:
+    def report(self) -> WheelReport:
         """Forces, loads, slips and further quantities of the wheels in the last step."""
-        return Report(*self.motion.report)
+        return WheelReport(*self.motion.report)
 
     @property
     def speed(self) -> float:
@@ -91,7 +93,7 @@ LOCKING_TORQUE = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def truck_on_tables(tables: Tables | None = None, plane: Plane = PAPER_PLANE) -> OnRoad:
+def truck_on_tables(tables: Tables | None = None, plane: PlaneVehicle = PAPER_PLANE) -> VehicleOnRoad:
     """The paper's truck on ice, or on other tyre tables with the cornering slope of ice."""
     return on_road(plane, tables or stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering)
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.brake import PAPER_FRONT, of_wheels, torque
-from models.brake.controller import AllApplied, Command, Sample
-from models.brake.plane_chain import inertia
+from models.brake.brake import PAPER_FRONT_BRAKE, brake_torque, brakes_of_wheels
+from models.brake.controller import Command, NoAntiLock, Sample
+from models.brake.plane_chain import fill_mass_matrix
 from models.brake.plane_step import redistribute_negative_loads
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
-from models.brake.port.ask import checked_answer
-from models.brake.surfaces import Stretch, road
+from models.brake.port.ask import usable_command
+from models.brake.surfaces import RoadStretch, road_of_stretches
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_train
 from models.systems.braking.march import StartState
 from models.systems.braking.procedures import vehicle_and_start_state
@@ -56,8 +56,10 @@ def mirrored_truck_error(implementation: str, folder: Path) -> float:
     """Case: the truck brakes and steers left, with less friction on the left. Error: difference (m, rad) from the
     mirror image of the mirrored stop."""
     ends = []
-    for side, stretch in ((1.0, Stretch(0.0, 0, 1)), (-1.0, Stretch(0.0, 1, 0))):
-        moved_vehicle = AdvancedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
+    for side, stretch in ((1.0, RoadStretch(0.0, 0, 1)), (-1.0, RoadStretch(0.0, 1, 0))):
+        moved_vehicle = AdvancedVehicle(
+            implementation, TRUCK, ICE, DRY, road=road_of_stretches([stretch]), steer=0.05 * side
+        )
         moved_vehicle.advance_with(np.full((101, 4), 2e3))
         ends.append(moved_vehicle.state * np.array([1.0, side, side]))
     return float(np.abs(ends[0] - ends[1]).max())
@@ -87,7 +89,7 @@ def jackknifed_train_error(implementation: str, folder: Path) -> float:
     def energy() -> float:
         mass, right_side = np.zeros((5, 5)), np.zeros(5)
         units = np.column_stack((np.cos(state[0, 2:]), np.sin(state[0, 2:])))
-        inertia(units, state[1], plane, mass, right_side, right_side.copy(), right_side.copy())
+        fill_mass_matrix(units, state[1], plane, mass, right_side, right_side.copy(), right_side.copy())
         return float(0.5 * state[1] @ mass @ state[1])
 
     levels = [energy()]
@@ -104,7 +106,9 @@ def split_friction_error(implementation: str, folder: Path) -> float:
         (piecewise_linear_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)),
         plane_of_truck(PAPER_TRUCK, with_load_transfer=False),
     )
-    moved_vehicle = AdvancedVehicle(implementation, plane, *tyres, rim_turning=0.0, road=road([Stretch(0.0, 0, 1)]))
+    moved_vehicle = AdvancedVehicle(
+        implementation, plane, *tyres, rim_turning=0.0, road=road_of_stretches([RoadStretch(0.0, 0, 1)])
+    )
     moved_vehicle.advance_with(np.full((6, 4), 2e4), 1e-3)
     lost = abs((SPEED - moved_vehicle.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
     return lost if moved_vehicle.state[1, 2] < 0.0 else np.inf
@@ -124,9 +128,9 @@ def motion_after_rest_on_lagging_tyres(implementation: str, folder: Path) -> flo
     vehicle, start_state = vehicle_and_start_state(scene, "stop")
     vehicle = vehicle_in_engine(vehicle, implementation)
     start_state.state[1, 1] = 0.2
-    path = vehicle.run(AllApplied(4), start_state, 10.0)
+    path = vehicle.run(NoAntiLock(4), start_state, 10.0)
     rest_state = StartState(path.states[-1].copy(), path.turning[-1].copy())
-    path_after = vehicle.run(AllApplied(4), rest_state, 1.0)
+    path_after = vehicle.run(NoAntiLock(4), rest_state, 1.0)
     displacement = np.abs(path_after.states[:, 0] - rest_state.state[0]).max() + np.abs(path_after.states[:, 1]).max()
     return float(displacement) if path.ended_at_rest else np.inf
 
@@ -169,7 +173,7 @@ def load_sharing_error(implementation: str, folder: Path) -> float:
 
 def torque_below_push_out(implementation: str, folder: Path) -> float:
     """Case: a brake just below its push-out pressure. Error: its torque (N m), which should be 0."""
-    return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
+    return float(brake_torque(0, 0.99 * PAPER_FRONT_BRAKE.push_out, 0.0, brakes_of_wheels(PAPER_FRONT_BRAKE)))
 
 
 def impossible_command_case(supply_pressure: float = 8.0, **command: Any) -> Error:
@@ -177,7 +181,7 @@ def impossible_command_case(supply_pressure: float = 8.0, **command: Any) -> Err
     refused. Error: infinite if it is not."""
 
     def error(implementation: str, folder: Path) -> float:
-        checked_answer(
+        usable_command(
             Command(**command),
             Sample(3, 16_500_000, np.ones(4), True, supply_pressure, 10.0),
             maximum_pressure=supply_pressure,

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FATAL_ENDS, advance, ending_sentence
-from models.brake.plane_vehicle import GRAVITY, Plane
-from models.brake.quarter import Quarter
-from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
+from models.brake.advance import AT_REST, FATAL_END_STATUSES, advance, ending_sentence
+from models.brake.plane_vehicle import GRAVITY, PlaneVehicle
+from models.brake.quarter import QuarterVehicle
+from models.brake.surfaces import UNIFORM_ROAD, RoadStretch, RoadSurfaces, road_of_stretches
 from models.core.errors import RunFailed
 from models.engines.braking import EngineChassis
 from models.tyre.magic_formula import table_of_surface
@@ -19,7 +19,7 @@ from validation.braking.quarter_stops import exact_distance
 
 Error = Callable[[str, Path], float]
 STEP, SPEED = 5.5e-3, 10.0
-QUARTER = Quarter(mass=1700.0, radius=0.5, spin_inertia=13.35)
+QUARTER = QuarterVehicle(mass=1700.0, radius=0.5, spin_inertia=13.35)
 LOAD = QUARTER.mass * GRAVITY
 DRY, ICE = table_of_surface("dry"), table_of_surface("ice")
 
@@ -40,11 +40,11 @@ class AdvancedVehicle(RollingTruck):
     def __init__(
         self,
         implementation: str,
-        plane: Plane,
+        plane: PlaneVehicle,
         *tyres: TyreTable,
         speed: float = SPEED,
         rim_turning: float | None = None,
-        road: Road = UNIFORM_ROAD,
+        road: RoadSurfaces = UNIFORM_ROAD,
         steer: float = 0.0,
     ) -> None:
         go = advance if implementation == "reference" else EngineChassis(implementation, plane).advance
@@ -58,7 +58,7 @@ class AdvancedVehicle(RollingTruck):
         vehicle came to rest. Raises RunFailed."""
         self.motion.accelerations[:] = 0.0
         status, used = self.on(torques, step)
-        if status in FATAL_ENDS:
+        if status in FATAL_END_STATUSES:
             raise RunFailed(self.implementation, ending_sentence(status, self.plane, self.motion), used)
         return status == AT_REST and bool(np.isfinite(self.state).all() and np.isfinite(self.turning).all())
 
@@ -74,7 +74,7 @@ def stopping_distance(
     *tyres: TyreTable,
     step: float = STEP,
     rim_turning: float | None = None,
-    road: Road = UNIFORM_ROAD,
+    road: RoadSurfaces = UNIFORM_ROAD,
 ) -> float:
     """Stopping distance (m) of the quarter vehicle under a constant brake torque (N m); infinite unless all speeds end
     at exactly 0."""
@@ -150,7 +150,12 @@ def changing_friction_error(implementation: str, folder: Path) -> float:
     stopping distance from its closed form."""
     slick, rough = (piecewise_linear_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
     distance = stopping_distance(
-        implementation, 1e5, slick, rough, rim_turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)])
+        implementation,
+        1e5,
+        slick,
+        rough,
+        rim_turning=0.0,
+        road=road_of_stretches([RoadStretch(0.0, 0, 0), RoadStretch(10.0, 1, 1)]),
     )
     return abs(distance / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
 
@@ -194,7 +199,9 @@ def released_brake_error(implementation: str, folder: Path) -> float:
 def surface_line_error(implementation: str, folder: Path) -> float:
     """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the stopping
     distance (m) from the distance on dry surface alone."""
-    distance_on_line = stopping_distance(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
+    distance_on_line = stopping_distance(
+        implementation, 2e3, DRY, ICE, road=road_of_stretches([RoadStretch(0.0, 0, 1)])
+    )
     return abs(distance_on_line - stopping_distance(implementation, 2e3, DRY))
 
 
@@ -202,7 +209,7 @@ def surface_change_error(implementation: str, folder: Path) -> float:
     """Case: a lightly braked wheel whose surface changes from dry to wet within a step of 20 ms. Error: relative
     difference of the stopping distance from the distance with unchanged tyre force."""
     level, steady_distance, turning = constant_slip_stop(DRY, 0.004)
-    two_surfaces = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
+    two_surfaces = road_of_stretches([RoadStretch(0.0, 0, 0), RoadStretch(5.03, 1, 1)])
     stop = stopping_distance(
         implementation, level, DRY, table_of_surface("wet"), step=2e-2, rim_turning=turning, road=two_surfaces
     )

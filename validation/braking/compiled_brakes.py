@@ -3,19 +3,19 @@ code."""
 
 import numpy as np
 
-from models.brake.plain.suspension import WheelForces
-from models.brake.plain.tyre import BrakedStep, Surface, WheelMotion
-from models.brake.plane_records import KNOWN, REPORT_SIZE, Report, Wheels
+from models.brake.plain.suspension import ConstantWheelForces
+from models.brake.plain.tyre import BrakedStep, WheelMotion, WheelSurface
+from models.brake.plane_records import REPORT_SIZE, WHEEL_QUANTITY_COUNT, WheelReport, WheelStates
+from models.brake.plane_step import fill_tyre_report as compiled_tyre
 from models.brake.plane_step import set_slip_angle
-from models.brake.plane_step import tyre as compiled_tyre
-from models.brake.plane_vehicle import PAPER_TRUCK, Plane, plane_of_truck
-from models.brake.relaxation import Lag
-from models.brake.relaxation import lag_on as compiled_lag_on
-from models.brake.sprung import Sprung
+from models.brake.plane_vehicle import PAPER_TRUCK, PlaneVehicle, plane_of_truck
+from models.brake.relaxation import TyreLag
+from models.brake.relaxation import advance_all_lagging_slips as compiled_lag_on
+from models.brake.sprung import SprungVehicle
 from models.brake.sprung_step import VALUES_PER_WHEEL
-from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, surfaces
-from models.brake.surfaces import under_wheels as compiled_under_wheels
-from models.brake.wheel_step import StepInput, Wheel
+from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad, new_wheel_surfaces
+from models.brake.surfaces import fill_surfaces_under_wheels as compiled_under_wheels
+from models.brake.wheel_step import BrakedWheel, WheelStepInput
 from models.engines.braking_sprung import driven_vehicle
 from models.engines.free_vehicle import FreeModel, free_model
 from models.tyre.magic_formula import table_of_surface
@@ -28,13 +28,19 @@ from models.tyre.tyre_table import (
     stacked_tables,
 )
 
-PAPER_PLANE: Plane = plane_of_truck(PAPER_TRUCK)
+PAPER_PLANE: PlaneVehicle = plane_of_truck(PAPER_TRUCK)
 DRY_TABLES = stacked_tables([table_of_surface("dry")])
 
 
-def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
-    """Report (7,) of a tyre after a step, by compiled code: the same values as by ``models.brake.plain.tyre.tyre``."""
-    wheels, report, surfaces_below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORT_SIZE, 1)), surfaces(1)
+def tyre(tables: Tables, surface: WheelSurface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
+    """Report (7,) of a tyre after a step, by compiled code: the same values as by
+    ``models.brake.plain.tyre.tyre_report``.
+    """
+    wheels, report, surfaces_below = (
+        WheelStates(*np.zeros((WHEEL_QUANTITY_COUNT, 1))),
+        np.empty((REPORT_SIZE, 1)),
+        new_wheel_surfaces(1),
+    )
     surfaces_below.first[0], surfaces_below.second[0], surfaces_below.share[0] = (
         surface.first,
         surface.second,
@@ -43,15 +49,15 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
     wheels.start[0], wheels.load[0] = motion.start, load
     forward_speed = motion.forward_speed if motion.start >= 0.0 else -motion.forward_speed
     set_slip_angle(0, forward_speed, motion.across, motion.least_speed, surfaces_below.lag, tables.angles, wheels)
-    step_input = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
+    step_input = WheelStepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
     compiled_tyre(
         0,
         step_input,
-        Wheel(braked.radius, braked.inertia, braked.turning),
+        BrakedWheel(braked.radius, braked.inertia, braked.turning),
         tables,
         wheels,
         surfaces_below,
-        Report(*report),
+        WheelReport(*report),
     )
     return report[:, 0]
 
@@ -69,11 +75,11 @@ def friction(tables: Tables, table_index: int, angle: float, load: float, slip: 
     return mu_below + w * (mu_above - mu_below), lateral_adhesion(table_index, cells, s, w, tables.g, tables.h)
 
 
-def under_wheels(road: Road, state: np.ndarray, step: float, surface_kinds: np.ndarray) -> np.ndarray:
+def under_wheels(road: RoadSurfaces, state: np.ndarray, step: float, surface_kinds: np.ndarray) -> np.ndarray:
     """Surfaces under the truck's four wheels during a step (s) from a state (2, 3), by compiled code: number of the
     first surface, of the second, and share of the second (4, 3)."""
-    surfaces_below = surfaces(4)
-    compiled_under_wheels(state, step, OnRoad(PAPER_PLANE, surface_kinds, 0.0, DRY_TABLES, road), surfaces_below)
+    surfaces_below = new_wheel_surfaces(4)
+    compiled_under_wheels(state, step, VehicleOnRoad(PAPER_PLANE, surface_kinds, 0.0, DRY_TABLES, road), surfaces_below)
     return np.column_stack((surfaces_below.first, surfaces_below.second, surfaces_below.share))
 
 
@@ -83,19 +89,19 @@ def lag_on(
     """Lagging slip angles of the truck's tyres after a time step and those used within the step (4,), rad, by compiled
     code. Arguments as in ``validation.braking.plain_relaxation.lag_on``."""
     lags_after, lagging = slip_lags.copy(), np.zeros(4)
-    truck_on_road = OnRoad(PAPER_PLANE, np.zeros(4, dtype=np.int64), slope, DRY_TABLES, UNIFORM_ROAD)
-    compiled_lag_on(state, time, steer, truck_on_road, Lag(length, lags_after), lagging)
+    truck_on_road = VehicleOnRoad(PAPER_PLANE, np.zeros(4, dtype=np.int64), slope, DRY_TABLES, UNIFORM_ROAD)
+    compiled_lag_on(state, time, steer, truck_on_road, TyreLag(length, lags_after), lagging)
     return lags_after, lagging
 
 
-def engine_model(vehicle: Sprung, engine: str) -> FreeModel:
+def engine_model(vehicle: SprungVehicle, engine: str) -> FreeModel:
     """Model of a vehicle on its suspension in an engine that calls the compiled forces. ``wheel_force_views`` of its
     table gives access to the quantities that are constant at each wheel during a step."""
     return free_model(engine, driven_vehicle(vehicle, engine))
 
 
-def wheel_force_views(table: np.ndarray, wheels: int = 4) -> WheelForces:
+def wheel_force_views(table: np.ndarray, wheels: int = 4) -> ConstantWheelForces:
     """Views into a model's parameter table on the quantities that are constant at each wheel during a step (steer
     angles, forces, spin moments); writing to them changes the table."""
     rows = table[-wheels * VALUES_PER_WHEEL :].reshape(VALUES_PER_WHEEL, wheels)
-    return WheelForces(rows[0], rows[1:3].T, rows[3])
+    return ConstantWheelForces(rows[0], rows[1:3].T, rows[3])

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate_of_phase
-from models.brake.controllers.five_phase_cycle import WheelAtSpeed
+from models.brake.controllers.five_phase import FivePhase, phase_end_threshold, pressure_rate_of_phase
+from models.brake.controllers.five_phase_cycle import WheelAtConstantSpeed
 
 
 @dataclass(frozen=True)
@@ -114,13 +114,15 @@ def advance_phase(wheel: ExactWheel, state: list[float], rate: float, sign: floa
 
 
 def exact_cycle(
-    wheel_at_speed: WheelAtSpeed, controller: FivePhase, first_rate: float | None = None
+    wheel_at_speed: WheelAtConstantSpeed, controller: FivePhase, first_rate: float | None = None
 ) -> tuple[float, float]:
     """Period (s) and mean force (divided by the largest tyre force) of the five-phase limit cycle of a wheel at
     constant vehicle speed. first_rate: rate of pressure (bar/s) in the first application."""
-    rates = [rate_of_phase(k, controller) for k in range(6)]
+    rates = [pressure_rate_of_phase(k, controller) for k in range(6)]
     rates[0] = rates[0] if first_rate is None else first_rate
-    phases = [(wheel_at_speed.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
+    phases = [
+        (wheel_at_speed.brake.rising * speed, *phase_end_threshold(k, controller)) for k, speed in enumerate(rates)
+    ]
     forces = wheel_at_speed.load * wheel_at_speed.tyre.mu_x[0, 0]
     return last_control_cycle(
         ExactWheel(

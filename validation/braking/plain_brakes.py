@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels
+from models.brake.brake import Brake, brakes_of_wheels
 from models.brake.controller import APPLY, HOLD, RELEASE, SLOW
 from models.brake.plain import pressure as plain_pressure
 from models.brake.plain import road as plain_road
 from models.brake.plain import tyre as plain_tyre
-from models.brake.pressure import Air, Chambers, by_pressures, by_valves, resting_chambers
-from models.brake.surfaces import Road, Stretch, road
+from models.brake.pressure import AirState, BrakeChambers, advance_by_pressures, advance_by_valves, air_at_rest
+from models.brake.surfaces import RoadStretch, RoadSurfaces, road_of_stretches
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking import compiled_brakes as compiled
@@ -61,11 +61,11 @@ def tyre_reports(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.n
         load *= random.choice([1.0, 1.0, 0.03])  # of light loads the slip decays so slowly that a series stands for it
         torques = level * random.uniform(0.5, 1.0), level * random.uniform(0.0, 1.0)
         first, second_table = map(int, random.integers(0, 3, 2))
-        under = plain_tyre.Surface(first, second_table, float(random.choice([0.0, random.uniform()])))
+        under = plain_tyre.WheelSurface(first, second_table, float(random.choice([0.0, random.uniform()])))
         turning = u * (1.0 - slip) / radius
         motion = plain_tyre.WheelMotion(u, rate, u + 0.5 * step * rate, across, 0.1)
         braked = plain_tyre.BrakedStep(torques, step, radius, inertia, turning)
-        plain[i] = plain_tyre.tyre(tyre_tables, under, motion, load, braked)
+        plain[i] = plain_tyre.tyre_report(tyre_tables, under, motion, load, braked)
         reports[i] = compiled.tyre(tyre_tables, under, motion, load, braked)
     return reports, plain
 
@@ -74,13 +74,15 @@ def random_surfaces(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[n
     """Surfaces under the wheels of a truck that crosses seams and lines between surfaces, by compiled and by plain
     code. Shape (4 state_count, 3): number of the first surface, of the second, share of the second."""
     random, shares, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
-    stretched: Road = road([Stretch(0.0, 0, 1), Stretch(1.0, 2, 2), Stretch(1.7, 1, 0)], 0.3, 2)
+    stretched: RoadSurfaces = road_of_stretches(
+        [RoadStretch(0.0, 0, 1), RoadStretch(1.0, 2, 2), RoadStretch(1.7, 1, 0)], 0.3, 2
+    )
     kind = np.array([0, 0, 1, 1])
     for _ in range(state_count):
         state = np.array([random.uniform(-2.0, 4.0, 3), random.uniform(-30.0, 30.0, 3)]) * [1.0, 0.5, 1.0]
         step = random.choice([5.5e-3, 1e-3])
         shares.append(compiled.under_wheels(stretched, state, step, kind))
-        under = plain_road.under_wheels(
+        under = plain_road.surfaces_under_wheels(
             stretched, plain_road.ground_paths(state[0], state[1], PAPER_PLANE.place, step), kind
         )
         plain += [[surface.first, surface.second, surface.share] for surface in under]
@@ -91,7 +93,7 @@ def torques_by_commands(sample_count: int = 60, seed: int = SEED) -> tuple[np.nd
     """Pressures, torques and supply pressure (n, 9) under random valve and pressure commands, by compiled and by plain
     code."""
     random, four = np.random.default_rng(seed), np.ones(4)
-    brakes = of_wheels(
+    brakes = brakes_of_wheels(
         Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1600.0),
         Brake(push_out=0.7, release=0.7, rising=1400.0, falling=1400.0),
         Brake(push_out=0.25, release=0.2, rising=1200.0, falling=1300.0),
@@ -99,27 +101,27 @@ def torques_by_commands(sample_count: int = 60, seed: int = SEED) -> tuple[np.nd
     )
     rows: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
     for delay in (0.0, 2e-3, 5.5e-3, 13e-3):
-        chambers = Chambers(
+        chambers = BrakeChambers(
             0.15 * four, np.array([0.1, 0.1, 0.0, 0.2]), 8.0, four * [0.5, 0.4, 0.3, 0.6], 40.0, delay, 0.6 * four
         )
-        airs = resting_chambers(chambers, 5.5e-3), resting_chambers(chambers, 5.5e-3)
-        pressures = plain_pressure.Pressures(chambers, brakes, 5.5e-3, airs[1])
+        airs = air_at_rest(chambers, 5.5e-3), air_at_rest(chambers, 5.5e-3)
+        pressures = plain_pressure.PlainAirSystem(chambers, brakes, 5.5e-3, airs[1])
         for n in range(sample_count):
             valves = random.choice([RELEASE, HOLD, APPLY, APPLY, SLOW], 4)
             torques = np.empty((2, 5, 4))
             if n % 20 == 19:
                 levels = random.uniform(0.0, 6.0, 4)
-                by_pressures(levels, airs[0], brakes, torques[0])
+                advance_by_pressures(levels, airs[0], brakes, torques[0])
                 pressures.by_pressures(levels, torques[1])
             else:
-                by_valves(valves, 5.5e-3, airs[0], chambers, brakes, torques[0])
+                advance_by_valves(valves, 5.5e-3, airs[0], chambers, brakes, torques[0])
                 pressures.by_valves(valves, torques[1])
             for k in range(2):
                 rows[k].append(_air_row(airs[k], torques[k]))
     return np.array(rows[0]), np.array(rows[1])
 
 
-def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
+def _air_row(air: AirState, torques: np.ndarray) -> np.ndarray:
     return np.concatenate((air.pressure, torques.ravel(), air.supply))
 
 
@@ -156,7 +158,7 @@ def friction_of_random_states(state_count: int = STATE_COUNT, seed: int = SEED) 
         single_tables = Tables(
             chosen.angles, chosen.slips, chosen.loads, chosen.mu_x[None], chosen.g[None], chosen.h[None]
         )
-        friction = plain_tyre.Friction(single_tables, plain_tyre.Surface(0, 0, 0.0), angle, load)
+        friction = plain_tyre.TyreFriction(single_tables, plain_tyre.WheelSurface(0, 0, 0.0), angle, load)
         friction_along = friction.force_along()
         plain[i] = np.interp(slip, friction_along.slips, friction_along.forces) / load, friction.side_force(slip) / load
     return coefficients, plain

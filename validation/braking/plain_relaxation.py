@@ -3,10 +3,10 @@
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from models.brake.brake import Brake, of_wheels
+from models.brake.brake import Brake, brakes_of_wheels
 from models.brake.plain import relaxation as plain
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.brake.pressure import Chambers
+from models.brake.pressure import BrakeChambers
 from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.magic_formula import table_of_surface
 from validation.braking.sprung_box import TORQUE_PER_BAR, steady_torques
@@ -35,7 +35,7 @@ def lag_on(
     speeds = np.array(
         [rotation(state[0, 2] + angle).T @ centre for angle, centre in zip(steer, centres, strict=True)]
     ).T
-    return plain.lag_on(slip_lags, speeds, time, length, slope)
+    return plain.advance_slip_tangents(slip_lags, speeds, time, length, slope)
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -52,8 +52,8 @@ def braked_turn_difference(relaxation_length: float, substeps: int = 4) -> float
     path = braked_vehicle_on_tyres(
         plane_of_truck(PAPER_TRUCK),
         [tyre],
-        of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=TORQUE_PER_BAR, falling=TORQUE_PER_BAR),)),
-        Chambers(np.zeros(4), np.zeros(4), 6.0),
+        brakes_of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=TORQUE_PER_BAR, falling=TORQUE_PER_BAR),)),
+        BrakeChambers(np.zeros(4), np.zeros(4), 6.0),
         steer=np.array([STEER_ANGLE, STEER_ANGLE, 0.0, 0.0]),
         substeps=substeps,
         relaxation=np.full(4, relaxation_length),

@@ -5,13 +5,13 @@ from functools import cache
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels
+from models.brake.brake import Brake, brakes_of_wheels
 from models.brake.controller import Controller
 from models.brake.controllers.slip import SlipBangBang
-from models.brake.plain.suspension import Suspension, WheelForces
-from models.brake.pressure import Chambers
-from models.brake.sprung import Sprung, suspended_vehicle
-from models.brake.surfaces import UNIFORM_ROAD, Stretch, road
+from models.brake.plain.suspension import ConstantWheelForces, PlainSuspension
+from models.brake.pressure import BrakeChambers
+from models.brake.sprung import SprungVehicle, suspended_vehicle
+from models.brake.surfaces import UNIFORM_ROAD, RoadStretch, road_of_stretches
 from models.engines.braking_sprung import EngineSprungVehicle
 from models.engines.braking_sprung_plain import PlainSprungVehicle
 from models.systems.braking.march import BrakedVehicle, BrakingPath, braked_vehicle_on_tyres
@@ -32,13 +32,13 @@ LARGEST_LEAN = 0.3
 
 
 @cache
-def asymmetric_twin() -> Sprung:
+def asymmetric_twin() -> SprungVehicle:
     """The asymmetric twin of the car on its suspension: a vehicle without any symmetry."""
     return suspended_vehicle(twin(), WHEEL_SPIN_INERTIA)
 
 
 @cache
-def car_with_stops() -> Sprung:
+def car_with_stops() -> SprungVehicle:
     """The car of 19 freedoms with bump stops, nonlinear dampers and dry friction at its wheels, and damped tyres."""
     stop = Curve((-0.06, -0.03, 0.0, 0.03, 0.06), (-4e3, -500.0, 0.0, 300.0, 3e3))
     damper = Curve((-1.0, -0.1, 0.0, 0.2, 1.0), (-900.0, -200.0, 0.0, 150.0, 400.0))
@@ -53,21 +53,21 @@ def car_with_stops() -> Sprung:
 
 
 @cache
-def towing_car() -> Sprung:
+def towing_car() -> SprungVehicle:
     """The car with a caravan on its tow ball, without aerodynamic drag."""
     return suspended_vehicle(replace(caravan(), drags=()), WHEEL_SPIN_INERTIA)
 
 
 @cache
-def asymmetric_train() -> Sprung:
+def asymmetric_train() -> SprungVehicle:
     """The asymmetric twin with a trailer made of a drawbar and a box, all without symmetry."""
     return suspended_vehicle(train(), WHEEL_SPIN_INERTIA)
 
 
 @cache
-def train_with_compiled_springs() -> Sprung:
+def train_with_compiled_springs() -> SprungVehicle:
     """The asymmetric twin with its trailer, all springs computed by the compiled force function."""
-    return suspended_vehicle(train(), WHEEL_SPIN_INERTIA, forces="compiled")
+    return suspended_vehicle(train(), WHEEL_SPIN_INERTIA, trailer_spring_code="compiled")
 
 
 VEHICLES = {"car": car, "twin": asymmetric_twin, "bent": car_with_stops}
@@ -75,14 +75,14 @@ TRAINS = {"caravan": towing_car, "train": asymmetric_train, "compiled train": tr
 EVERY_VEHICLE = {**VEHICLES, **TRAINS}
 
 
-def wheel_count(vehicle: Sprung) -> int:
+def wheel_count(vehicle: SprungVehicle) -> int:
     """Number of wheels of a vehicle, including those of its trailer."""
     return len(vehicle.handling.vehicle.tyres)
 
 
 def random_states(
     coordinate_count: int, state_count: int = STATE_COUNT, wheels: int = 4
-) -> tuple[np.ndarray, list[WheelForces]]:
+) -> tuple[np.ndarray, list[ConstantWheelForces]]:
     """Random coordinates and rates (state_count, 2, coordinate_count) at any heading, and random steer angles, forces
     and moments of their wheels.
     """
@@ -97,7 +97,7 @@ def random_states(
         random.normal(0.0, 15.0, (state_count, 2)),
     )
     wheel_forces = [
-        WheelForces(
+        ConstantWheelForces(
             random.normal(0.0, 0.2, wheels), random.normal(0.0, 3e3, (wheels, 2)), random.normal(0.0, 300.0, wheels)
         )
         for _ in range(state_count)
@@ -108,7 +108,7 @@ def random_states(
 @cache
 def plain_accelerations(vehicle: str, state_count: int = STATE_COUNT) -> np.ndarray:
     """Accelerations (state_count, number of coordinates) of a vehicle at the random states, by plain code."""
-    suspension = Suspension(EVERY_VEHICLE[vehicle]())
+    suspension = PlainSuspension(EVERY_VEHICLE[vehicle]())
     coordinates_and_rates, wheel_forces = random_states(suspension.size, state_count, len(suspension.tyres))
     return np.array(
         [
@@ -118,7 +118,7 @@ def plain_accelerations(vehicle: str, state_count: int = STATE_COUNT) -> np.ndar
     )
 
 
-def accelerations(vehicle: Sprung, engine: str, state_count: int = STATE_COUNT) -> np.ndarray:
+def accelerations(vehicle: SprungVehicle, engine: str, state_count: int = STATE_COUNT) -> np.ndarray:
     """Accelerations (state_count, number of coordinates) of a vehicle at the random states, by an engine that calls the
     compiled forces."""
     model, computed = engine_model(vehicle, engine), np.empty((state_count, vehicle.size))
@@ -141,7 +141,7 @@ def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     return difference if np.isfinite(difference) else np.inf
 
 
-def braked_vehicle_on_springs(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
+def braked_vehicle_on_springs(vehicle: SprungVehicle, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
     """A braked vehicle on its suspension, steered to the left, with hysteresis in its brakes. Its road is dry on the
     left and wet on the right for 3 m, then ice. lags: whether its tyres have relaxation lengths."""
     front, rear = (
@@ -153,9 +153,9 @@ def braked_vehicle_on_springs(vehicle: Sprung, engine: str, valves: bool, lags: 
     return braked_vehicle_on_tyres(
         plane,
         [table_of_surface(name) for name in ("wet", "dry", "ice")],
-        of_wheels(front, front, *[rear] * (plane.wheels - 2)),
-        Chambers(0.05 * unit_values, 0.04 * unit_values, 6.0, 0.5 * unit_values, 200.0, 3e-3),
-        road([Stretch(0.0, 1, 0), Stretch(3.0, 2, 2)], 0.2),
+        brakes_of_wheels(front, front, *[rear] * (plane.wheels - 2)),
+        BrakeChambers(0.05 * unit_values, 0.04 * unit_values, 6.0, 0.5 * unit_values, 200.0, 3e-3),
+        road_of_stretches([RoadStretch(0.0, 1, 0), RoadStretch(3.0, 2, 2)], 0.2),
         steer=np.where(on_front_unit, 0.05, 0.0),
         substeps=2,
         engine=PlainSprungVehicle(vehicle) if engine == "reference" else EngineSprungVehicle(engine, vehicle),
@@ -170,7 +170,7 @@ def controller(valves: bool, wheels: int = 4) -> Controller:
 
 
 def run(
-    vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
+    vehicle: SprungVehicle, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
     """Simulate a stop of a vehicle on its suspension from a speed (m/s) for a duration (s) in an engine."""
     return braked_vehicle_on_springs(vehicle, engine, valves, lags).run(
@@ -198,7 +198,9 @@ def path_difference(path: BrakingPath, other_path: BrakingPath) -> float:
     return difference if np.isfinite(difference) else np.inf
 
 
-def steady_circle_pair(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+def steady_circle_pair(
+    vehicle: SprungVehicle, speed: float = 8.0, radius: float = 30.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Steady circle of a vehicle at a speed (m/s) and radius (m), by MuJoCo's forces and by plain code. Each array has
     steer angles, wheel speeds and state; NaN where no steady turn exists."""
     rows = []

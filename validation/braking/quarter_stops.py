@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.quarter import Quarter, QuarterStop, braked
+from models.brake.quarter import QuarterStop, QuarterVehicle, stop_of_quarter_vehicle
 from models.brake.surfaces import UNIFORM_ROAD
 from models.machine.compiled import njit
 from models.tyre.magic_formula import table_of_surface
@@ -117,7 +117,7 @@ def march(scheme, u, w, torques, quarter_car, road, step):
 
 
 def stop_by_scheme(
-    scheme: int, quarter_car: Quarter, torques: np.ndarray, road: FrictionChange, speed: float, step: float
+    scheme: int, quarter_car: QuarterVehicle, torques: np.ndarray, road: FrictionChange, speed: float, step: float
 ) -> tuple[float, int, float]:
     """Stopping distance (m), number of steps and remaining speed (m/s), by a scheme, of a quarter vehicle that starts
     with a rolling wheel at a speed (m/s)."""
@@ -127,7 +127,7 @@ def stop_by_scheme(
 
 
 def stopping_distance(
-    scheme: str, quarter_car: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
+    scheme: str, quarter_car: QuarterVehicle, tyre: TyreTable, torque: float, speed: float, step: float
 ) -> tuple[float, float]:
     """Stopping distance (m) and remaining speed (m/s) by one of SCHEMES under a constant brake torque (N m), from a
     speed (m/s) with a rolling wheel.
@@ -143,7 +143,7 @@ def stopping_distance(
     return distance, left
 
 
-def exact_distance(quarter_car: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
+def exact_distance(quarter_car: QuarterVehicle, tyre: TyreTable, torque: float, speed: float) -> float:
     """Exact stopping distance (m), to a relative accuracy of 1e-9, under a constant torque (N m) from a speed (m/s)
     with a rolling wheel.
 
@@ -169,7 +169,7 @@ def exact_distance(quarter_car: Quarter, tyre: TyreTable, torque: float, speed: 
     return float(distance + math.exp(2.0 * log_speed) * m / (2.0 * np.interp(slip, nodes, forces)))
 
 
-FRONT_WHEEL = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
+FRONT_WHEEL = QuarterVehicle(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck with the mass that it carries while braking."""
 PAPER_STEP = 5.5e-3
 """Time step of the paper (s)."""
@@ -182,14 +182,14 @@ def friction_table(surface_name: str, friction_scale: float = 1.0) -> tuple[Tyre
     return tyre, stacked_tables([tyre])
 
 
-def steady_torque(quarter_car: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
+def steady_torque(quarter_car: QuarterVehicle, tyre: TyreTable, slip: float) -> tuple[float, float]:
     """Tyre force (N) at a slip, and brake torque (N m) at which this slip stays constant."""
     force = quarter_car.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return force, quarter_car.steady_torque(slip, force)
 
 
 def constant_torque_stop(
-    quarter_car: Quarter,
+    quarter_car: QuarterVehicle,
     tyre: tuple[TyreTable, Tables],
     torque: float,
     speed: float,
@@ -204,4 +204,6 @@ def constant_torque_stop(
     steps = (
         math.ceil((1.25 * speed * quarter_car.mass / least_force + 0.5 + extra_time) / step) if torque > 0.0 else 1000
     )
-    return braked(quarter_car, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, rim_turning)
+    return stop_of_quarter_vehicle(
+        quarter_car, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, rim_turning
+    )

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.brake.brake import Brake, of_wheels
-from models.brake.controller import SAMPLE, Controller, Sample
+from models.brake.brake import Brake, brakes_of_wheels
+from models.brake.controller import SAMPLING_PERIOD, Controller, Sample
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.pressure import APPLY, RELEASE, Chambers
-from models.brake.quarter import Quarter
+from models.brake.pressure import APPLY, RELEASE, BrakeChambers
+from models.brake.quarter import QuarterVehicle
 from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.magic_formula import NAMED_SURFACES, table_of_surface
 
@@ -27,18 +27,23 @@ RoadStretches = Sequence[tuple[float, Callable[[float], float]]]
 
 
 def twinrig_distance(
-    quarter_car: Quarter, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
+    quarter_car: QuarterVehicle, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
 ) -> float:
     """Stopping distance (m) of the quarter vehicle by twinrig, from a speed (m/s)."""
-    chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
+    chambers = BrakeChambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
     vehicle = braked_vehicle_on_tyres(
-        quarter_car.plane, [table_of_surface(surface_name)], of_wheels(brake), chambers, substeps=substeps
+        quarter_car.plane, [table_of_surface(surface_name)], brakes_of_wheels(brake), chambers, substeps=substeps
     )
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 
 
 def reference_distance(
-    quarter_car: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
+    quarter_car: QuarterVehicle,
+    brake: Brake,
+    surface: str,
+    controller: Controller,
+    speed: float,
+    tolerance: float = 1e-10,
 ) -> float:
     """Stopping distance (m) of the quarter vehicle on a surface by the reference solver, at a relative tolerance."""
     curve = NAMED_SURFACES[surface][0]
@@ -48,7 +53,7 @@ def reference_distance(
 
 
 def reference_distance_on_stretches(
-    quarter_car: Quarter,
+    quarter_car: QuarterVehicle,
     brake: Brake,
     road_stretches: RoadStretches,
     controller: Controller,
@@ -60,13 +65,15 @@ def reference_distance_on_stretches(
     solver."""
     y, pressure, torque, number = np.array([0.0, speed, speed / quarter_car.radius]), 0.0, 0.0, 0
     while y[1] > LAST_SPEED:
-        sample = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter_car.radius, True, SUPPLY, float(y[1]))
+        sample = Sample(
+            number, round(number * SAMPLING_PERIOD * 1e9), y[2:] * quarter_car.radius, True, SUPPLY, float(y[1])
+        )
         valve = int(np.asarray(controller.sample(sample).valves)[0])
         law = _brake_law(pressure, torque, valve, brake)
         y = _state_after_sample(
             y, law, quarter_car, road_stretches, {"method": method, "rtol": tolerance, "atol": 1e-2 * tolerance}
         )
-        pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
+        pressure, torque, number = law(SAMPLING_PERIOD)[0], law(SAMPLING_PERIOD)[1], number + 1
     slowing = GRAVITY * _friction_at(y[0], road_stretches)[0](1.0)  # so slow, all is applied and the wheel stands
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
@@ -98,7 +105,7 @@ def _friction_at(x: float, road_stretches: RoadStretches) -> tuple[Callable[[flo
 
 
 def _state_after_sample(
-    y: np.ndarray, law: Any, quarter_car: Quarter, road_stretches: RoadStretches, options: dict[str, Any]
+    y: np.ndarray, law: Any, quarter_car: QuarterVehicle, road_stretches: RoadStretches, options: dict[str, Any]
 ) -> np.ndarray:
     """Position (m), speed (m/s) and angular velocity of the wheel (rad/s) after a sample. A wheel that stops turning
     stays locked as long as its brake can hold it."""
@@ -126,11 +133,11 @@ def _state_after_sample(
 
     for event in (stops, lets_go, passes):
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-    while time < SAMPLE:
+    while time < SAMPLING_PERIOD:
         is_held = y[2] <= 1e-12 and law(time)[1] > radius * force(1.0)
         solution = solve_ivp(
             sliding if is_held else turning,
-            (time, SAMPLE),
+            (time, SAMPLING_PERIOD),
             y,
             **options,
             events=(lets_go if is_held else stops, passes),

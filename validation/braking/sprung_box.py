@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels
-from models.brake.controller import Pressures
+from models.brake.brake import Brake, brakes_of_wheels
+from models.brake.controller import ConstantPressures
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.pressure import Chambers
-from models.brake.sprung import Sprung, suspended_vehicle
+from models.brake.pressure import BrakeChambers
+from models.brake.sprung import SprungVehicle, suspended_vehicle
 from models.engines.braking_sprung import EngineSprungVehicle
 from models.systems.braking.march import BrakedVehicle, BrakingPath, braked_vehicle_on_tyres
 from models.tyre.tyre_table import TyreTable
@@ -30,7 +30,7 @@ TORQUE_PER_BAR = 2e4
 
 
 @cache
-def box(stiffness_factor: float = 1.0, spin_inertia: float = WHEEL_SPIN_INERTIA) -> Sprung:
+def box(stiffness_factor: float = 1.0, spin_inertia: float = WHEEL_SPIN_INERTIA) -> SprungVehicle:
     """A box of 1000 kg on four wheels of 30 kg. The stiffness of springs and tyres is multiplied by a factor, at the
     same damping ratio."""
     wheels = {
@@ -73,7 +73,7 @@ def box(stiffness_factor: float = 1.0, spin_inertia: float = WHEEL_SPIN_INERTIA)
 
 
 @cache
-def car() -> Sprung:
+def car() -> SprungVehicle:
     """The car with 19 degrees of freedom on its suspension, without aerodynamic drag."""
     return suspended_vehicle(replace(load_vehicle("r19_free"), drags=()), WHEEL_SPIN_INERTIA)
 
@@ -98,13 +98,13 @@ def constant_friction(mu: float) -> TyreTable:
     return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * share_aside[:, None])
 
 
-def steady_torques(*torques: float) -> Pressures:
+def steady_torques(*torques: float) -> ConstantPressures:
     """Controller that keeps constant brake torques (N m), one for each wheel, in runs of ``braked_vehicle``."""
-    return Pressures(np.array(torques) / TORQUE_PER_BAR)
+    return ConstantPressures(np.array(torques) / TORQUE_PER_BAR)
 
 
 def braked_vehicle(
-    sprung: Sprung,
+    sprung: SprungVehicle,
     tyre: TyreTable,
     engine: str | None = "mujoco",
     steer: float = 0.0,
@@ -122,8 +122,8 @@ def braked_vehicle(
     return braked_vehicle_on_tyres(
         plane,
         [tyre],
-        of_wheels(*[brake] * plane.wheels),
-        Chambers(zeros + 0.03, zeros + 0.02, SUPPLY),
+        brakes_of_wheels(*[brake] * plane.wheels),
+        BrakeChambers(zeros + 0.03, zeros + 0.02, SUPPLY),
         steer=np.where(np.arange(plane.wheels) < 2, steer, 0.0),
         substeps=substeps,
         sample=step,

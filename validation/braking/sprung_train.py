@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.sprung import Sprung
+from models.brake.sprung import SprungVehicle
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.systems.braking.march import BrakingPath
@@ -97,7 +97,7 @@ def caravan_run(plant_fault: Callable[[Handling], None] | None = None, duration:
     return PulledCaravan(slowing, load, _ball_force(vehicle, path, late, slowing))
 
 
-def _ball_force(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
+def _ball_force(vehicle: SprungVehicle, path: BrakingPath, late: slice, slowing: float) -> float:
     """Longitudinal force (N) at the tow ball from the caravan's balance: tyre drag minus mass times deceleration."""
     mass, _, _ = _mass(vehicle.handling.given, vehicle.handling.given.towed[0])
     return -float(path.reports.force_x[late, 4:].sum(axis=1).mean()) - mass * slowing

@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 from scipy.stats import ttest_ind
 
-from models.brake.brake import PAPER_BRAKES, PAPER_FRONT, Brake, of_wheels, torques_of_pressures
-from models.brake.controller import SAMPLE
+from models.brake.brake import PAPER_BRAKES, PAPER_FRONT_BRAKE, Brake, brakes_of_wheels, torques_of_pressures
+from models.brake.controller import SAMPLING_PERIOD
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle, sampled_cycle
+from models.brake.controllers.five_phase_cycle import (
+    WheelAtConstantSpeed,
+    limit_cycle,
+    mean_cycle_of_sampled_controller,
+)
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
-from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, resting_chambers
+from models.brake.pressure import APPLY, RELEASE, BrakeChambers, advance_by_valves, air_at_rest
 from models.systems.braking.march import BrakingPath, braked_vehicle_on_tyres
 from models.systems.braking.stop_report import StopHistory
 from models.tyre.magic_formula import table_of_surface
@@ -87,7 +91,7 @@ def brake_hysteresis_loop(
     path = np.concatenate(
         (np.linspace(high_pressure, low_pressure, point_count), np.linspace(low_pressure, high_pressure, point_count))
     )
-    return path, torques_of_pressures(path, of_wheels(brake))
+    return path, torques_of_pressures(path, brakes_of_wheels(brake))
 
 
 def hysteresis_loop_area(brake: Brake, low_pressure: float, high_pressure: float) -> float:
@@ -104,12 +108,12 @@ def hysteresis_loop_area(brake: Brake, low_pressure: float, high_pressure: float
 def _hysteresis_rows() -> list[Row]:
     """Rows: area and sense of the brake's hysteresis loop, and its torque below the push-out pressure."""
     worst, sense = 0.0, True
-    for brake in (HYSTERETIC_BRAKE, PAPER_FRONT):
+    for brake in (HYSTERETIC_BRAKE, PAPER_FRONT_BRAKE):
         for low in (0.0, 2.5):
             p, t = brake_hysteresis_loop(brake, low, 4.5)
             worst = max(worst, abs(-np.trapezoid(t, p) / hysteresis_loop_area(brake, low, 4.5) - 1.0))
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
-    rise = torques_of_pressures(np.linspace(0.0, 0.75, 100), of_wheels(HYSTERETIC_BRAKE))
+    rise = torques_of_pressures(np.linspace(0.0, 0.75, 100), brakes_of_wheels(HYSTERETIC_BRAKE))
     return [
         Observed(
             "braking_controllers.loop",
@@ -140,12 +144,12 @@ def _hysteresis_rows() -> list[Row]:
 def _air_supply_row() -> Row:
     """Row: pressure that remains at the fifth brake stroke when the supply is cut off, compared with a closed form."""
     volumes, reservoir = np.array([1.2, 1.2, 1.6, 1.6]), 40.0
-    chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
-    air, ends = resting_chambers(chambers, SAMPLE), np.empty((5, 4))
+    chambers = BrakeChambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
+    air, ends = air_at_rest(chambers, SAMPLING_PERIOD), np.empty((5, 4))
     for stroke in range(5):
         for valve in (APPLY,) if stroke == 4 else (APPLY, RELEASE):
             for _ in range(500):
-                by_valves(np.full(4, valve), SAMPLE, air, chambers, PAPER_BRAKES, ends)
+                advance_by_valves(np.full(4, valve), SAMPLING_PERIOD, air, chambers, PAPER_BRAKES, ends)
     left = 8.0 * (reservoir / (reservoir + volumes.sum())) ** 5
     return Observed(
         "braking_controllers.strokes",
@@ -156,9 +160,9 @@ def _air_supply_row() -> Row:
     ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
 
 
-def _front_wheel_at_constant_speed(spin_inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
+def _front_wheel_at_constant_speed(spin_inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtConstantSpeed:
     """A front wheel on dry road whose vehicle keeps its speed."""
-    return WheelAtSpeed(
+    return WheelAtConstantSpeed(
         11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, spin_inertia, LINEAR_BRAKE, table_of_surface("dry")
     )
 
@@ -201,8 +205,11 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
             SYSTEM,
             "relative difference of the period with samples of 5.5 ms from the period of the "
             f"continuous controller, {controller_name}",
-            sampled_cycle(
-                _front_wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
+            mean_cycle_of_sampled_controller(
+                _front_wheel_at_constant_speed(),
+                replace(FIVE_PHASE_CONTROLLERS[controller_name]),
+                cycle_count=5,
+                skipped_cycle_count=3,
             ).period
             / cycle.period
             - 1.0,
@@ -213,7 +220,7 @@ def _limit_cycle_rows(controller_name: str) -> list[Row]:
 
 def truck_stop(surface_name: str, controller_name: str, start_speed: float) -> BrakingPath:
     """The paper's truck braked to a stop on a surface by a controller with its default parameters."""
-    chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
+    chambers = BrakeChambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
     return braked_vehicle_on_tyres(
         plane_of_truck(PAPER_TRUCK), [table_of_surface(surface_name)], PAPER_BRAKES, chambers
     ).run(CONTROLLERS[controller_name](4), start_speed)
@@ -235,7 +242,9 @@ def stop_results(surface_name: str, controller_name: str, start_speed: float) ->
         "distance": float(path.states[-1, 0, 0]),
         "time": float(path.times[-1]),
         "used": float(used),
-        "locked": 1e3 * SAMPLE * max(_longest_true_sequence(wheel > 0.0) for wheel in path.reports.locked[:last].T),
+        "locked": 1e3
+        * SAMPLING_PERIOD
+        * max(_longest_true_sequence(wheel > 0.0) for wheel in path.reports.locked[:last].T),
         "stands": float(path.ended_at_rest),
     }
 
@@ -271,9 +280,9 @@ def _substep_rows() -> list[Row]:
     """Rows: stopping distance on snow and dry road by number of substeps, compared with the independent reference."""
     rows = []
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
-        tight = reference_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
+        tight = reference_distance(FRONT_WHEEL, PAPER_FRONT_BRAKE, on, CONTROLLERS["slip_bang_bang"](1), speed)
         for n in SUBSTEP_COUNTS:
-            distance = twinrig_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
+            distance = twinrig_distance(FRONT_WHEEL, PAPER_FRONT_BRAKE, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
                 Observed(
                     f"braking_controllers.stop_{on}_{n}",
@@ -295,7 +304,7 @@ def _ice_stop_ensemble_rows(run_count: int = 24, fine_substep_count: int = 32) -
     distances = [
         np.array(
             [
-                twinrig_distance(FRONT_WHEEL, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n)
+                twinrig_distance(FRONT_WHEEL, PAPER_FRONT_BRAKE, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n)
                 for speed in some
             ]
         )

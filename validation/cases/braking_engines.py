@@ -12,8 +12,8 @@ from models.brake.advance import FINE, advance
 from models.brake.brake import PAPER_BRAKES
 from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_vehicle import PAPER_TRUCK
-from models.brake.pressure import Chambers
-from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
+from models.brake.pressure import BrakeChambers
+from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, trailer_behind_hook
 from models.engines.braking import EngineChassis
 from models.systems.braking.march import braked_vehicle_on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
@@ -99,7 +99,7 @@ def braked_truck_turn(
 
 def real_time_factor(substep_count: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
-    chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
+    chambers = BrakeChambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
     vehicle = braked_vehicle_on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
     vehicle.run(SlipBangBang(wheels=4), START_SPEED, 0.1)
     start = time.process_time()
@@ -194,7 +194,7 @@ def trailer_pull_error(
     state = np.array(
         [[0.0, 0.0, start_angle, start_angle], [v, 0.0, -v * np.sin(start_angle) / CHOSEN_TRAILER.drawbar, 0.0]]
     )
-    states, _ = follow_hook(
+    states, _ = trailer_behind_hook(
         plane_of_trailer(CHOSEN_TRAILER),
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,
@@ -220,7 +220,7 @@ def trailer_circle_errors(
     state = np.array(
         [[radius, 0.0, first, first - np.arcsin(CHOSEN_TRAILER.wheelbase / front)], [*hook[0], yaw_rate, yaw_rate]]
     )
-    states, _ = follow_hook(
+    states, _ = trailer_behind_hook(
         plane_of_trailer(CHOSEN_TRAILER),
         lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,

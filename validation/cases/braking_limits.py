@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels
+from models.brake.brake import Brake, brakes_of_wheels
 from models.brake.controller import SLOW
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle
+from models.brake.controllers.five_phase_cycle import WheelAtConstantSpeed, limit_cycle
 from models.brake.controllers.slip import SlipPI
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.pressure import Chambers, by_valves, resting_chambers
+from models.brake.pressure import BrakeChambers, advance_by_valves, air_at_rest
 from models.brake.trailer import CHOSEN_TRAILER
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.run import run
@@ -156,10 +156,10 @@ def _rollover_rows() -> list[Row]:
 
 def _slow_pressure_rise_row() -> Row:
     """Row: pressure in a brake chamber that fills slowly, compared with an exponential."""
-    chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
-    air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
+    chambers = BrakeChambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
+    air, torques = air_at_rest(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
-        by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINEAR_BRAKE), torques)
+        advance_by_valves(np.full(1, SLOW), 0.01, air, chambers, brakes_of_wheels(LINEAR_BRAKE), torques)
     return Observed(
         "braking_limits.slow_apply",
         SYSTEM,
@@ -172,7 +172,7 @@ def _slow_pressure_rise_row() -> Row:
 def _limit_cycle_row() -> Row:
     """Row: period of the controller's limit cycle after a fast first application to a rolling wheel, compared with the
     exact period after a slow first application."""
-    frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
+    frozen = WheelAtConstantSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
     period, _ = exact_cycle(frozen, LONG_RELEASE_CONTROLLER, LONG_RELEASE_CONTROLLER.slow)
     reached = limit_cycle(frozen, replace(LONG_RELEASE_CONTROLLER), 1e-4).period
     return Observed(

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 import models.brake.port as port
-from models.brake.controller import SAMPLE, Controller, Sample
-from models.brake.port.ask import ControllerFailed, ask
-from models.brake.port.example import Example
-from models.brake.port.setup import ControllerRun, PortTable, controller_of_run
+from models.brake.controller import SAMPLING_PERIOD, Controller, Sample
+from models.brake.port.ask import ControllerFailed, checked_command
+from models.brake.port.example import ExampleController
+from models.brake.port.setup import ControllerRunData, PortTable, controller_of_run
 from models.machine.timing import median
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.run import run
@@ -31,7 +31,7 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row, 
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
-EXAMPLE_CONTROLLER = "models.brake.port.example:Example"
+EXAMPLE_CONTROLLER = "models.brake.port.example:ExampleController"
 SILENCE_TIMEOUT = 0.5
 """Time-out (s) for one command of a controller that falls silent. A run whose controller fails shall have ended within
 twice that time."""
@@ -193,7 +193,7 @@ def _exchange_times(
     port_tables_by_connection: dict[str, dict[str, Any] | str], work_folder: Path, round_count: int
 ) -> dict[str, list[float]]:
     """Time of one exchange in microseconds for each kind of connection: median of the rounds with its 95 % interval."""
-    facts, seconds = ControllerRun(np.full(4, 0.5), SAMPLE, folder=work_folder), dict[str, list[float]]()
+    facts, seconds = ControllerRunData(np.full(4, 0.5), SAMPLING_PERIOD, folder=work_folder), dict[str, list[float]]()
     with ExitStack() as stack:
         tables = {
             name: PortTable(timeout=LONG_TIMEOUT, start=LONG_TIMEOUT, **table)
@@ -201,7 +201,8 @@ def _exchange_times(
             if isinstance(table, dict)
         }
         controllers = {
-            name: stack.enter_context(controller_of_run(table, facts, Example(4)))[0] for name, table in tables.items()
+            name: stack.enter_context(controller_of_run(table, facts, ExampleController(4)))[0]
+            for name, table in tables.items()
         }
         for i in range(round_count):
             for name, controller in controllers.items():
@@ -212,12 +213,12 @@ def _exchange_times(
 def _seconds_of_exchange_round(controller: Controller, first_sample_number: int) -> float:
     """Times (s) of the exchanges with a controller in one round."""
     samples = [
-        Sample(i, round(1e9 * SAMPLE * i), np.full(4, 10.0 + 0.01 * (i % 7)), True, 6.0, 11.0)
+        Sample(i, round(1e9 * SAMPLING_PERIOD * i), np.full(4, 10.0 + 0.01 * (i % 7)), True, 6.0, 11.0)
         for i in range(first_sample_number, first_sample_number + EXCHANGES_PER_ROUND)
     ]
     start = time.perf_counter()
     for sample in samples:
-        ask(controller, sample)
+        checked_command(controller, sample)
     return time.perf_counter() - start
 
 
@@ -361,7 +362,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     return [
         Table(
             "Cost of one exchange",
-            f"Of {1e6 * SAMPLE:g} us between two samples; median with its 95 % interval.",
+            f"Of {1e6 * SAMPLING_PERIOD:g} us between two samples; median with its 95 % interval.",
             ("way", "us"),
             costs,
         ),

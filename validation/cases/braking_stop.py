@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.quarter import Quarter, QuarterStop, braked
+from models.brake.quarter import QuarterStop, QuarterVehicle, stop_of_quarter_vehicle
 from models.brake.surfaces import UNIFORM_ROAD
 from models.tyre.magic_formula import NAMED_SURFACES
 from validation.braking.quarter_stops import (
@@ -164,7 +164,7 @@ def _stopping_distance_row(
     spin_inertia_factor: float,
 ) -> Row:
     """Row of a further case: error of the stopping distance."""
-    quarter = Quarter(
+    quarter = QuarterVehicle(
         mass=mass_factor * FRONT_WHEEL.mass,
         radius=FRONT_WHEEL.radius,
         spin_inertia=spin_inertia_factor * FRONT_WHEEL.spin_inertia,
@@ -262,7 +262,7 @@ def _wheel_release_row() -> Row:
         tyre, tables = friction_table(on)
         sliding = FRONT_WHEEL.mass * GRAVITY * float(tyre.mu_x[0, 0, -1]) * FRONT_WHEEL.radius
         times = step * np.arange(math.ceil(0.8 / step) + 1)
-        braked_stop = braked(
+        braked_stop = stop_of_quarter_vehicle(
             FRONT_WHEEL, tables, UNIFORM_ROAD, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0
         )
         errors.append(abs(braked_stop.release_time - 0.5 * 0.8037))

@@ -14,8 +14,8 @@ import numpy as np
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach
 from models.contact.inputs import Array
-from models.contact.patches import separate
-from models.contact.simplified_theory import press, roll
+from models.contact.patches import separate_patches
+from models.contact.simplified_theory import solve_normal_contact, solve_rolling_contact
 from models.engines.contact_bridge import FREEDOM, FREEDOMS, Theory, Wheels, add_forces, forces
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import empty_law, model, python_law
@@ -263,7 +263,7 @@ def _exudyn_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law:
 
 def contact_law_of_library(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     """Contact law that calls the library's Python functions: FASTSIM, or the simplified theory of 1983."""
-    bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
+    bodies = separate_patches(wheels.bodies) if wheels.theory == "simplified" else None
 
     def add(wheel_table: Array, q: Array, v: Array, force_sum: Array) -> None:
         pressed: Any
@@ -272,8 +272,8 @@ def contact_law_of_library(wheels: Wheels) -> Callable[[Array, Array, Array, Arr
             approach, mu, speed = wheels.sunk + position["z"], wheels.mu, wheels.speed
             slip = rate["x"] / speed, rate["y"] / speed - position["yaw"], rate["yaw"] / speed
             if bodies is not None:
-                pressed = press(bodies, wheels.pair, approach=approach)
-                creep = roll(pressed, mu, *slip, cells=wheels.cells)
+                pressed = solve_normal_contact(bodies, wheels.pair, approach=approach)
+                creep = solve_rolling_contact(pressed, mu, *slip, cell_count=wheels.cells)
             else:
                 pressed = by_approach(*wheels.curvatures, approach, wheels.pair)
                 ellipse = RollingEllipse(pressed.a, pressed.b, pressed.load, mu, *slip)

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.linear_theory import RATIOS, coefficients
+from models.contact.linear_theory import TABLE_AXIS_RATIOS, kalker_coefficients
 from models.contact.material import Material, MaterialPair
-from models.contact.normal_problem import centres
-from models.contact.rolling_operator import FreeSystem, SlipOperator
+from models.contact.normal_problem import cell_centres
+from models.contact.rolling_operator import FreeTractionSystem, SlipOperator
 from models.contact.rolling_problem import rigid_slip
 from models.core.errors import RunFailed
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -58,7 +58,9 @@ def exact_coefficients(axis_ratio: float, poisson_ratio: float, cell_count: int 
         _coefficients_on_grid(axis_ratio, poisson_ratio, n) for n in (cell_count, 2 * cell_count, 4 * cell_count)
     )
     limit = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
-    if axis_ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
+    if (
+        axis_ratio > TABLE_AXIS_RATIOS[-1]
+    ):  # C33 of long patches changes by a fourth from grid to grid: second order alone
         limit[3] = fine[3] + (fine[3] - middle[3]) / 3.0
     return limit
 
@@ -70,11 +72,11 @@ def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cell_count: i
     more = max(1.0, max(axis_ratio, 1.0 / axis_ratio) / 10.0)
     columns, rows = round(cell_count * (more if a > b else 1.0)), round(cell_count * (more if b > a else 1.0))
     dx, dy = 2.0 * a / columns, 2.0 * b / rows
-    x, y = centres(columns, dx), centres(rows, dy)
+    x, y = cell_centres(columns, dx), cell_centres(rows, dy)
     inside = (x / a) ** 2 + (y[:, None] / b) ** 2 < 1.0
     body = Material(E=2e11, nu=poisson_ratio)
     operator = SlipOperator(columns, rows, dx, dy, MaterialPair(body, body))
-    system = FreeSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
+    system = FreeTractionSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
     sums = []
     for motion in np.eye(3):
         rigid = rigid_slip(x, y, *motion)
@@ -92,12 +94,14 @@ def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cell_count: i
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the nodes of the table and for a planted misprint; a full run also compares between and beyond the
     nodes."""
-    ratios, nus = (QUICK_AXIS_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), POISSON_RATIOS)
+    ratios, nus = (QUICK_AXIS_RATIOS, (0.25,)) if quick else (TABLE_AXIS_RATIOS.tolist(), POISSON_RATIOS)
     nodes = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio in ratios for nu in nus]
     data: dict[str, Any] = {"nodes": nodes}
     rows = [*_table_node_rows(np.array(nodes)), _misprint_row(np.array(nodes))]
     if not quick:
-        middle = [(float(ratio), 0.25) for ratio in np.sqrt(RATIOS[1:] * RATIOS[:-1])]  # of every two ratios
+        middle = [
+            (float(ratio), 0.25) for ratio in np.sqrt(TABLE_AXIS_RATIOS[1:] * TABLE_AXIS_RATIOS[:-1])
+        ]  # of every two ratios
         middle += [(ratio, nu) for ratio in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
         data["between"] = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio, nu in middle]
         data["beyond"] = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio, nu in SLENDER_ELLIPSES]
@@ -110,7 +114,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def deviations_from_exact(exact_coefficient_rows: Array) -> Array:
     """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_coefficient_rows (n, 6): axis
     ratio, Poisson's ratio, and the four exact coefficients."""
-    c = coefficients(exact_coefficient_rows[:, 0], exact_coefficient_rows[:, 1])
+    c = kalker_coefficients(exact_coefficient_rows[:, 0], exact_coefficient_rows[:, 1])
     return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / exact_coefficient_rows[:, 2:] - 1.0
 
 
@@ -169,8 +173,8 @@ def _misprint_row(table_nodes: Array) -> Row:
 def _interpolation_rows(exact_coefficient_rows: Array, table_nodes: Array) -> list[Row]:
     """Rows: interpolation error of the coefficients. This is the deviation between two nodes of the table minus the
     mean deviation at these nodes."""
-    at_nodes = deviations_from_exact(table_nodes).reshape(len(RATIOS), len(POISSON_RATIOS), 4)
-    count = len(RATIOS) - 1
+    at_nodes = deviations_from_exact(table_nodes).reshape(len(TABLE_AXIS_RATIOS), len(POISSON_RATIOS), 4)
+    count = len(TABLE_AXIS_RATIOS) - 1
     along_ratio = (at_nodes[1:, 1] + at_nodes[:-1, 1]) / 2.0
     along_nu = [(at_nodes[i, k] + at_nodes[i, k + 1]) / 2.0 for i in (0, 9, 18) for k in (0, 1)]
     off = np.abs(deviations_from_exact(exact_coefficient_rows) - np.concatenate((along_ratio, along_nu)))
@@ -255,7 +259,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
-    c = coefficients(ratio, 0.25)
+    c = kalker_coefficients(ratio, 0.25)
     solved = np.array([row for solved_rows in case_data.values() for row in solved_rows])
     quarter = solved[np.abs(solved[:, 1] - 0.25) < 0.04]
     for i, (name, curve) in enumerate(zip(COEFFICIENT_NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):

@@ -10,7 +10,7 @@ import numpy as np
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.material import Material, MaterialPair
-from models.contact.normal_problem import NormalSolution, centres, hertzian, solve_normal
+from models.contact.normal_problem import NormalSolution, cell_centres, hertzian_pressure_grid, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
 from models.systems.contact.work_precision import ContactCase
@@ -85,7 +85,7 @@ def numerical_hertz_contact(axis_ratio: float, cell_count: int) -> tuple[NormalS
     a, b = CONTACT_SIZE * axis_ratio**0.5, CONTACT_SIZE / axis_ratio**0.5
     truth = by_axes(a, b, MATERIAL_PAIR, load=NORMAL_LOAD)
     dx, dy = 2 * a / cell_count, 2 * b / cell_count
-    x, y = centres(cell_count + 5, dx), centres(cell_count + 5, dy)
+    x, y = cell_centres(cell_count + 5, dx), cell_centres(cell_count + 5, dy)
     solved = solve_normal(
         float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, MATERIAL_PAIR, load=NORMAL_LOAD
     )
@@ -140,7 +140,7 @@ def _strip_traction(cell_count: int, creepage_share: float) -> tuple[list[float]
     by that of full sliding. creepage_share: creepage divided by the creepage of full sliding."""
     b = CONTACT_SIZE / STRIP_AXIS_RATIO**0.5
     a = STRIP_AXIS_RATIO * b
-    pressed = hertzian(a, b, NORMAL_LOAD, cell_count + 1)  # odd: one strip of cells lies in the middle
+    pressed = hertzian_pressure_grid(a, b, NORMAL_LOAD, cell_count + 1)  # odd: one strip of cells lies in the middle
     bound = FRICTION_COEFFICIENT * 1.5 * NORMAL_LOAD / (np.pi * a * b)
     solved = solve_rolling(
         pressed, FRICTION_COEFFICIENT, 2 * creepage_share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR
@@ -175,7 +175,11 @@ def shifted_ball(force_share: float, poisson_ratio: float, cell_count: int) -> R
         3 * FRICTION_LIMIT * (2 - poisson_ratio) / (8 * CONTACT_SIZE * pair.G) * (1 - (1 - force_share) ** (2 / 3))
     )
     return solve_shift(
-        hertzian(CONTACT_SIZE, CONTACT_SIZE, NORMAL_LOAD, cell_count), FRICTION_COEFFICIENT, shift_distance, 0.0, pair
+        hertzian_pressure_grid(CONTACT_SIZE, CONTACT_SIZE, NORMAL_LOAD, cell_count),
+        FRICTION_COEFFICIENT,
+        shift_distance,
+        0.0,
+        pair,
     )
 
 
@@ -199,7 +203,7 @@ def rolling_forces(case_name: str, cell_count: int, creepage_sign: float = 1.0, 
     reverses the creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
     ratio, xi_x, xi_y, spin = CREEPAGE_CASES[case_name]
     creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * creepage_sign
-    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, NORMAL_LOAD, cell_count)
+    pressed = hertzian_pressure_grid(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, NORMAL_LOAD, cell_count)
     across = mirror_sign * creepage
     solved = solve_rolling(
         pressed, FRICTION_COEFFICIENT, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR
@@ -209,7 +213,7 @@ def rolling_forces(case_name: str, cell_count: int, creepage_sign: float = 1.0, 
 
 def _sliding_rows() -> list[Row]:
     """Rows on creepages so large that the whole contact area slides."""
-    pressed = hertzian(CONTACT_SIZE, CONTACT_SIZE, NORMAL_LOAD, 20)
+    pressed = hertzian_pressure_grid(CONTACT_SIZE, CONTACT_SIZE, NORMAL_LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
         solved = solve_rolling(pressed, FRICTION_COEFFICIENT, np.cos(angle), np.sin(angle), 0.0, MATERIAL_PAIR)
@@ -315,7 +319,12 @@ def _convergence_row() -> Row:
     rng, failed = np.random.default_rng(SEED), 0
     for case, cells in (random_contact_case(rng) for _ in range(RANDOM_CONTACT_COUNT)):
         try:
-            solve_rolling(hertzian(case.a, case.b, NORMAL_LOAD, cells), FRICTION_COEFFICIENT, *case.motion, case.pair)
+            solve_rolling(
+                hertzian_pressure_grid(case.a, case.b, NORMAL_LOAD, cells),
+                FRICTION_COEFFICIENT,
+                *case.motion,
+                case.pair,
+            )
         except RunFailed:
             failed += 1
     return _bound_row(
@@ -360,7 +369,7 @@ def _differences_from_file(sample_row: dict[str, str], cell_count: int) -> list[
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
     solved = solve_rolling(
-        hertzian(a, b, value["FN_N"], cell_count),
+        hertzian_pressure_grid(a, b, value["FN_N"], cell_count),
         value["mu"],
         value["xi_x"],
         value["xi_y"],

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.hertz import Hertz, by_approach, by_load
+from models.contact.hertz import HertzContact, by_approach, by_load
 from models.contact.material import STEEL, Material, MaterialPair
 from models.core.errors import InputError
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -117,9 +117,9 @@ def _largest_errors(axis_ratios: tuple[float, ...]) -> dict[str, list[float]]:
     }
 
 
-def _exchange_axes(hertz_contact: Hertz) -> Hertz:
+def _exchange_axes(hertz_contact: HertzContact) -> HertzContact:
     """The contact with the axes x and y exchanged."""
-    return Hertz(
+    return HertzContact(
         hertz_contact.b,
         hertz_contact.a,
         hertz_contact.p0,

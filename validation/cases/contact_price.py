@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import BEST_CHOICES, remaining_errors, rolled
-from models.contact.theories import Fastsim
+from models.contact.accuracy import BEST_FASTSIM_CHOICES, remaining_errors, rolled_with_errors
+from models.contact.theories import FastsimTheory
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built
@@ -146,8 +146,8 @@ def _total_error_rows(contact_cases: list[ContactCase]) -> list[Row]:
     theory, for every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in contact_cases]), [], []
     for case in contact_cases:
-        contact = case.contact(Fastsim, **BEST_CHOICES)
-        answers, error = rolled(contact, case.motion, 21)
+        contact = case.contact(FastsimTheory, **BEST_FASTSIM_CHOICES)
+        answers, error = rolled_with_errors(contact, case.motion, 21)
         limit, moment = case.friction_limit, case.friction_limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
         stated.append((error.total, error.moment + MOMENT_ROUNDING * limit))
@@ -224,7 +224,7 @@ def _shares_beyond_stated_error(
     """Shares of contacts whose discretisation errors of force and of moment exceed the stated ones."""
     answers = []
     for case in contact_cases:
-        contact = case.contact(Fastsim, **{**BEST_CHOICES, **fastsim_options})
+        contact = case.contact(FastsimTheory, **{**BEST_FASTSIM_CHOICES, **fastsim_options})
         fine, true = contact.roll(case.motion, cell_count), contact.roll(case.motion, CONVERGED_CELL_COUNT)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(

@@ -10,9 +10,9 @@ from scipy.spatial import KDTree
 from models.contact.material import MaterialPair
 from models.contact.profile_files import read_profile
 from models.contact.profiles import ContactProfile
-from models.contact.simplified_theory import press
-from models.contact.standard_profiles import s1002, uic60
-from models.contact.wheel_on_rail import Track, wheel_on_rail
+from models.contact.simplified_theory import solve_normal_contact
+from models.contact.standard_profiles import s1002_profile, uic60_profile
+from models.contact.wheel_on_rail import TrackGeometry, wheel_on_rail
 from models.core.errors import InputError
 from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
@@ -56,8 +56,8 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _right_wheel_contact(lateral_shift: float, yaw: float, with_exact_peak: bool) -> dict[str, Any]:
     """Contact of the right wheel at a lateral displacement (mm) and yaw angle (rad): contact points, their loads, area
     and peak pressure."""
-    touches = wheel_on_rail(s1002(), uic60(), lateral_shift=lateral_shift * 1e-3, yaw=yaw)
-    pressed = press([touch.patch for touch in touches], MATERIAL_PAIR, load=WHEEL_LOAD)
+    touches = wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=lateral_shift * 1e-3, yaw=yaw)
+    pressed = solve_normal_contact([touch.patch for touch in touches], MATERIAL_PAIR, load=WHEEL_LOAD)
     loads = {id(patch_pressure.patch): patch_pressure.load for patch_pressure in pressed.patches}
     contact_points = [
         {
@@ -127,7 +127,7 @@ def _profile_file_rows() -> list[Row]:
 def wheel_profile_difference(file_profile: ContactProfile) -> float:
     """Largest difference in height (m) between the built-in S1002 profile and the wheel profile of a file, where both
     are defined."""
-    rail_profile = s1002()
+    rail_profile = s1002_profile()
     inside = (file_profile.y >= rail_profile.y[0]) & (file_profile.y <= rail_profile.y[-1])
     return float(np.abs(rail_profile.curve(file_profile.y[inside]) - file_profile.z[inside]).max())
 
@@ -135,7 +135,7 @@ def wheel_profile_difference(file_profile: ContactProfile) -> float:
 def rail_profile_distance(file_profile: ContactProfile) -> float:
     """Largest distance (m) of a file's rail profile from the built-in inclined rail. The file has another origin, so
     the best shift is subtracted first."""
-    laid = uic60().turned(Track().inclination)
+    laid = uic60_profile().turned(TrackGeometry().inclination)
     tree = KDTree(np.column_stack([laid.y, laid.z]))
     points = np.column_stack([file_profile.y, file_profile.z])[file_profile.z < 0.036]
 

@@ -12,8 +12,16 @@ import numpy as np
 
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
-from models.contact.patches import Patch, separate
-from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, SimplifiedOptions, load_at_depth, press, roll
+from models.contact.patches import Patch, separate_patches
+from models.contact.simplified_theory import (
+    DEFAULT_OPTIONS,
+    PAPER_OPTIONS,
+    NormalContact,
+    SimplifiedOptions,
+    load_at_depth,
+    solve_normal_contact,
+    solve_rolling_contact,
+)
 from models.contact.undeformed_distance import quadratic
 from models.machine.seconds import cost
 from models.machine.timing import interleave
@@ -39,11 +47,11 @@ SYSTEM: System = "contact"
 EXACT_CELL_COUNT = 36
 """Cells of the exact grid along each axis."""
 FITTING_OPTIONS = {
-    "elliptic": PLAIN,
-    "paper": PAPER,
+    "elliptic": DEFAULT_OPTIONS,
+    "paper": PAPER_OPTIONS,
     "elliptic, gradient": SimplifiedOptions(fit="gradient"),
-    "paper, gradient": replace(PAPER, fit="gradient"),
-    "elliptic, one net": replace(PLAIN, separate=False),
+    "paper, gradient": replace(PAPER_OPTIONS, fit="gradient"),
+    "elliptic, one net": replace(DEFAULT_OPTIONS, separate=False),
 }
 """Variants of the theory; the first is the default, the second follows the paper to the letter."""
 TIMING_ROUNDS = 10
@@ -64,18 +72,20 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on Hertz's ellipses and on the continuity of the load; a full run has all shapes, variants and net sizes,
     and computing times."""
     hertz = {
-        f"{ratio:g}": _errors_on_hertz_ellipse(ratio, PLAIN)
-        | {"paper": _errors_on_hertz_ellipse(ratio, PAPER)["approach"]}
+        f"{ratio:g}": _errors_on_hertz_ellipse(ratio, DEFAULT_OPTIONS)
+        | {"paper": _errors_on_hertz_ellipse(ratio, PAPER_OPTIONS)["approach"]}
         for ratio in CURVATURE_RATIOS
     }
-    jump = largest_load_jump(separate(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
+    jump = largest_load_jump(separate_patches(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
     rows = [*_hertz_rows(hertz), _load_jump_row(jump)]
     if quick:
         return rows, data
     data["shapes"] = {shape.name: _errors_of_variants(shape) for shape in shapes_by_formula() + profile_shapes()}
     data["grown"] = {shape.name: _approach_errors(shape) for shape in merged_shapes()} | _rail_approach_errors()
-    data["nets"] = {str(net): _errors_on_hertz_ellipse(5.0, replace(PLAIN, net=net)) for net in MESHES_PER_SIDE}
+    data["nets"] = {
+        str(net): _errors_on_hertz_ellipse(5.0, replace(DEFAULT_OPTIONS, net=net)) for net in MESHES_PER_SIDE
+    }
     data["time"] = _computing_times()
     return rows + _contact_shape_rows(data["shapes"]) + _merged_patch_rows(data["grown"]) + _computing_time_rows(
         data["time"]
@@ -86,11 +96,11 @@ def _errors_on_hertz_ellipse(curvature_ratio: float, fitting_options: Simplified
     """Relative errors of approach, area and peak pressure on a Hertzian ellipse with the ratio of curvatures B/A."""
     exact = by_load(CURVATURE, CURVATURE * curvature_ratio, 1e5, MATERIAL_PAIR)
     a, b = float(exact.a), float(exact.b)
-    contact = press(
+    contact = solve_normal_contact(
         quadratic(CURVATURE, CURVATURE * curvature_ratio, 2.5 * a, 2.5 * b),
         MATERIAL_PAIR,
         load=1e5,
-        options=fitting_options,
+        simplified_options=fitting_options,
     )
     return _relative_errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
@@ -130,7 +140,9 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
     """Errors of every variant of the theory for one contact shape, and the exact values. Errors of approach, area and
     peak pressure are relative; those of forces are in % of mu N."""
     contacts = {
-        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
+        name: solve_normal_contact(
+            contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, simplified_options=fitting_options
+        )
         for name, fitting_options in FITTING_OPTIONS.items()
     }
     normal = exact_normal(
@@ -144,7 +156,9 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
     for name, contact in contacts.items():
         forces = [
             float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * contact_shape.load))
-            for rolled, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
+            for rolled, true in (
+                (solve_rolling_contact(contact, FRICTION, *motions[key]), true) for key, true in solved.items()
+            )
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
         errors_by_fitting[name] = _relative_errors(contact, **figures) | {"force": mean, "force_max": most}
@@ -155,10 +169,12 @@ def _approach_errors(contact_shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a separate grid for each patch, and with one grid for all patches."""
     exact = exact_normal(contact_shape, EXACT_CELL_COUNT, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
-        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options).approach
+        name: solve_normal_contact(
+            contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, simplified_options=fitting_options
+        ).approach
         / exact
         - 1.0
-        for name, fitting_options in (("each", PLAIN), ("one", FITTING_OPTIONS["elliptic, one net"]))
+        for name, fitting_options in (("each", DEFAULT_OPTIONS), ("one", FITTING_OPTIONS["elliptic, one net"]))
     }
 
 
@@ -167,7 +183,7 @@ def _rail_approach_errors() -> dict[str, dict[str, float]]:
     grid."""
     errors = {}
     for position in placed_wheelsets():
-        pressed = press([touch.patch for touch in position.touches], MATERIAL_PAIR, load=position.load)
+        pressed = solve_normal_contact([touch.patch for touch in position.touches], MATERIAL_PAIR, load=position.load)
         along = np.cos(min(patch_pressure.patch.lean for patch_pressure in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
@@ -190,11 +206,11 @@ def _computing_times() -> dict[str, list[float]]:
     hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, MATERIAL_PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
-    contact, (patch,) = press(distance, MATERIAL_PAIR, load=1e5), separate(distance)
+    contact, (patch,) = solve_normal_contact(distance, MATERIAL_PAIR, load=1e5), separate_patches(distance)
     jobs: dict[str, Callable[[], Any]] = {
         "1982": lambda: fastsim(RollingEllipse(a, b, 1e5, FRICTION, *creepage), MATERIAL_PAIR, cells=45),
-        "roll": lambda: roll(contact, FRICTION, *creepage),
-        "press": lambda: press(distance, MATERIAL_PAIR, load=1e5),
+        "roll": lambda: solve_rolling_contact(contact, FRICTION, *creepage),
+        "press": lambda: solve_normal_contact(distance, MATERIAL_PAIR, load=1e5),
         "depth": lambda: load_at_depth(patch, 5e-5, MATERIAL_PAIR),
         "exact": lambda: exact_normal(shapes_by_formula()[0], 45, (-0.008, 0.008, -0.008, 0.008)),
     }
@@ -398,7 +414,7 @@ def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
 
 def _net_errors_text(errors_by_net: dict[str, dict[str, float]]) -> str:
     """Sentences on the errors by the size of the net."""
-    sizes = (next(iter(errors_by_net)), str(PLAIN.net), list(errors_by_net)[-1])
+    sizes = (next(iter(errors_by_net)), str(DEFAULT_OPTIONS.net), list(errors_by_net)[-1])
     first, used, last = (100.0 * abs(errors_by_net[net]["approach"]) for net in sizes)
     area, peak = (100.0 * errors_by_net[sizes[-1]][key] for key in ("area", "peak"))
     return (

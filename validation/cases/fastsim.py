@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.special import ellipe
 
-from models.contact.fastsim import KINDS as KINDS_OF_FLEXIBILITY
+from models.contact.fastsim import FLEXIBILITY_KINDS as KINDS_OF_FLEXIBILITY
 from models.contact.fastsim import RollingEllipse, fastsim
-from models.contact.fastsim_derivatives import derivatives
+from models.contact.fastsim_derivatives import creep_force_derivatives
 from models.contact.fastsim_grid import POWERS
 from models.contact.inputs import Array
-from models.contact.linear_theory import coefficients
-from models.contact.linear_theory import forces as linear_forces
+from models.contact.linear_theory import kalker_coefficients
+from models.contact.linear_theory import linear_creep_forces as linear_forces
 from models.contact.material import MaterialPair
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import theory_errors
@@ -86,7 +86,7 @@ def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float,
     )
     creepage_parts = np.array([CREEPAGE_KINDS[name] for name in kind_names])[kind] * level[:, None]
     known, unit = (
-        coefficients(ratio, MATERIAL_PAIR.nu),
+        kalker_coefficients(ratio, MATERIAL_PAIR.nu),
         FRICTION_COEFFICIENT * NORMAL_LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2),
     )
     scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_SEMI_AXIS], axis=1)
@@ -261,7 +261,7 @@ def _force_derivative_rows() -> list[Row]:
     """Row: difference of the forces' analytic derivatives from central differences."""
     columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": NORMAL_LOAD}
-    known, off = derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
+    known, off = creep_force_derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_forces_with_changed_input(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / FORCE_SCALES)

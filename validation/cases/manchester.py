@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.profile_files import read_profile
-from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, rail_in_track
+from models.contact.wheel_on_rail import TrackGeometry, WheelAndRail, WheelsetGeometry, rail_in_track
 from models.rail.contact_table import WheelsetPlacement
 from models.systems.wheel_rail.run import run
 from models.systems.wheel_rail.scene import LateralPositions
@@ -250,8 +250,8 @@ def _profile_file_rows(wheelset_placements: list[WheelsetPlacement]) -> list[Row
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
         return [not_run(f"manchester.files.{name}", SYSTEM, f"{name}: {words}", reason) for name in names]
-    rail = rail_in_track(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
-    side = WheelAndRail(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
+    rail = rail_in_track(read_profile(folder / RAIL_FILE, "rail"), TrackGeometry(inclination=0.0))
+    side = WheelAndRail(read_profile(folder / WHEEL_FILE, "wheel"), rail, WheelsetGeometry())
     other_contact = replace(contact_of("A-2"), side=side)
     chosen = [
         (placement, other_contact.at(placement.shift, placement.yaw))

@@ -265,7 +265,7 @@ def _speed_sweep_rows(speeds: np.ndarray, engine_name: str) -> tuple[list[Row], 
     quick = variance_sweep(linear, roads, speeds, WEIGHTED_OUTPUTS)
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
-    slow = variance_sweep(linear, roads, speeds[some], WEIGHTED_OUTPUTS, fast=False)
+    slow = variance_sweep(linear, roads, speeds[some], WEIGHTED_OUTPUTS, by_modes=False)
     is_finite = slow.variance > SYMMETRY_ZERO_SHARE * slow.variance.max()
     rows = [
         Observed(

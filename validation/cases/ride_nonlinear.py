@@ -153,8 +153,13 @@ def _road_level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[st
     Carlo. The tolerance of each is the accuracy that the result states."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
-    copies = copies_in_time(
-        vehicle, road, SPEED, MONTE_CARLO_COPY_SECONDS[not quick], copies=MONTE_CARLO_COPY_COUNTS[not quick], seed=SEED
+    copy_count = copies_in_time(
+        vehicle,
+        road,
+        SPEED,
+        MONTE_CARLO_COPY_SECONDS[not quick],
+        copy_count=MONTE_CARLO_COPY_COUNTS[not quick],
+        seed=SEED,
     )
     rows, cells = [], [f"{road_level:g}"]
     for i, name in enumerate(copies.names):
@@ -202,8 +207,8 @@ def _linear_springs_row() -> Row:
     """Row: with linear springs, the variances of the Monte Carlo copies agree with the covariance."""
     vehicle, road = vehicle_and_road("quarter_car")
     exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
-    copies = copies_in_time(
-        vehicle, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copies=MONTE_CARLO_COPY_COUNTS[1], seed=SEED
+    copy_count = copies_in_time(
+        vehicle, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copy_count=MONTE_CARLO_COPY_COUNTS[1], seed=SEED
     )
     return Observed(
         "ride_nonlinear.linear",
@@ -232,8 +237,8 @@ def _single_law_rows() -> list[Row]:
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
-        copies = copies_in_time(
-            alone, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copies=MONTE_CARLO_COPY_COUNTS[1] // 2, seed=SEED
+        copy_count = copies_in_time(
+            alone, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copy_count=MONTE_CARLO_COPY_COUNTS[1] // 2, seed=SEED
         )
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
         curve_kept = [

@@ -102,7 +102,7 @@ def _wheel_height_covariance_rows() -> list[Row]:
     delayed outputs of one filter."""
     worst = {"first": 0.0, "second": 0.0}
     for order, cutoff in (("first", None), ("second", 40.0)):
-        road = road_of_level(HALF_TRACK, cutoff=cutoff)
+        road = road_of_level(HALF_TRACK, cutoff_wavenumber=cutoff)
         for case in CORRELATION_CASES.values():
             by_noise = wheel_heights_covariance(road_excitation(road, ASYMMETRIC_WHEEL_POSITIONS, *case))
             by_output = input_covariance(road, ASYMMETRIC_WHEEL_POSITIONS, *case)

@@ -262,11 +262,11 @@ def _limit_cycles(
         if name != "chosen" and not 20.0 < (critical_speed_table[name]["reference"] or 0.0) < 160.0:
             continue
         setup: tuple[Any, ...] = (wheelset, _travel_speed_of_simulation(critical_speed_table, name), "fastsim", 11)
-        first = attained_cycle(Equations(*setup), step=_time_step_of_wheelset(Equations(*setup)))
+        first = attained_cycle(Equations(*setup), time_step=_time_step_of_wheelset(Equations(*setup)))
         if first is not None:
             guesses = {engine: guess_from_orbit(first, equations_class(engine)(*setup)) for engine in engine_names}
             cycles[name] = {
-                engine: refined_orbit(solved_orbit(guess, "amplitude", precise=False), "amplitude")
+                engine: refined_orbit(solved_orbit(guess, "amplitude", is_precise=False), "amplitude")
                 for engine, guess in guesses.items()
             }
     return cycles

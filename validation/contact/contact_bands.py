@@ -11,11 +11,17 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from models.contact.accuracy import KNOTS, band, moment_band, spin_share, used_with_moment
+from models.contact.accuracy import (
+    FRICTION_SHARE_KNOTS,
+    force_error_band,
+    friction_share_with_moment,
+    moment_error_band,
+    spin_weight_of_motion,
+)
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
-from models.contact.theories import Simplified
+from models.contact.theories import SimplifiedTheory
 from models.systems.contact.run import interpenetration_contact
 from models.systems.contact.work_precision import ContactCase
 from validation.contact.contact_set import FITTED_PART, FRICTION, LOAD, read_contacts, read_drawn, read_wide
@@ -45,7 +51,7 @@ class TheoryErrors:
     moment: Array
     error: Array
     moment_error: Array
-    spin_share: Array
+    spin_weight_of_motion: Array
     group: Array
 
     @property
@@ -56,7 +62,7 @@ class TheoryErrors:
     @property
     def used_with_moment(self) -> Array:
         """Magnitude (n,) of the scaled creep force and moment together."""
-        return used_with_moment(self.used_friction, self.moment)
+        return friction_share_with_moment(self.used_friction, self.moment)
 
     def selected(self, mask: Array) -> "TheoryErrors":
         """Forces and errors of the contacts that a mask (n,) selects."""
@@ -70,7 +76,9 @@ def theory_forces(name: str, cases: list[ContactCase], cells: int) -> Array:
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":
         pressed = [interpenetration_contact(by_axes(c.a, c.b, c.pair, load=LOAD), c.pair) for c in cases]
-        theory_forces = [Simplified(p, FRICTION).roll(c.motion, cells) for p, c in zip(pressed, cases, strict=True)]
+        theory_forces = [
+            SimplifiedTheory(p, FRICTION).roll(c.motion, cells) for p, c in zip(pressed, cases, strict=True)
+        ]
         return np.array([(force.fx, force.fy, force.mz) for force in theory_forces]) / unit
     kind, bound = name.split()
     moved, nus = np.empty((len(cases), 3)), np.array([case.pair.nu for case in cases])
@@ -100,7 +108,7 @@ def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS_PER_ST
     answers, nu = theory_forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays_of_contacts(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
-    off, share = answers - exact, spin_share(axes[0], axes[1], motions, nu)
+    off, share = answers - exact, spin_weight_of_motion(axes[0], axes[1], motions, nu)
     return TheoryErrors(
         answers[:, :2],
         answers[:, 2],
@@ -114,9 +122,9 @@ def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS_PER_ST
 def shares_within_bands(name: str, theory: TheoryErrors) -> tuple[float, float]:
     """Shares of contacts whose errors of force and of moment lie within the bands that ``models.contact.accuracy``
     states."""
-    moment = moment_band(name, theory.used_with_moment, theory.spin_share)
+    moment = moment_error_band(name, theory.used_with_moment, theory.spin_share)
     return (
-        float(np.mean(theory.error <= band(name, theory.used_friction, theory.spin_share))),
+        float(np.mean(theory.error <= force_error_band(name, theory.used_friction, theory.spin_share))),
         float(np.mean(theory.moment_error <= moment + MOMENT_ROUNDING)),
     )
 
@@ -124,7 +132,7 @@ def shares_within_bands(name: str, theory: TheoryErrors) -> tuple[float, float]:
 def measured_bands(error: Array, used_friction: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
     """Bands of a theory's error: its quantile at each knot of used friction, largest over the groups of contacts; a
     list without spin and a list with spin."""
-    ends = (0.0, *KNOTS, 1.1)
+    ends = (0.0, *FRICTION_SHARE_KNOTS, 1.1)
     within = [(used_friction >= low) & (used_friction <= high) for low, high in zip(ends, ends[2:], strict=False)]
     kinds = theory.spin_share < 0.5, theory.spin_share >= 0.5
     return tuple([_largest_quantile(error, rows & some, theory.group) for some in within] for rows in kinds)

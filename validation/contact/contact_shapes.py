@@ -7,12 +7,12 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
-from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from models.contact.normal_problem import NormalSolution, cell_centres, solve_normal
 from models.contact.patches import Patch
 from models.contact.rolling_problem import RollingSolution, solve_rolling
 from models.contact.simplified_theory import NormalContact
-from models.contact.standard_profiles import s1002, uic60
-from models.contact.undeformed_distance import Distance, from_function
+from models.contact.standard_profiles import s1002_profile, uic60_profile
+from models.contact.undeformed_distance import UndeformedDistance, from_function
 from models.contact.wheel_on_rail import TouchingPlace, wheel_on_rail
 from models.core.errors import InputError, RunFailed
 
@@ -40,7 +40,7 @@ class Shape:
     exact grid (None: to be determined)."""
 
     name: str
-    distance: Distance
+    distance: UndeformedDistance
     load: float
     box: Box | None = None
 
@@ -149,7 +149,7 @@ def profile_shapes() -> list[Shape]:
     (N)."""
     shapes = []
     for shift, load in ((0.002, 5e4), (0.004, 5e4), (0.006, 2e4), (0.008, 2e4)):
-        distance = wheel_on_rail(s1002(), uic60(), lateral_shift=shift)[0].patch.distance
+        distance = wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=shift)[0].patch.distance
         shapes.append(Shape(f"S1002 on UIC 60, {1e3 * shift:g} mm", distance, load))
     return shapes
 
@@ -174,7 +174,7 @@ def placed_wheelsets() -> list[PlacedWheelset]:
     wheelsets = []
     for yaw in (0.0, 0.01, -0.02):
         for shift in np.arange(-4e-3, 8.1e-3, 2e-3):
-            touches = wheel_on_rail(s1002(), uic60(), lateral_shift=float(shift), yaw=yaw)
+            touches = wheel_on_rail(s1002_profile(), uic60_profile(), lateral_shift=float(shift), yaw=yaw)
             if max(touch.patch.lean for touch in touches) < JOINED_ANGLE or len(touches) == 1:
                 wheelsets += [PlacedWheelset(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
     return wheelsets
@@ -200,7 +200,7 @@ def exact_contact_of_wheelset(wheelset: PlacedWheelset, normal_contact: NormalCo
     slope = float(np.cos(min(part.patch.lean for part in normal_contact.patches)))
     for margin in GRID_MARGINS:
         step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
-        x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
+        x, y = (x0 + x1) / 2 + cell_centres(cells, step_x), (y0 + y1) / 2 + cell_centres(2 * cells, step_y)
         heights = np.min([_heights_of_patch(touch.patch, x, y) for touch in wheelset.touches], axis=0)
         try:
             return solve_normal(heights * slope, step_x, step_y, MATERIAL_PAIR, load=wheelset.load / slope)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Ellipse, RollingEllipse, fastsim
-from models.contact.fastsim_grid import grid
+from models.contact.fastsim import FastsimEllipse, RollingEllipse, fastsim
+from models.contact.fastsim_grid import ellipse_grid
 from models.contact.fastsim_kernels import march_plain, march_second_order
-from models.contact.fastsim_records import BLOCK, LANES
+from models.contact.fastsim_records import BLOCK, LANE_COUNT
 from models.contact.material import MaterialPair
 from models.machine.compiled import compiled
 from models.machine.timing import median, paired_ratio, spelled
@@ -31,12 +31,15 @@ def speed_rows_and_table(
     draw = np.random.default_rng(5)
     blocks = _aligned_blocks(1)
     for name in ("u", "v0", "v1"):
-        blocks[name] = draw.normal(0.0, 0.3, LANES)
-    (_, cells), values = grid(CELLS, CELLS + 1, "intermediate").records, draw.uniform(1.0, 2.0, CELLS * LANES)
+        blocks[name] = draw.normal(0.0, 0.3, LANE_COUNT)
+    (_, cells), values = (
+        ellipse_grid(CELLS, CELLS + 1, "intermediate").records,
+        draw.uniform(1.0, 2.0, CELLS * LANE_COUNT),
+    )
     along, across = (draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
     many = RollingEllipse(semi_axis, semi_axis, load, mu, along, across, draw.normal(0.0, 0.3, CONTACTS))
-    calls = {n: Ellipse(1.0, material_pair, cells=n) for n in (12, CELLS)}
-    marched = REPEATS * CELLS * LANES
+    calls = {n: FastsimEllipse(1.0, material_pair, cells=n) for n in (12, CELLS)}
+    marched = REPEATS * CELLS * LANE_COUNT
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
         "bound": (partial(_arithmetic_bound, values, REPEATS), marched),
         "plain": (partial(_plain_loop, blocks, cells, REPEATS), marched),
@@ -75,7 +78,7 @@ def speed_rows_and_table(
     return rows, table
 
 
-def _call_kernel(ellipse: Ellipse, values: tuple[float, ...]) -> None:
+def _call_kernel(ellipse: FastsimEllipse, values: tuple[float, ...]) -> None:
     for _ in range(REPEATS):
         ellipse(*values)
 

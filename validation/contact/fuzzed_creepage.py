@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Creep, RollingEllipse, fastsim
-from models.contact.fastsim_grid import Bound, nets
+from models.contact.fastsim import CreepForces, RollingEllipse, fastsim
+from models.contact.fastsim_grid import BoundShape, grids_of_ratios
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
 
@@ -76,7 +76,7 @@ def worst_violation(
     still, power = (motion == 0.0) | (limit == 0.0), least * np.where(motion > 0.0, motion, 1.0)
     net = {name: options[name] for name in ("cells", "bound") if name in options}
 
-    def scaled_forces(values: Creep, value_sizes: tuple[float, ...]) -> Array:
+    def scaled_forces(values: CreepForces, value_sizes: tuple[float, ...]) -> Array:
         parts = zip((values.fx, values.fy, values.mz), value_sizes, (least, least, least * arm), strict=True)
         return np.array([value / size / unit for value, size, unit in parts])
 
@@ -109,7 +109,7 @@ def _largest_finite(values: Array) -> float:
     return float(max(0.0, np.where(np.isfinite(values), values, np.inf).max()))
 
 
-def moment_bound(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
+def moment_bound(columns: Mapping[str, Any], cells: int = 21, bound: BoundShape = "intermediate") -> Array:
     """Upper bound (n,) of the spin moment (N m) for contacts with arrays (n,) of semi-axes a, b (m), load (N) and
     friction mu."""
     pure = {
@@ -120,12 +120,12 @@ def moment_bound(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "in
     return power_bound({**columns, **pure}, cells, bound)
 
 
-def power_bound(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
+def power_bound(columns: Mapping[str, Any], cells: int = 21, bound: BoundShape = "intermediate") -> Array:
     """Upper bound (n,) of the power that friction dissipates, divided by the rolling speed (N). The columns hold a, b,
     load, mu, and creepages xi_x, xi_y, spin."""
     a, b, xi_x, xi_y, spin = (columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     work = np.zeros(len(columns["a"]))
-    for rows, net in nets(columns["a"] / columns["b"], cells, bound):
+    for rows, net in grids_of_ratios(columns["a"] / columns["b"], cells, bound):
         strips, along_strip = net.records
         y, half, part = (values[:, None] for values in (strips.y, strips.half, strips.part))
         along, across = -b[rows] * y, a[rows] * half * along_strip.centre

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.material import MaterialPair
-from models.contact.normal_problem import NormalSolution, centres, solve_normal
-from models.contact.undeformed_distance import Distance
-from models.contact.wheel_on_rail import Pose, WheelAndRail, distance_over, touches_of
+from models.contact.normal_problem import NormalSolution, cell_centres, solve_normal
+from models.contact.undeformed_distance import UndeformedDistance
+from models.contact.wheel_on_rail import WheelAndRail, WheelsetPose, distance_over, touching_places
 from models.rail.contact_table import WheelsetContact, WheelsetPlacement
 from models.systems.wheel_rail.scene import build
 
@@ -69,7 +69,7 @@ def exact_on_contact_plane(contact: WheelsetContact, placed: WheelsetPlacement) 
     side, (_, y, angle) = contact.side, CONTACT_PLANE
     normal, pose = sum(touch.normal for touch in placed.right), _lowered_pose(side, placed)
     place = np.array([-7e-3, y, float(side.rail.curve(y))])
-    x, s = centres(140, CELL_SIZE), 5e-3 + centres(180, CELL_SIZE)
+    x, s = cell_centres(140, CELL_SIZE), 5e-3 + cell_centres(180, CELL_SIZE)
 
     def pressed(depth: float) -> NormalSolution:
         distance = distance_over(side, replace(pose, fall=pose.fall + depth), place, angle, (-5e-3, 15e-3))
@@ -94,7 +94,7 @@ def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[fl
     Each patch is lowered by the other patch's resultant, as by Boussinesq's point force at that distance.
     """
     side = contact.side
-    touches = touches_of(side, _lowered_pose(side, placed))[: len(placed.right)]
+    touches = touching_places(side, _lowered_pose(side, placed))[: len(placed.right)]
     away = abs(touches[0].patch.contour_position - touches[1].patch.contour_position)
     vertical, cosines = sum(wheel.vertical for wheel in placed.right), [math.cos(touch.angle) for touch in touches]
 
@@ -115,15 +115,15 @@ def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[fl
     return [float(force) for force in pressed(approach)]
 
 
-def _load_of_patch(distance: Distance, approach: float, material_pair: MaterialPair) -> float:
-    x, s = centres(60, 2e-4), centres(70, 1e-4)
+def _load_of_patch(distance: UndeformedDistance, approach: float, material_pair: MaterialPair) -> float:
+    x, s = cell_centres(60, 2e-4), cell_centres(70, 1e-4)
     heights = distance.at(x[None, :], s[:, None])
     return solve_normal(heights, 2e-4, 1e-4, material_pair, approach=approach).load if heights.min() < approach else 0.0
 
 
-def _lowered_pose(wheel_and_rail: WheelAndRail, placed: WheelsetPlacement) -> Pose:
-    pose = Pose(placed.shift, placed.yaw, placed.roll, 0.0)
-    return Pose(placed.shift, placed.yaw, placed.roll, wheel_and_rail.clearance(pose))
+def _lowered_pose(wheel_and_rail: WheelAndRail, placed: WheelsetPlacement) -> WheelsetPose:
+    pose = WheelsetPose(placed.shift, placed.yaw, placed.roll, 0.0)
+    return WheelsetPose(placed.shift, placed.yaw, placed.roll, wheel_and_rail.clearance(pose))
 
 
 def first_touch(

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicHermiteSpline, barycentric_interpolate, make_
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from models.contact.fastsim_grid import MOST_STRIPS, POWERS, Bound
+from models.contact.fastsim_grid import POWERS, STRIPS_PER_CELL_LIMIT, BoundShape
 from models.contact.fastsim_many import (
     BLEND_POWER,
     BLEND_REACH,
@@ -27,11 +27,19 @@ from models.contact.fastsim_many import (
     X_WEIGHT,
 )
 from models.contact.inputs import Array
-from models.contact.linear_theory import LONG_C33, LONG_FADING, LONG_RATIOS, NARROW_FADING, RATIOS, STIFFER_SPIN, TABLE
-from models.contact.linear_theory import POWERS as OF_NU
+from models.contact.linear_theory import INTERPOLATED_POWERS as OF_NU
+from models.contact.linear_theory import (
+    KALKER_TABLE,
+    LONG_C33,
+    LONG_FADING,
+    LONG_PATCH_SPIN_FACTOR,
+    LONG_RATIOS,
+    NARROW_FADING,
+    TABLE_AXIS_RATIOS,
+)
 
-LOG_RATIOS = np.log(RATIOS)
-LOGARITHMS = np.log(TABLE)
+LOG_RATIOS = np.log(TABLE_AXIS_RATIOS)
+LOGARITHMS = np.log(KALKER_TABLE)
 NODES = CubicHermiteSpline(LOG_RATIOS, LOGARITHMS, np.gradient(LOGARITHMS, LOG_RATIOS, axis=0, edge_order=2))
 LONG_NODES = make_interp_spline(np.log(LONG_RATIOS), np.log(LONG_C33), k=1)
 FrictionFactor = Callable[[float], float]
@@ -69,7 +77,7 @@ class FastsimSettings:
     march "second-order" (first step of half length, turning slip direction) or "plain" (neither)."""
 
     cells: int
-    bound: Bound = "intermediate"
+    bound: BoundShape = "intermediate"
     flexibilities: str = "blended"
     march: str = "second-order"
 
@@ -135,7 +143,7 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
     """Flexibilities L1, L2, L3 (m^3/N) by Kalker (1982); L3 is not less than passive tractions require."""
     c11, c22, c23, _ = coefficients(a / b, nu)
     along, across = 8.0 * a / (3.0 * shear * c11), 8.0 * a / (3.0 * shear * c22)
-    least = across / (1.0 + STIFFER_SPIN * (b / a) ** 2)
+    least = across / (1.0 + LONG_PATCH_SPIN_FACTOR * (b / a) ** 2)
     return along, across, max(math.pi * a * math.sqrt(a / b) / (4.0 * shear * c23), least)
 
 
@@ -172,7 +180,7 @@ def fastsim(
     """FASTSIM: forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,); complex tractions (strips,
     cells) in Pa."""
     a, b, n, power = ellipse.a, ellipse.b, settings.cells, POWERS[settings.bound]
-    strips = 2 * math.ceil(n * min(max((b / (2.0 * a)) ** 0.6, 1.0), MOST_STRIPS) / 2.0 - 1e-9)
+    strips = 2 * math.ceil(n * min(max((b / (2.0 * a)) ** 0.6, 1.0), STRIPS_PER_CELL_LIMIT) / 2.0 - 1e-9)
     y = b * (strips - 1.0 - 2.0 * np.arange(strips)) / strips
     half = a * np.sqrt(1.0 - (y / b) ** 2)
     x = half[:, None] * (1.0 - (2.0 * np.arange(n) + 1.0) / n)

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 from scipy.signal import convolve2d
 
-from models.contact.half_space import Z, influence, offsets
+from models.contact.half_space import Z, cell_offsets, influence_of_rectangle
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
 from models.contact.simplified_kernels import LEAST_STIFFNESS_SHARE, POINTS_PER_MESH
@@ -111,7 +111,9 @@ def surface_displacement(values: Array, step: tuple[float, float], material_pair
     """Surface displacement (m) on a square grid due to a traction component (Pa) on it. parts: indices of the
     displacement and traction components."""
     n = len(values)
-    kernel = influence(offsets(n, step[0]), offsets(n, step[1])[:, None], *step, material_pair)[(..., *parts)]
+    kernel = influence_of_rectangle(cell_offsets(n, step[0]), cell_offsets(n, step[1])[:, None], *step, material_pair)[
+        (..., *parts)
+    ]
     return convolve2d(kernel, values, mode="valid")
 
 

@@ -5,9 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Creep, RollingEllipse, fastsim
+from models.contact.fastsim import CreepForces, RollingEllipse, fastsim
 from models.contact.hertz import by_axes
-from models.contact.simplified_theory import FINE_CELLS, PAPER, NormalContact, Rolling, roll
+from models.contact.simplified_theory import (
+    FINE_CELLS,
+    PAPER_OPTIONS,
+    NormalContact,
+    SimplifiedRolling,
+    solve_rolling_contact,
+)
 from models.machine.seconds import cost
 from models.machine.timing import interleave
 from models.systems.contact.run import interpenetration_contact
@@ -23,15 +29,15 @@ def compare_programs(cases: list[ContactCase]) -> dict[str, Any]:
     against Hertz, and computing times (s) of a call."""
     pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
-    def program_1982(case: ContactCase) -> Creep:
+    def program_1982(case: ContactCase) -> CreepForces:
         return fastsim(
             RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **PROGRAM_OF_1982
         )
 
-    def program_1983(case: ContactCase) -> Rolling:
-        return roll(pressed[case.a, case.b], case.friction, *case.motion)
+    def program_1983(case: ContactCase) -> SimplifiedRolling:
+        return solve_rolling_contact(pressed[case.a, case.b], case.friction, *case.motion)
 
-    def error(case: ContactCase, forces: Creep | Rolling) -> float:
+    def error(case: ContactCase, forces: CreepForces | SimplifiedRolling) -> float:
         return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.friction_limit - case.force)))
 
     errors = {
@@ -50,7 +56,7 @@ PROGRAM_OF_1982: dict[str, Any] = {"cells": FINE_CELLS, "march": "plain", "flexi
 
 
 def _normal_contact(case: ContactCase) -> NormalContact:
-    return interpenetration_contact(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
+    return interpenetration_contact(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER_OPTIONS)
 
 
 def _normal_errors(case: ContactCase, pressed: NormalContact) -> dict[str, float]:

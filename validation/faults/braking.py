@@ -13,10 +13,10 @@ import numpy as np
 
 from models.brake import brake, plane_vehicle
 from models.brake.advance import advance
-from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, PlaneVehicle
 from models.brake.port import sensors
 from models.brake.quarter import QuarterPath, QuarterStop
-from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
+from models.brake.surfaces import UNIFORM_ROAD, RoadStretch, RoadSurfaces, road_of_stretches
 from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
 from validation.braking import quarter_stops as stops
@@ -25,10 +25,10 @@ from validation.braking.quarter_stops import LITERAL, exact_distance, stopping_d
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
-SPLIT_ROAD, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
+SPLIT_ROAD, STEP = road_of_stretches([RoadStretch(0.0, 1, 0)]), 5.5e-3
 
 
-def _truck_after_first_step(course: Road, steer: float = 0.0) -> RollingTruck:
+def _truck_after_first_step(course: RoadSurfaces, steer: float = 0.0) -> RollingTruck:
     """The truck after a time step with all wheels locked, or, if steered, with rolling wheels. On SPLIT_ROAD the left
     side is dry and the right side ice; else the road is ice."""
     tables = tyre_table.stacked_tables([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
@@ -95,7 +95,7 @@ def _split_road_sign_error() -> float:
 
 def _hysteresis_area_error() -> float:
     """Relative error of the area of a brake's hysteresis loop from 0 to 5 bar and back, against the closed form."""
-    brakes = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
+    brakes = brake.brakes_of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
     torques = brake.torques_of_pressures(pressures, brakes)
     top, released_torque = 1400.0 * 4.2, 1500.0
@@ -106,7 +106,7 @@ def _hysteresis_area_error() -> float:
 
 def _torque_below_push_out() -> float:
     """Torque (N m) of the paper's front brake at 0.7 bar, below its push-out pressure; it should be 0."""
-    return float(brake.torque(0, 0.7, 0.0, brake.of_wheels(brake.PAPER_FRONT)))
+    return float(brake.brake_torque(0, 0.7, 0.0, brake.brakes_of_wheels(brake.PAPER_FRONT_BRAKE)))
 
 
 def _table_node_error() -> float:
@@ -123,7 +123,7 @@ def _constant_slip_distance_error() -> float:
 def _converter_error() -> float:
     """Relative difference between the largest error of a ramp converted to 12 bits and half a code."""
     ramp = np.linspace(0.0, 30.0, 100_001)
-    channels = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
+    channels = sensors.SensorChannels(sensors.SensorConversion(bits=12, range=30.0), ramp.size, 0)
     return float(abs(np.abs(channels(0, ramp) - ramp).max() / (0.5 * 30.0 / (2**12 - 1)) - 1.0))
 
 
@@ -151,13 +151,15 @@ def _truck_patch(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     )
 
 
-def _changed_plane(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
+def _changed_plane(plane: PlaneVehicle, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> PlaneVehicle:
     parts: dict[str, Any] = {name: change_field(getattr(plane, name)) for name, change_field in change.items()}
     return plane._replace(**parts)
 
 
 def _brakes_patch(change: Callable[[Any], Any]) -> Patch:
-    return attribute_patch("models.brake.brake:of_wheels", lambda real: lambda *arguments: change(real(*arguments)))
+    return attribute_patch(
+        "models.brake.brake:brakes_of_wheels", lambda real: lambda *arguments: change(real(*arguments))
+    )
 
 
 def _force_of_step_start(original: Any) -> Any:
@@ -194,7 +196,7 @@ def _spin_inertia_patch(factor: float) -> Patch:
     def change(original: Any) -> Any:
         return property(lambda truck: _changed_plane(original.fget(truck), {"spin": lambda spin: factor * spin}))
 
-    return attribute_patch("models.brake.quarter:Quarter.plane", change)
+    return attribute_patch("models.brake.quarter:QuarterVehicle.plane", change)
 
 
 def _coarser_conversion(original: Any) -> Any:
@@ -225,7 +227,9 @@ FAULTS = (
         attribute_patch("validation.faults.braking:advance", _mirrored_steering),
     ),
     CampaignFault(
-        "conversion with a bit less", "port", attribute_patch("models.brake.port.sensors:Channels", _coarser_conversion)
+        "conversion with a bit less",
+        "port",
+        attribute_patch("models.brake.port.sensors:SensorChannels", _coarser_conversion),
     ),
     CampaignFault("front and rear swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([-1.0, 1.0]))),
     CampaignFault(

@@ -249,7 +249,7 @@ def _longer_relaxation(original: Any) -> Any:
 def _relaxation_patch(change: Callable[..., tuple[Any, ...]]) -> Patch:
     """Patch that changes the inputs by which lagging slip angles are advanced for a vehicle on its suspension."""
     return attribute_patch(
-        "models.brake.sprung_relaxation:relax", lambda real: lambda *arguments: real(*change(*arguments))
+        "models.brake.sprung_relaxation:advance_contact_lag", lambda real: lambda *arguments: real(*change(*arguments))
     )
 
 

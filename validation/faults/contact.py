@@ -11,9 +11,9 @@ from models.contact import fastsim as creep
 from models.contact import hertz, normal_problem, rolling_problem
 from models.contact.fastsim_kernels import PLAIN
 from models.contact.inputs import Array
-from models.contact.linear_theory import forces
+from models.contact.linear_theory import linear_creep_forces
 from models.contact.material import STEEL, Material, MaterialPair
-from models.contact.normal_problem import NormalSolution, centres
+from models.contact.normal_problem import NormalSolution, cell_centres
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
@@ -50,7 +50,7 @@ def _ellipse_errors() -> float:
 
 
 def _normal_solution() -> NormalSolution:
-    y, x = centres(CELLS[0], CELL_WIDTH), centres(CELLS[1], CELL_LENGTH)
+    y, x = cell_centres(CELLS[0], CELL_WIDTH), cell_centres(CELLS[1], CELL_LENGTH)
     away = (x**2 + y[:, None] ** 2) / (2.0 * RADIUS)
     return normal_problem.solve_normal(away, CELL_LENGTH, CELL_WIDTH, MATERIAL_PAIR, load=LOAD)
 
@@ -79,7 +79,7 @@ def _linear_theory_errors() -> float:
     motion = (1e-7, 0.7e-7, 2e-5)
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, *motion), MATERIAL_PAIR, cells=41)
     return largest_relative_difference(
-        np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, MATERIAL_PAIR)[:2])
+        np.array([answer.fx, answer.fy]), np.array(linear_creep_forces(A, B, *motion, MATERIAL_PAIR)[:2])
     )
 
 
@@ -101,7 +101,7 @@ def _theory_difference() -> float:
 @cache
 def _forces_at_small_creepage() -> Array:
     a = _ball_contact()[0]
-    return np.array(forces(a, a, 2e-5, 1e-5, 0.0, MATERIAL_PAIR)[:2])
+    return np.array(linear_creep_forces(a, a, 2e-5, 1e-5, 0.0, MATERIAL_PAIR)[:2])
 
 
 def _exact_theory_error() -> float:
@@ -133,7 +133,7 @@ def _contacts_patch(change: Callable[[Array], None]) -> Patch:
 
         return planted
 
-    return attribute_patch("models.contact.fastsim:contacts_of", contacts)
+    return attribute_patch("models.contact.fastsim:contact_records", contacts)
 
 
 def _multiplication_patch(name: str, factor: float) -> Patch:
@@ -195,7 +195,7 @@ FAULTS = (
     CampaignFault(
         "whole first step at the leading edge",
         "FASTSIM",
-        attribute_patch("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN}),
+        attribute_patch("models.contact.fastsim:MARCH_KINDS", lambda real: {**real, "second-order": PLAIN}),
     ),
     CampaignFault("sign of the spin", "FASTSIM", _multiplication_patch("spin", -1.0)),
     CampaignFault("creepages exchanged", "FASTSIM", _exchange_patch("xi_x", "xi_y")),

@@ -10,7 +10,7 @@ from unittest import mock
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.linear_theory import forces as kalker
+from models.contact.linear_theory import linear_creep_forces as kalker
 from models.engines.wheelset import MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels, torques_of_pressures
+from models.brake.brake import Brake, brakes_of_wheels, torques_of_pressures
 from validation.hard_cases.case import Case
 
-LOOPED = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
+LOOPED = brakes_of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
 
 
 def step_split_error(implementation: str, folder: Path) -> float:

@@ -12,8 +12,8 @@ import numpy as np
 
 from models.brake.brake import Brake
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.brake.quarter import braked
-from models.brake.surfaces import UNIFORM_ROAD, Stretch, check_way, road
+from models.brake.quarter import stop_of_quarter_vehicle
+from models.brake.surfaces import UNIFORM_ROAD, RoadStretch, check_step_distance, road_of_stretches
 from models.core.errors import InputError
 from models.tyre.tyre_table import stacked_tables
 from validation.braking import braked_trucks as trucks
@@ -288,7 +288,7 @@ CASES = (
         for name, run in (
             (
                 "torque that drives the wheel",
-                lambda: braked(
+                lambda: stop_of_quarter_vehicle(
                     wheels.QUARTER, stacked_tables([DRY]), UNIFORM_ROAD, np.full(3, -1.0), wheels.STEP, wheels.SPEED
                 ),
             ),
@@ -296,7 +296,9 @@ CASES = (
             ("table with friction at no slip", lambda: piecewise_linear_friction((0.0, 0.1), (1.0, 0.8))),
             (
                 "stretches shorter than a step",
-                lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),
+                lambda: check_step_distance(
+                    road_of_stretches([RoadStretch(0.0, 0, 0), RoadStretch(1.0, 1, 1), RoadStretch(1.01, 0, 0)]), 0.1
+                ),
             ),
             ("brake that lets go too early", inconsistent_brake),
             ("vehicle lighter than its wheels", lambda: plane_of_truck(PAPER_TRUCK.model_copy(update={"mass": 100.0}))),

@@ -10,8 +10,8 @@ import numpy as np
 
 from models.contact import hertz
 from models.contact.fastsim import RollingEllipse, fastsim
-from models.contact.fastsim_derivatives import derivatives
-from models.contact.linear_theory import forces
+from models.contact.fastsim_derivatives import creep_force_derivatives
+from models.contact.linear_theory import linear_creep_forces
 from models.contact.material import MaterialPair
 from validation.hard_cases.case import Case
 
@@ -21,7 +21,7 @@ A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 def force_without_creepage(implementation: str, folder: Path) -> float:
     """Case: no creepage. Error: largest creep force (N); infinite if a derivative is not finite."""
-    answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), MATERIAL_PAIR)
+    answer = creep_force_derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), MATERIAL_PAIR)
     return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
@@ -38,7 +38,7 @@ def tiny_creepage_error(implementation: str, folder: Path) -> float:
     motion = (small, -0.5 * small, 30.0 * small)
     answer, linear = (
         fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR),
-        forces(A, B, *motion, MATERIAL_PAIR),
+        linear_creep_forces(A, B, *motion, MATERIAL_PAIR),
     )
     relative_errors = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
     return float(np.abs(relative_errors).max())

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from models.contact import hertz
-from models.contact.fastsim import March, RollingEllipse, fastsim
-from models.contact.linear_theory import forces
+from models.contact.fastsim import MarchChoice, RollingEllipse, fastsim
+from models.contact.linear_theory import linear_creep_forces
 from models.contact.material import MaterialPair
-from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from models.contact.normal_problem import NormalSolution, cell_centres, solve_normal
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 
 MATERIAL_PAIR = MaterialPair()
@@ -22,11 +22,11 @@ CELL, RADIUS, BALL_LOAD = 1.5e-4, 0.3, 1e4
 """Cell size (m), radius (m) of two balls, load (N) on each."""
 
 
-def _linear_error(cells: int, march_name: March) -> float:
+def _linear_error(cells: int, march_name: MarchChoice) -> float:
     answer = fastsim(
         RollingEllipse(A, B, LOAD, MU, SMALL_CREEPAGE, 0.0, 0.0), MATERIAL_PAIR, cells=cells, march=march_name
     )
-    return abs(float(answer.fx / forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, MATERIAL_PAIR)[0]) - 1.0)
+    return abs(float(answer.fx / linear_creep_forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, MATERIAL_PAIR)[0]) - 1.0)
 
 
 def few_cells_error(implementation: str, folder: Path) -> float:
@@ -85,13 +85,13 @@ def pure_spin_error(implementation: str, folder: Path) -> float:
     error of the lateral force against the linear theory."""
     small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), MATERIAL_PAIR)
     large = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3]), MATERIAL_PAIR)
-    wanted = float(forces(A, B, 0.0, 0.0, 1e-6, MATERIAL_PAIR)[1])
+    wanted = float(linear_creep_forces(A, B, 0.0, 0.0, 1e-6, MATERIAL_PAIR)[1])
     return max(abs(float(small.fy) / wanted - 1.0), float(np.abs(large.fx).max()) / (MU * LOAD))
 
 
 def _balls(centre_distance: float, load: float, cells: tuple[int, int] = (41, 101)) -> NormalSolution:
     """Exact normal contact of two balls side by side at a distance (m) between their centres."""
-    y, x = (centres(n, CELL) for n in cells)
+    y, x = (cell_centres(n, CELL) for n in cells)
     away = np.minimum((x - centre_distance / 2) ** 2, (x + centre_distance / 2) ** 2) + y[:, None] ** 2
     return solve_normal(away / (2.0 * RADIUS), CELL, CELL, MATERIAL_PAIR, load=load)
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from models.contact.accuracy import rolled
+from models.contact.accuracy import rolled_with_errors
 from models.contact.hertz import by_axes
 from models.contact.material import MaterialPair
-from models.contact.profiles import profile
-from models.contact.standard_profiles import built_in
-from models.contact.theories import ExactOnEllipse, Fastsim
+from models.contact.profiles import profile_of_points
+from models.contact.standard_profiles import built_in_profile
+from models.contact.theories import ExactTheoryOnEllipse, FastsimTheory
 from models.core.result import Result, load
 from models.drift.growth import drift_off_time
 from models.drift.point_mass import euler_covariance
@@ -52,7 +52,7 @@ def long_wave_error(implementation: str, folder: Path) -> float:
 
 def _run_copies(corner: float) -> Any:
     vehicle, road = _vehicle_and_road(corner)
-    return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest_step=2e-3)
+    return copies_in_time(vehicle, road, 5.0, 1.0, copy_count=20, seed=1, longest_step=2e-3)
 
 
 def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
@@ -78,8 +78,8 @@ def slender_ellipse_case(a: float, b: float) -> Callable[[str, Path], float]:
         hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
         choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
         (fast, error_of_fast), (exact, error_of_exact) = (
-            rolled(theory, motion, CELLS)
-            for theory in (Fastsim(hertz, FRICTION, pair, **choices), ExactOnEllipse(hertz, FRICTION, pair))
+            rolled_with_errors(theory, motion, CELLS)
+            for theory in (FastsimTheory(hertz, FRICTION, pair, **choices), ExactTheoryOnEllipse(hertz, FRICTION, pair))
         )
         force, moment = float(np.linalg.norm(fast.force - exact.force)), abs(fast.mz - exact.mz)
         return max(
@@ -125,15 +125,15 @@ def flipped_bit_error(implementation: str, folder: Path) -> float:
 
 def profile_with_spike() -> Any:
     """A rail profile with a point measured 1 mm too low, which must be refused."""
-    rail = built_in("UIC60")
-    return profile(rail.y, rail.z + 1e-3 * (np.arange(rail.z.size) == rail.z.size // 2))
+    rail = built_in_profile("UIC60")
+    return profile_of_points(rail.y, rail.z + 1e-3 * (np.arange(rail.z.size) == rail.z.size // 2))
 
 
 def rounded_profile() -> Any:
     """A rail profile with points rounded to 0.1 mm, so that its steep sides go back and forth, which must be
     refused."""
-    rail = built_in("UIC60")
-    return profile(rail.y.round(4), rail.z.round(4))
+    rail = built_in_profile("UIC60")
+    return profile_of_points(rail.y.round(4), rail.z.round(4))
 
 
 MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)

@@ -129,7 +129,7 @@ def measure_routes(quick: bool, round_count: int, minimum_seconds: float) -> tup
         jobs.append(partial(deviations_on_grid, ride, count, highest_frequency, even))
     for copies, lasting in COPY_COUNTS[quick]:
         jobs.append(
-            partial(variances_at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED)
+            partial(variances_at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copy_count=copies, seed=SEED)
         )
         start_time = time.perf_counter()
         estimate: VarianceEstimate = jobs[-1]()

@@ -101,7 +101,7 @@ def paper_road(
     track width."""
     y = half_track(wheels)
     placed = wheels if y else wheels_on_track(wheels, 1.0)
-    return road_excitation(road_of_level(y or 1.0, level_factor, cutoff=cutoff), placed, *correlation_words)
+    return road_excitation(road_of_level(y or 1.0, level_factor, cutoff_wavenumber=cutoff), placed, *correlation_words)
 
 
 def five_correlation_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from models.contact.fastsim import RollingEllipse, fastsim
-from models.contact.linear_theory import forces as linear_forces
+from models.contact.linear_theory import linear_creep_forces as linear_forces
 from models.rail.wheelset import Wheelset
 
 SLOWEST_SPEED = 0.1

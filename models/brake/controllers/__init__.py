@@ -2,13 +2,13 @@
 that the slower one needs.
 """
 
-from models.brake.controller import AllApplied
+from models.brake.controller import NoAntiLock
 from models.brake.controllers.acceleration_phases import AccelerationPhases
 from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.slip import SlipBangBang, SlipPI
 
 CONTROLLERS = {
-    "none": AllApplied,
+    "none": NoAntiLock,
     "slip_bang_bang": SlipBangBang,
     "acceleration_phases": AccelerationPhases,
     "five_phase": FivePhase,

@@ -16,14 +16,14 @@ Automotive Handbook. Their figures are those of cars; these are for a truck with
 from dataclasses import dataclass
 
 from models.brake.controller import APPLY, HOLD, RELEASE, SLOW
-from models.brake.controllers.per_wheel import ACCELERATION_BOUNDS, SLIP_BOUNDS, SMALLEST_FLOAT, Common
+from models.brake.controllers.per_wheel import ACCELERATION_BOUNDS, SLIP_BOUNDS, SMALLEST_FLOAT, AntiLockController
 from models.core.errors import InputError
 
 FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
 
 
 @dataclass
-class AccelerationPhases(Common):
+class AccelerationPhases(AntiLockController):
     """Anti-lock controller by thresholds of the wheel's acceleration (m/s^2): falls (-a), rises (+a), rises_fast (+A);
     of its slip: slip, and deep, above which a wheel that does not rise is released; pulse : samples per step of
     pressure; slow : whether valves that can apply slowly do so in place of these steps.
@@ -50,16 +50,16 @@ class AccelerationPhases(Common):
             if not isinstance(getattr(self, name), kind):
                 allowed = "must be a whole number" if kind is int else "must be true or false"
                 raise InputError("", f"controller.parameters.{name}", getattr(self, name), allowed)
-        self.set_logic(_Logic)
+        self.set_logic(_AccelerationPhaseLogic)
 
 
-class _Logic:
+class _AccelerationPhaseLogic:
     """State machine of one wheel's acceleration phases."""
 
-    def __init__(self, settings: AccelerationPhases) -> None:
-        self._settings, self._phase, self._rose, self._count = settings, FIRST, False, 0
+    def __init__(self, thresholds: AccelerationPhases) -> None:
+        self._settings, self._phase, self._rose, self._count = thresholds, FIRST, False, 0
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         settings, phase = self._settings, self._phase
         falls = relative_acceleration < settings.falls
         if phase == FIRST and falls:

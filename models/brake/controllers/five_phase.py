@@ -18,12 +18,12 @@ with phase 1.
 
 from dataclasses import dataclass
 
-from models.brake.controllers.per_wheel import ACCELERATION_BOUNDS, PRESSURE_RATE, SLIP_BOUNDS, Common
+from models.brake.controllers.per_wheel import ACCELERATION_BOUNDS, PRESSURE_RATE, SLIP_BOUNDS, AntiLockController
 from models.core.errors import InputError
 
 
 @dataclass
-class FivePhase(Common):
+class FivePhase(AntiLockController):
     """Five-phase anti-lock controller. e1 to e5 : thresholds of the wheel's acceleration (m/s^2); falling, fast, slow :
     rates of its pressure (bar/s); deep : slip above which phase 1 begins.
     """
@@ -47,42 +47,42 @@ class FivePhase(Common):
         )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
-        self.set_logic(_Logic, pressures=True)
+        self.set_logic(_FivePhaseLogic, commands_pressures=True)
 
 
 FIRST_PHASE = 0
 
 
-def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
+def phase_end_threshold(phase: int, controller: FivePhase) -> tuple[float, float]:
     """Threshold of the wheel's acceleration that ends a phase: sign +1 if the acceleration must rise to it, -1 if it
     must fall, and level (m/s^2).
     """
     if phase in (1, 2):
-        return 1.0, settings.e1 if phase == 1 else settings.e2
-    return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
+        return 1.0, controller.e1 if phase == 1 else controller.e2
+    return -1.0, {3: controller.e3, 4: controller.e4}.get(phase, -controller.e5)
 
 
-def rate_of_phase(phase: int, settings: FivePhase) -> float:
+def pressure_rate_of_phase(phase: int, controller: FivePhase) -> float:
     """Rate of the brake pressure (bar/s) in a phase."""
-    return (settings.fast, -settings.falling, 0.0, settings.fast, 0.0, settings.slow)[phase]
+    return (controller.fast, -controller.falling, 0.0, controller.fast, 0.0, controller.slow)[phase]
 
 
-class _Logic:
+class _FivePhaseLogic:
     """State machine of one wheel's five phases."""
 
-    def __init__(self, settings: FivePhase) -> None:
-        self._settings, self._phase, self._pressure = settings, FIRST_PHASE, 0.0
+    def __init__(self, controller: FivePhase) -> None:
+        self._settings, self._phase, self._pressure = controller, FIRST_PHASE, 0.0
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
-        sign, level = end_of_phase(self._phase, self._settings)
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
+        sign, level = phase_end_threshold(self._phase, self._settings)
         if sign * (relative_acceleration - level) >= 0.0:
             self._phase = self._phase % 5 + 1
         elif self._continues_with_phase_5(slip, relative_acceleration):
             self._phase = 5
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
-        raised = self._pressure + rate_of_phase(self._phase, self._settings) * self._settings.period
-        self._pressure = min(max(raised, 0.0), supply)
+        raised = self._pressure + pressure_rate_of_phase(self._phase, self._settings) * self._settings.period
+        self._pressure = min(max(raised, 0.0), supply_pressure)
         return self._pressure
 
     def _continues_with_phase_5(self, slip: float, relative_acceleration: float) -> bool:

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from models.brake.controller import APPLY, RELEASE, SAMPLE, Command, Sample
+from models.brake.controller import APPLY, RELEASE, SAMPLING_PERIOD, Command, Sample
 from models.core.errors import InputError
 
-SLOPE_MEMORY = 0.1
+ACCELERATION_SMOOTHING_TIME = 0.1
 """Time constant (s) over which the vehicle's acceleration is smoothed."""
 SMALLEST_FLOAT = 5e-324
 """Smallest positive number; its negative as an exclusive lower bound admits zero, and as an upper bound excludes
@@ -26,17 +26,17 @@ SLIP_BOUNDS = (0.0, 1.0)
 """Bounds of slip thresholds: a locked wheel has slip 1."""
 
 
-class Logic(Protocol):
+class WheelLogic(Protocol):
     """Protocol of the anti-lock logic for one wheel, or for one axle on the basis of its slower wheel."""
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         """Valve state or pressure (bar), from the wheel's slip, its acceleration relative to the vehicle's (m/s^2), the
         vehicle's speed (m/s) and the supply pressure (bar)."""
         ...
 
 
 @dataclass(kw_only=True)
-class Common:
+class AntiLockController:
     """Parameters that every anti-lock controller has.
 
     wheels : how many there are; select_low : axles, from 0, whose two wheels get what the slower one needs; cut_off :
@@ -47,13 +47,13 @@ class Common:
     wheels: int = field(kw_only=False)
     select_low: tuple[int, ...] = ()
     cut_off: float = 1.5
-    period: float = SAMPLE
+    period: float = SAMPLING_PERIOD
 
-    def set_logic(self, logic: Callable[[Any], Logic], pressures: bool = False) -> None:
-        """Set up one ``logic`` per wheel or axle; ``pressures`` : whether it commands pressures instead of valve
-        states.
+    def set_logic(self, make_wheel_logic: Callable[[Any], WheelLogic], commands_pressures: bool = False) -> None:
+        """Set up one ``make_wheel_logic`` per wheel or axle; ``commands_pressures`` : whether it commands pressures
+        instead of valve states.
         """
-        self._loop = PerWheel(self.wheels, self, logic, pressures)
+        self._loop = PerWheelLoop(self.wheels, self, make_wheel_logic, commands_pressures)
 
     def sample(self, sample: Sample) -> Command:
         """Command for a sample: states of the valves, or pressures."""
@@ -63,7 +63,7 @@ class Common:
         """Refuse a parameter that is no number or outside its bounds: it must be above the first and at most the
         second.
 
-        Raises InputError. Axles that do not exist are refused by ``PerWheel``.
+        Raises InputError. Axles that do not exist are refused by ``PerWheelLoop``.
         """
         for name, (bound_below, bound_above) in {
             "period": (0.0, 1.0),
@@ -80,21 +80,29 @@ class Common:
         self.select_low = tuple(self.select_low)
 
 
-class PerWheel:
+class PerWheelLoop:
     """Loop over wheels or axles that all controllers share; ``pressures`` : whether they command pressures instead of
     valve states.
     """
 
-    def __init__(self, wheels: int, common: Common, logic: Callable[[Any], Logic], pressures: bool) -> None:
-        for axle in common.select_low:
-            if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheels):
-                raise InputError("", "controller.parameters.select_low", axle, f"must be axles 0 to {wheels // 2 - 1}")
-        shared = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
-        single_wheels = [(i, i) for i in range(wheels) if i // 2 not in common.select_low]
+    def __init__(
+        self,
+        wheel_count: int,
+        controller: AntiLockController,
+        make_wheel_logic: Callable[[Any], WheelLogic],
+        commands_pressures: bool,
+    ) -> None:
+        for axle in controller.select_low:
+            if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheel_count):
+                raise InputError(
+                    "", "controller.parameters.select_low", axle, f"must be axles 0 to {wheel_count // 2 - 1}"
+                )
+        shared = [(2 * axle, 2 * axle + 1) for axle in controller.select_low]
+        single_wheels = [(i, i) for i in range(wheel_count) if i // 2 not in controller.select_low]
         self._groups = sorted(shared + single_wheels)
-        self._logics = [logic(common) for _ in self._groups]
-        self._common, self._pressures, self._wheels = common, pressures, wheels
-        self._estimate, self._last_wheel_speeds = SpeedEstimate(common.period), [np.nan] * len(self._groups)
+        self._logics = [make_wheel_logic(controller) for _ in self._groups]
+        self._common, self._pressures, self._wheels = controller, commands_pressures, wheel_count
+        self._estimate, self._last_wheel_speeds = SpeedEstimate(controller.period), [np.nan] * len(self._groups)
         self._speed, self._mean_acceleration = np.nan, 0.0
 
     def command(self, sample: Sample) -> Command:
@@ -102,7 +110,7 @@ class PerWheel:
         speed.
         """
         wheels = sample.wheels.tolist()
-        speed = vehicle_speed(sample.speed, wheels, self._estimate)
+        speed = speed_from_scene_or_estimate(sample.speed, wheels, self._estimate)
         vehicle_acceleration = self._smoothed_acceleration(speed)
         if not sample.brake:
             return self._command_all(0.0 if self._pressures else RELEASE)
@@ -123,25 +131,27 @@ class PerWheel:
             return self._command_all(sample.supply if self._pressures else APPLY)
         return self._commands_of_logics(commands)
 
-    def _smoothed_acceleration(self, speed: float) -> float:
-        """Mean acceleration of the vehicle (m/s^2), negative while it brakes, smoothed over about ``SLOPE_MEMORY``
-        seconds.
+    def _smoothed_acceleration(self, vehicle_speed: float) -> float:
+        """Mean acceleration of the vehicle (m/s^2), negative while it brakes, smoothed over about
+        ``ACCELERATION_SMOOTHING_TIME`` seconds.
         """
         if self._speed == self._speed:
-            latest = (speed - self._speed) / self._common.period
-            self._mean_acceleration += (latest - self._mean_acceleration) * min(self._common.period / SLOPE_MEMORY, 1.0)
-        self._speed = speed
+            latest = (vehicle_speed - self._speed) / self._common.period
+            self._mean_acceleration += (latest - self._mean_acceleration) * min(
+                self._common.period / ACCELERATION_SMOOTHING_TIME, 1.0
+            )
+        self._speed = vehicle_speed
         return self._mean_acceleration
 
-    def _command_all(self, logic_output: float) -> Command:
+    def _command_all(self, wheel_command: float) -> Command:
         """The same command for all wheels."""
-        return self._commands_of_logics([logic_output] * self._wheels)
+        return self._commands_of_logics([wheel_command] * self._wheels)
 
-    def _commands_of_logics(self, logic_outputs: list[float]) -> Command:
+    def _commands_of_logics(self, wheel_commands: list[float]) -> Command:
         """Command with one valve state or pressure per wheel."""
         if self._pressures:
-            return Command(pressures=np.array(logic_outputs, dtype=float))
-        return Command(valves=np.array(logic_outputs, dtype=np.int64))
+            return Command(pressures=np.array(wheel_commands, dtype=float))
+        return Command(valves=np.array(wheel_commands, dtype=np.int64))
 
 
 @dataclass
@@ -167,25 +177,27 @@ class SpeedEstimate:
         self._fastest, self._rising, self._since = 0.0, False, 0.0
         self._peak = math.nan
 
-    def after(self, wheels: Sequence[float]) -> float:
+    def after(self, wheel_speeds: Sequence[float]) -> float:
         """Estimated speed (m/s) of the vehicle after one more sample of the wheels' speeds (m/s)."""
-        fastest = max(wheels)
+        fastest = max(wheel_speeds)
         if self._speed != self._speed:
             self._speed = self._peak = fastest
         self._learn_slope(fastest)
         self._speed = max(fastest, self._speed - self._slope * self.sample)
         return self._speed
 
-    def _learn_slope(self, fastest: float) -> None:
+    def _learn_slope(self, fastest_wheel_speed: float) -> None:
         """Update the slope (m/s^2) of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
         self._since += self.sample
-        if self._rising and fastest < self._fastest and self._since >= self.least_interval:
+        if self._rising and fastest_wheel_speed < self._fastest and self._since >= self.least_interval:
             slope = self.slope_margin * (self._peak - self._fastest) / self._since
             self._slope = min(max(slope, self.gentlest_deceleration), self.steepest_deceleration)
             self._peak, self._since = self._fastest, 0.0
-        self._rising, self._fastest = fastest > self._fastest, fastest
+        self._rising, self._fastest = fastest_wheel_speed > self._fastest, fastest_wheel_speed
 
 
-def vehicle_speed(scene_speed: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
+def speed_from_scene_or_estimate(
+    scene_speed: float, wheel_speeds: Sequence[float], speed_estimate: SpeedEstimate
+) -> float:
     """Vehicle speed (m/s) from the scene, or the estimate where the scene's speed is not a number."""
-    return estimate.after(wheels) if scene_speed != scene_speed else scene_speed
+    return speed_estimate.after(wheel_speeds) if scene_speed != scene_speed else scene_speed

@@ -11,12 +11,12 @@ Rantzer, J. Ludemann, Synthesis of a model-based tire slip controller, Vehicle S
 from dataclasses import dataclass
 
 from models.brake.controller import APPLY, RELEASE
-from models.brake.controllers.per_wheel import SLIP_BOUNDS, SMALLEST_FLOAT, Common
+from models.brake.controllers.per_wheel import SLIP_BOUNDS, SMALLEST_FLOAT, AntiLockController
 from models.core.errors import InputError
 
 
 @dataclass
-class SlipBangBang(Common):
+class SlipBangBang(AntiLockController):
     """Slip controller that releases the brake above one slip, applies it below a lower one, and keeps its last command
     between them.
     """
@@ -28,16 +28,16 @@ class SlipBangBang(Common):
         self.check(release=SLIP_BOUNDS, apply=SLIP_BOUNDS)
         if not self.apply <= self.release < 1.0:
             raise InputError("", "controller.parameters.apply", self.apply, "must be at most release, and that below 1")
-        self.set_logic(_BangBang)
+        self.set_logic(_SlipBangBangLogic)
 
 
-class _BangBang:
+class _SlipBangBangLogic:
     """Two-threshold logic of one wheel."""
 
-    def __init__(self, settings: SlipBangBang) -> None:
-        self._settings, self._valve = settings, APPLY
+    def __init__(self, slip_controller: SlipBangBang) -> None:
+        self._settings, self._valve = slip_controller, APPLY
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         if slip > self._settings.release:
             self._valve = RELEASE
         elif slip < self._settings.apply:
@@ -46,7 +46,7 @@ class _BangBang:
 
 
 @dataclass
-class SlipPI(Common):
+class SlipPI(AntiLockController):
     """Proportional-integral slip controller. target : slip wanted; gain : bar per unit of slip and m/s; reset : time of
     the integral part (s); mix : share of the deceleration (slip per g).
     """
@@ -58,19 +58,19 @@ class SlipPI(Common):
 
     def __post_init__(self) -> None:
         self.check(target=SLIP_BOUNDS, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
-        self.set_logic(_Loop, pressures=True)
+        self.set_logic(_SlipPILogic, commands_pressures=True)
 
 
-class _Loop:
+class _SlipPILogic:
     """Proportional-integral loop of one wheel, whose gain grows with speed."""
 
-    def __init__(self, settings: SlipPI) -> None:
-        self._settings, self._sum = settings, 0.0
+    def __init__(self, slip_controller: SlipPI) -> None:
+        self._settings, self._sum = slip_controller, 0.0
 
-    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, vehicle_speed: float, supply_pressure: float) -> float:
         settings = self._settings
         error = settings.target - (slip - settings.mix * relative_acceleration / 9.81)
-        gain = settings.gain * speed
+        gain = settings.gain * vehicle_speed
         total = self._sum + gain * error * settings.period / settings.reset
-        self._sum = min(max(total, 0.0), supply)
-        return min(max(self._sum + gain * error, 0.0), supply)
+        self._sum = min(max(total, 0.0), supply_pressure)
+        return min(max(self._sum + gain * error, 0.0), supply_pressure)

@@ -10,30 +10,32 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.brake.brake import Brakes
+from models.brake.brake import WheelBrakes
 from models.brake.controller import APPLY, RELEASE, SLOW
-from models.brake.pressure import Air, Chambers
+from models.brake.pressure import AirState, BrakeChambers
 
 STEP_END_SHARE = 1e-9
 """Share of a step at its ends within which a command counts as arriving at the end."""
 
 
 @dataclass(eq=False)
-class Pressures:
+class PlainAirSystem:
     """The brakes' air system: all commands so far, and its state ``air``, which is updated in place; sample : duration
     (s).
     """
 
-    chambers: Chambers
-    brakes: Brakes
+    chambers: BrakeChambers
+    brakes: WheelBrakes
     sample: float
-    air: Air
+    air: AirState
     commands: list[np.ndarray] = field(default_factory=list)
 
-    def by_valves(self, valves: np.ndarray, torques: np.ndarray) -> None:
-        """Fill ``torques`` (n + 1, W) in N m, at the ends of the n steps of the next sample, for valve states (W,)."""
-        self.commands.append(valves.copy())
-        torques[0], steps = self.air.torque, len(torques) - 1
+    def by_valves(self, valve_states: np.ndarray, brake_torques: np.ndarray) -> None:
+        """Fill ``brake_torques`` (n + 1, W) in N m, at the ends of the n steps of the next sample, for valve states
+        (W,).
+        """
+        self.commands.append(valve_states.copy())
+        brake_torques[0], steps = self.air.torque, len(brake_torques) - 1
         step = self.sample / steps
         for n in range(steps):
             within = [
@@ -43,34 +45,42 @@ class Pressures:
                 self._advance_pressures(
                     self._effective_command(n * step + 0.5 * (start_time + end_time)), end_time - start_time
                 )
-            torques[n + 1] = self.air.torque
+            brake_torques[n + 1] = self.air.torque
 
-    def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
-        """Set pressures (W,) in bar at once and keep them over the next sample; fill its ``torques`` (n + 1, W) in N
-        m.
+    def by_pressures(self, pressures: np.ndarray, brake_torques: np.ndarray) -> None:
+        """Set pressures (W,) in bar at once and keep them over the next sample; fill its ``brake_torques`` (n + 1, W)
+        in N m.
         """
         self.air.pressure[:] = pressures
         self._follow_hysteresis()
-        torques[:] = self.air.torque
+        brake_torques[:] = self.air.torque
 
-    def _arrival_times(self, time: float) -> list[float]:
-        """Times (s) at which each command reaches the chambers, counted from ``time`` (s) in the latest sample."""
+    def _arrival_times(self, time_in_sample: float) -> list[float]:
+        """Times (s) at which each command reaches the chambers, counted from ``time_in_sample`` (s) in the latest
+        sample.
+        """
         latest = len(self.commands) - 1
-        return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
+        return [(k - latest) * self.sample + self.chambers.delay - time_in_sample for k in range(latest + 1)]
 
-    def _effective_command(self, time: float) -> np.ndarray:
+    def _effective_command(self, time_in_sample: float) -> np.ndarray:
         """The valve states (W,) that are effective in the chambers at a time (s) in the latest sample."""
-        known = [arrived for arrived, late in zip(self.commands, self._arrival_times(time), strict=True) if late <= 0.0]
+        known = [
+            arrived
+            for arrived, late in zip(self.commands, self._arrival_times(time_in_sample), strict=True)
+            if late <= 0.0
+        ]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 
-    def _advance_pressures(self, valves: np.ndarray, time: float) -> None:
+    def _advance_pressures(self, valve_states: np.ndarray, duration: float) -> None:
         """Update chamber pressures and torques over a time (s) with constant valve states (W,)."""
         chambers, supply, pressures_before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
-        fills = valves >= APPLY
-        target = np.where(fills, supply, np.where(valves == RELEASE, 0.0, pressures_before))
+        fills = valve_states >= APPLY
+        target = np.where(fills, supply, np.where(valve_states == RELEASE, 0.0, pressures_before))
         slow = chambers.slow if chambers.slow.size else chambers.fill_time
-        constants = np.where(valves == RELEASE, chambers.empty_time, np.where(valves == SLOW, slow, chambers.fill_time))
-        remaining_share = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
+        constants = np.where(
+            valve_states == RELEASE, chambers.empty_time, np.where(valve_states == SLOW, slow, chambers.fill_time)
+        )
+        remaining_share = np.exp(-duration / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
         self.air.pressure[:] = target + (pressures_before - target) * remaining_share
         self._follow_hysteresis()
         if np.isfinite(chambers.reservoir):

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.brake.plain.wheel import Force, WheelStep, wheel_step
+from models.brake.plain.wheel import TyreForceCurve, WheelStepData, wheel_step
 from models.tyre.tyre_table import Tables
 
 LOCKING_SLIP = 0.98
 """Slip above which the force turns to that of a locked tyre, against the direction of sliding."""
 
 
-def interpolation_weights(nodes: np.ndarray, interpolated_at: float) -> np.ndarray:
+def interpolation_weights(nodes: np.ndarray, position: float) -> np.ndarray:
     """Interpolation weight (n,) of each node at a value; beyond the nodes, the end node alone counts."""
-    clipped = float(np.clip(interpolated_at, nodes[0], nodes[-1]))
+    clipped = float(np.clip(position, nodes[0], nodes[-1]))
     high = min(max(int(np.searchsorted(nodes, clipped)), 1), nodes.size - 1)
     weights_at = np.zeros(nodes.size)
     if nodes.size == 1:
@@ -30,7 +30,7 @@ def interpolation_weights(nodes: np.ndarray, interpolated_at: float) -> np.ndarr
 
 
 @dataclass(frozen=True)
-class Surface:
+class WheelSurface:
     """Surface under a wheel: indices of two friction tables, and the share of the second one in the mixture."""
 
     first: int
@@ -39,21 +39,23 @@ class Surface:
 
 
 @dataclass(frozen=True, eq=False)
-class Friction:
+class TyreFriction:
     """Friction of a tyre at one slip angle (rad, from 0) and load (N) on a surface."""
 
     tables: Tables
-    surface: Surface
+    surface: WheelSurface
     angle: float
     load: float
 
-    def mixed_values(self, values: np.ndarray) -> np.ndarray:
-        """Values on the wheel's surface, a mixture of two tables' values out of ``values`` (t, ...) of all tables."""
+    def mixed_values(self, table_values: np.ndarray) -> np.ndarray:
+        """Values on the wheel's surface, a mixture of two tables' values out of ``table_values`` (t, ...) of all
+        tables.
+        """
         share = self.surface.share
-        mixed: np.ndarray = (1.0 - share) * values[self.surface.first] + share * values[self.surface.second]
+        mixed: np.ndarray = (1.0 - share) * table_values[self.surface.first] + share * table_values[self.surface.second]
         return mixed
 
-    def force_along(self) -> Force:
+    def force_along(self) -> TyreForceCurve:
         """Force (N) along the wheel as a function of slip."""
         t = self.tables
         mu = np.einsum(
@@ -62,7 +64,7 @@ class Friction:
             interpolation_weights(t.loads, self.load),
             t.mu_x,
         )
-        return Force(t.slips, self.load * self.mixed_values(mu))
+        return TyreForceCurve(t.slips, self.load * self.mixed_values(mu))
 
     def side_force(self, slip: float) -> float:
         """Magnitude (N) of the force across the wheel at a slip."""
@@ -114,28 +116,32 @@ class BrakedStep:
     turning: float
 
 
-def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
+def tyre_report(
+    tyre_tables: Tables, surface: WheelSurface, wheel_motion: WheelMotion, load: float, braked_step: BrakedStep
+) -> np.ndarray:
     """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
     mean slip, slip angle (rad), time locked (s), rotational speed (rad/s) at the end.
     """
-    friction, sense = Friction(tables, surface, motion.angle, load), motion.direction
-    speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
-    wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
-    turning, force_along, slip, locked = wheel_step(wheel, sense * braked.turning, friction.force_along())
-    forces = _turned_to_sliding(np.array([force_along, friction.side_force(slip)]), slip, motion)
-    side = -math.copysign(forces[1], motion.across) if motion.across else 0.0
-    angle = math.copysign(motion.angle, motion.across)
+    friction, sense = TyreFriction(tyre_tables, surface, wheel_motion.angle, load), wheel_motion.direction
+    speeds = sense * wheel_motion.start, sense * (wheel_motion.start + braked_step.step * wheel_motion.rate)
+    wheel = WheelStepData(speeds, braked_step.torques, braked_step.step, braked_step.radius, braked_step.inertia)
+    turning, force_along, slip, locked = wheel_step(wheel, sense * braked_step.turning, friction.force_along())
+    forces = _turned_to_sliding(np.array([force_along, friction.side_force(slip)]), slip, wheel_motion)
+    side = -math.copysign(forces[1], wheel_motion.across) if wheel_motion.across else 0.0
+    angle = math.copysign(wheel_motion.angle, wheel_motion.across)
     return np.array([-sense * forces[0], side, load, slip, angle, locked, sense * turning])
 
 
-def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> np.ndarray:
+def _turned_to_sliding(force_magnitudes: np.ndarray, slip: float, wheel_motion: WheelMotion) -> np.ndarray:
     """Magnitudes (2,) of the forces along and across the wheel (N), turned towards its sliding direction as the wheel
     comes near to locking.
     """
-    sliding = np.array([motion.forward_speed, abs(motion.across)])
+    sliding = np.array([wheel_motion.forward_speed, abs(wheel_motion.across)])
     speed = float(np.hypot(*sliding))
     if slip <= LOCKING_SLIP or speed == 0.0:
-        return forces
+        return force_magnitudes
     share = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
-    turned_forces: np.ndarray = (1.0 - share) * forces + share * float(np.hypot(*forces)) * sliding / speed
+    turned_forces: np.ndarray = (1.0 - share) * force_magnitudes + share * float(
+        np.hypot(*force_magnitudes)
+    ) * sliding / speed
     return turned_forces

@@ -19,7 +19,7 @@ LOCKED_SLIP = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Force:
+class TyreForceCurve:
     """Tyre force as a function of slip: slips (s,) from 0 to 1, and the forces (s,) in N at these; the force is odd in
     the slip.
     """
@@ -38,7 +38,7 @@ class Force:
 
 
 @dataclass(frozen=True)
-class WheelStep:
+class WheelStepData:
     """Data of a wheel over a step: at both ends, speeds of its centre (m/s) and torques of its brake (N m), both linear
     in time and not negative; step (s), radius (m), inertia (kg m^2).
     """
@@ -49,18 +49,18 @@ class WheelStep:
     radius: float
     inertia: float
 
-    def speed(self, time: float) -> float:
+    def speed(self, time_in_step: float) -> float:
         """Speed (m/s) of the wheel's centre at a time (s) within the step."""
         u0, u1 = max(self.speeds[0], SLOWEST_SPEED), max(self.speeds[1], 0.0)
-        return u0 + (u1 - u0) * time / self.step
+        return u0 + (u1 - u0) * time_in_step / self.step
 
-    def torque(self, time: float) -> float:
+    def torque(self, time_in_step: float) -> float:
         """Brake torque (N m) at a time (s) within the step."""
-        return self.torques[0] + (self.torques[1] - self.torques[0]) * time / self.step
+        return self.torques[0] + (self.torques[1] - self.torques[0]) * time_in_step / self.step
 
-    def mean_torque(self, time: float) -> float:
+    def mean_torque(self, time_in_step: float) -> float:
         """Mean brake torque (N m) from a time (s) to the end of the step."""
-        return 0.5 * (self.torque(time) + self.torques[1])
+        return 0.5 * (self.torque(time_in_step) + self.torques[1])
 
     @property
     def mean_speed(self) -> float:
@@ -87,146 +87,186 @@ class WheelProgress:
     has_been_freed: bool = False
 
 
-def wheel_step(step_data: WheelStep, rim_turning: float, force: Force) -> tuple[float, float, float, float]:
+def wheel_step(
+    wheel_step_data: WheelStepData, rim_turning: float, tyre_force: TyreForceCurve
+) -> tuple[float, float, float, float]:
     """Rotational speed (rad/s) at the end of a step, mean force (N), mean slip and time locked (s) of a braked wheel.
 
     rim_turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
     """
-    slip = 1.0 - step_data.radius * rim_turning / step_data.speed(0.0)
+    slip = 1.0 - wheel_step_data.radius * rim_turning / wheel_step_data.speed(0.0)
     progress = WheelProgress(0.0, slip)
     if slip > LOCKED_SLIP:
-        stopping = force.locked_force * step_data.radius + step_data.mean_torque(0.0)
-        if stopping * step_data.step <= -step_data.inertia * rim_turning:
-            return rim_turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
-        _advance_at_slip(progress, -step_data.inertia * rim_turning / stopping, force.locked_force, LOCKED_SLIP)
-    while progress.time < step_data.step:
-        if _stays_locked(step_data, progress, force):
-            _advance_locked(step_data, progress, force)
-        elif _is_spinning(step_data, progress, force):
-            turning_speed = _advance_spinning(step_data, progress, force)
-            if progress.time >= step_data.step:
+        stopping = tyre_force.locked_force * wheel_step_data.radius + wheel_step_data.mean_torque(0.0)
+        if stopping * wheel_step_data.step <= -wheel_step_data.inertia * rim_turning:
+            return (
+                rim_turning + stopping * wheel_step_data.step / wheel_step_data.inertia,
+                tyre_force.locked_force,
+                slip,
+                0.0,
+            )
+        _advance_at_slip(
+            progress, -wheel_step_data.inertia * rim_turning / stopping, tyre_force.locked_force, LOCKED_SLIP
+        )
+    while progress.time < wheel_step_data.step:
+        if _stays_locked(wheel_step_data, progress, tyre_force):
+            _advance_locked(wheel_step_data, progress, tyre_force)
+        elif _is_spinning(wheel_step_data, progress, tyre_force):
+            turning_speed = _advance_spinning(wheel_step_data, progress, tyre_force)
+            if progress.time >= wheel_step_data.step:
                 return (
                     turning_speed,
-                    progress.impulse / step_data.step,
-                    progress.slip_integral / step_data.step,
+                    progress.impulse / wheel_step_data.step,
+                    progress.slip_integral / wheel_step_data.step,
                     progress.locked,
                 )
         else:
-            _roll(step_data, progress, force)
+            _roll(wheel_step_data, progress, tyre_force)
     return (
-        step_data.speed(step_data.step) * (1.0 - progress.slip) / step_data.radius,
-        progress.impulse / step_data.step,
-        progress.slip_integral / step_data.step,
+        wheel_step_data.speed(wheel_step_data.step) * (1.0 - progress.slip) / wheel_step_data.radius,
+        progress.impulse / wheel_step_data.step,
+        progress.slip_integral / wheel_step_data.step,
         progress.locked,
     )
 
 
-def _advance_at_slip(progress: WheelProgress, time: float, force: float, slip: float) -> None:
+def _advance_at_slip(wheel_progress: WheelProgress, duration: float, tyre_force: float, slip: float) -> None:
     """Advance the wheel's progress by a time (s) at a constant force (N) and slip."""
-    progress.time, progress.slip = progress.time + time, slip
-    progress.impulse, progress.slip_integral = progress.impulse + force * time, progress.slip_integral + slip * time
+    wheel_progress.time, wheel_progress.slip = wheel_progress.time + duration, slip
+    wheel_progress.impulse, wheel_progress.slip_integral = (
+        wheel_progress.impulse + tyre_force * duration,
+        wheel_progress.slip_integral + slip * duration,
+    )
 
 
-def _stays_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
+def _stays_locked(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> bool:
     """Whether the brake holds a locked wheel, by its torque now or by its mean torque over the remaining step."""
     holds = (
-        max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius
-        >= force.locked_force
+        max(wheel_step_data.torque(wheel_progress.time), wheel_step_data.mean_torque(wheel_progress.time))
+        / wheel_step_data.radius
+        >= tyre_force.locked_force
     )
-    return progress.slip >= LOCKED_SLIP and not progress.has_been_freed and holds
+    return wheel_progress.slip >= LOCKED_SLIP and not wheel_progress.has_been_freed and holds
 
 
-def _advance_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
+def _advance_locked(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> None:
     """Advance a locked wheel until the brake torque falls below the torque of the sliding force, or the step ends."""
-    needed, time = force.locked_force * step_data.radius, step_data.step - progress.time
-    if step_data.torques[1] < needed:
+    needed, time = tyre_force.locked_force * wheel_step_data.radius, wheel_step_data.step - wheel_progress.time
+    if wheel_step_data.torques[1] < needed:
         time = (
-            (needed - step_data.torque(progress.time)) * step_data.step / (step_data.torques[1] - step_data.torques[0])
+            (needed - wheel_step_data.torque(wheel_progress.time))
+            * wheel_step_data.step
+            / (wheel_step_data.torques[1] - wheel_step_data.torques[0])
         )
-    _advance_at_slip(progress, time, force.locked_force, LOCKED_SLIP)
-    progress.locked, progress.has_been_freed = progress.locked + time, True
+    _advance_at_slip(wheel_progress, time, tyre_force.locked_force, LOCKED_SLIP)
+    wheel_progress.locked, wheel_progress.has_been_freed = wheel_progress.locked + time, True
 
 
-def _excess_rate(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
+def _excess_rate(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> float:
     """Rate (m/s^2) of the rim speed less twice the centre's speed, while the wheel slides at slip -1."""
     return (
-        -step_data.radius
-        * (step_data.radius * force.locked_force + step_data.mean_torque(progress.time))
-        / step_data.inertia
-        - 2.0 * step_data.gain
+        -wheel_step_data.radius
+        * (wheel_step_data.radius * tyre_force.locked_force + wheel_step_data.mean_torque(wheel_progress.time))
+        / wheel_step_data.inertia
+        - 2.0 * wheel_step_data.gain
     )
 
 
-def _is_spinning(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
+def _is_spinning(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> bool:
     """Whether the rim's speed is above twice the centre's speed and stays there."""
-    return progress.slip < -1.0 or (progress.slip == -1.0 and _excess_rate(step_data, progress, force) > 0.0)
+    return wheel_progress.slip < -1.0 or (
+        wheel_progress.slip == -1.0 and _excess_rate(wheel_step_data, wheel_progress, tyre_force) > 0.0
+    )
 
 
-def _advance_spinning(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
+def _advance_spinning(
+    wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve
+) -> float:
     """Advance a wheel that spins at a slip counted as -1, until the step ends or that slip is reached; returns its
     rotation (rad/s)."""
     turning, excess = (
-        step_data.speed(progress.time) * (1.0 - progress.slip) / step_data.radius,
-        _excess_rate(step_data, progress, force),
+        wheel_step_data.speed(wheel_progress.time) * (1.0 - wheel_progress.slip) / wheel_step_data.radius,
+        _excess_rate(wheel_step_data, wheel_progress, tyre_force),
     )
-    overspeed, time = step_data.radius * turning - 2.0 * step_data.speed(progress.time), step_data.step - progress.time
-    slowing = (step_data.radius * force.locked_force + step_data.mean_torque(progress.time)) / step_data.inertia
+    overspeed, time = (
+        wheel_step_data.radius * turning - 2.0 * wheel_step_data.speed(wheel_progress.time),
+        wheel_step_data.step - wheel_progress.time,
+    )
+    slowing = (
+        wheel_step_data.radius * tyre_force.locked_force + wheel_step_data.mean_torque(wheel_progress.time)
+    ) / wheel_step_data.inertia
     if excess < 0.0:
         time = min(time, -overspeed / excess)
-    _advance_at_slip(progress, time, -force.locked_force, -1.0)
-    progress.has_been_freed = False
+    _advance_at_slip(wheel_progress, time, -tyre_force.locked_force, -1.0)
+    wheel_progress.has_been_freed = False
     return turning - slowing * time
 
 
-def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
+def _roll(wheel_step_data: WheelStepData, wheel_progress: WheelProgress, tyre_force: TyreForceCurve) -> None:
     """Advance a wheel with a slip between -1 and 1 until the step ends or the slip reaches one of them. The mean force
     follows from the wheel's momentum.
     """
-    start_time, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED_SLIP)
-    nodes, forces = force.both_ways()
-    kappa = step_data.radius**2 / (step_data.inertia * step_data.mean_speed)
-    rates = kappa * (mean / step_data.radius - forces) + (1.0 - nodes) * step_data.gain / step_data.mean_speed
-    time, progress.slip, area = along_nodes(slip, nodes, rates, step_data.step - start_time)
-    if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
-        time = step_data.step - start_time
-    progress.time, progress.has_been_freed = start_time + time, False
-    if math.isclose(progress.time, step_data.step, rel_tol=1e-15):
-        progress.time = step_data.step
-    turning = [
-        step_data.speed(t) * (1.0 - s) / step_data.radius
-        for t, s in ((start_time, slip), (progress.time, progress.slip))
-    ]
-    progress.impulse += (
-        step_data.inertia * (turning[1] - turning[0]) / step_data.radius + mean / step_data.radius * time
+    start_time, mean, slip = (
+        wheel_progress.time,
+        wheel_step_data.mean_torque(wheel_progress.time),
+        min(wheel_progress.slip, LOCKED_SLIP),
     )
-    progress.slip_integral += area
+    nodes, forces = tyre_force.both_ways()
+    kappa = wheel_step_data.radius**2 / (wheel_step_data.inertia * wheel_step_data.mean_speed)
+    rates = (
+        kappa * (mean / wheel_step_data.radius - forces)
+        + (1.0 - nodes) * wheel_step_data.gain / wheel_step_data.mean_speed
+    )
+    time, wheel_progress.slip, area = advance_slip_along_nodes(slip, nodes, rates, wheel_step_data.step - start_time)
+    if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
+        time = wheel_step_data.step - start_time
+    wheel_progress.time, wheel_progress.has_been_freed = start_time + time, False
+    if math.isclose(wheel_progress.time, wheel_step_data.step, rel_tol=1e-15):
+        wheel_progress.time = wheel_step_data.step
+    turning = [
+        wheel_step_data.speed(t) * (1.0 - s) / wheel_step_data.radius
+        for t, s in ((start_time, slip), (wheel_progress.time, wheel_progress.slip))
+    ]
+    wheel_progress.impulse += (
+        wheel_step_data.inertia * (turning[1] - turning[0]) / wheel_step_data.radius
+        + mean / wheel_step_data.radius * time
+    )
+    wheel_progress.slip_integral += area
 
 
-def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: float) -> tuple[float, float, float]:
-    """Time (s) that passes, slip at its end and integral of slip (s), over ``remaining`` seconds or until the last node
-    is reached.
+def advance_slip_along_nodes(
+    start_slip: float, slip_nodes: np.ndarray, slip_rates: np.ndarray, time_limit: float
+) -> tuple[float, float, float]:
+    """Time (s) that passes, slip at its end and integral of slip (s), over ``time_limit`` seconds or until the last
+    node is reached.
 
-    nodes, rates (k,) : the rate (1/s) of the slip is linear between the nodes.
+    slip_nodes, slip_rates (k,) : the rate (1/s) of the slip is linear between the nodes.
     """
-    rate, time, area = float(np.interp(slip, nodes, rates)), 0.0, 0.0
+    rate, time, area = float(np.interp(start_slip, slip_nodes, slip_rates)), 0.0, 0.0
     if rate == 0.0:
-        return remaining, slip, slip * remaining
-    nodes_passed = np.flatnonzero(nodes > slip) if rate > 0.0 else np.flatnonzero(nodes < slip)[::-1]
+        return time_limit, start_slip, start_slip * time_limit
+    nodes_passed = (
+        np.flatnonzero(slip_nodes > start_slip) if rate > 0.0 else np.flatnonzero(slip_nodes < start_slip)[::-1]
+    )
     for k in nodes_passed:
-        slip_to_node, ratio = float(nodes[k]) - slip, float(rates[k]) / rate
+        slip_to_node, ratio = float(slip_nodes[k]) - start_slip, float(slip_rates[k]) / rate
         grows = (ratio - 1.0) * rate / slip_to_node
-        needed = slip_to_node / rate * _log_over(ratio - 1.0) if ratio > 0.0 else math.inf
-        if time + needed >= remaining:
-            remaining_time = remaining - time
+        needed = slip_to_node / rate * _log_quotient(ratio - 1.0) if ratio > 0.0 else math.inf
+        if time + needed >= time_limit:
+            remaining_time = time_limit - time
             z = grows * remaining_time
-            end_slip = slip + remaining_time * rate * _phi_function(1, z)
-            return remaining, end_slip, area + slip * remaining_time + rate * remaining_time**2 * _phi_function(2, z)
-        area += slip * needed + rate * needed**2 * _phi_function(2, grows * needed)
-        time, slip, rate = time + needed, float(nodes[k]), float(rates[k])
-    return time, slip, area
+            end_slip = start_slip + remaining_time * rate * _phi_function(1, z)
+            return (
+                time_limit,
+                end_slip,
+                area + start_slip * remaining_time + rate * remaining_time**2 * _phi_function(2, z),
+            )
+        area += start_slip * needed + rate * needed**2 * _phi_function(2, grows * needed)
+        time, start_slip, rate = time + needed, float(slip_nodes[k]), float(slip_rates[k])
+    return time, start_slip, area
 
 
-def _log_over(x: float) -> float:
+def _log_quotient(x: float) -> float:
     """The quotient log(1 + x) / x, also for x near 0."""
     return math.log1p(x) / x if abs(x) > SERIES_LIMIT else math.fsum((-x) ** k / (k + 1) for k in range(6))
 

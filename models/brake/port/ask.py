@@ -45,16 +45,16 @@ class ControllerFailed(RunFailed):
     of the sample; why : the fault, as a phrase.
     """
 
-    def __init__(self, sample: Sample, name: str, reason: str) -> None:
+    def __init__(self, sample: Sample, fault_name: str, reason: str) -> None:
         reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST_ERROR_TEXT]
-        self.name, self.number, self.why = name, sample.number, reason
-        super().__init__("controller", f"sample {sample.number}: {name}: {reason}", 1e-9 * sample.time)
+        self.name, self.number, self.why = fault_name, sample.number, reason
+        super().__init__("controller", f"sample {sample.number}: {fault_name}: {reason}", 1e-9 * sample.time)
 
 
-def ask(
+def checked_command(
     controller: Controller,
     sample: Sample,
-    states: frozenset[int] = VALVE_STATES,
+    allowed_states: frozenset[int] = VALVE_STATES,
     maximum_pressure: float = LARGEST_PRESSURE,
 ) -> Command:
     """A controller's command for a sample, after checks; maximum_pressure : largest pressure (bar) allowed.
@@ -67,20 +67,20 @@ def ask(
         raise
     except (Exception, SystemExit) as error:
         raise ControllerFailed(sample, "crash", exception_text(error)) from error
-    return checked_answer(command, sample, states, maximum_pressure)
+    return usable_command(command, sample, allowed_states, maximum_pressure)
 
 
-def exception_text(error: BaseException) -> str:
+def exception_text(exception: BaseException) -> str:
     """Type and text of an exception, and the line of the user's file in which it was raised, or which called the code
     that raised it.
     """
     lines = [
         frame
-        for frame in extract_tb(error.__traceback__)
+        for frame in extract_tb(exception.__traceback__)
         if "site-packages" not in frame.filename and Path(frame.filename).parent != PORT_FOLDER
     ]
     source_line = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
-    return f"{type(error).__name__}: {error}"[: LONGEST_ERROR_TEXT - len(source_line)] + source_line
+    return f"{type(exception).__name__}: {exception}"[: LONGEST_ERROR_TEXT - len(source_line)] + source_line
 
 
 @dataclass
@@ -92,11 +92,14 @@ class CheckedController:
 
     def sample(self, sample: Sample) -> Command:
         """The controller's checked command for a sample; raises ControllerFailed."""
-        return ask(self.controller, sample, self.states, sample.supply)
+        return checked_command(self.controller, sample, self.states, sample.supply)
 
 
-def checked_answer(
-    command: Command, sample: Sample, states: frozenset[int] = VALVE_STATES, maximum_pressure: float = LARGEST_PRESSURE
+def usable_command(
+    command: Command,
+    sample: Sample,
+    allowed_states: frozenset[int] = VALVE_STATES,
+    maximum_pressure: float = LARGEST_PRESSURE,
 ) -> Command:
     """The controller's command, if it has exactly one valve state or one pressure per wheel; else raises
     ControllerFailed.
@@ -108,10 +111,10 @@ def checked_answer(
     if (
         valve_states is not None
         and valve_states.shape == sample.wheels.shape
-        and states.issuperset(valve_states.tolist())
+        and allowed_states.issuperset(valve_states.tolist())
     ):
         return command
-    values = _answer_array(command.pressures if command.valves is None else command.valves, sample)
+    values = _command_array(command.pressures if command.valves is None else command.valves, sample)
     for value in values.tolist():
         if not math.isfinite(value):
             raise ControllerFailed(sample, "not a number", f"{value:g} for a wheel")
@@ -121,21 +124,23 @@ def checked_answer(
             raise ControllerFailed(
                 sample, "too high", f"a pressure of {value:g} bar, above the {maximum_pressure:g} bar that there are"
             )
-        if command.valves is not None and value not in states:
-            raise ControllerFailed(sample, "no state of a valve", f"{value:g} is none of {_listed_text(states)}")
+        if command.valves is not None and value not in allowed_states:
+            raise ControllerFailed(
+                sample, "no state of a valve", f"{value:g} is none of {_states_text(allowed_states)}"
+            )
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
 
 
-def _listed_text(states: frozenset[int]) -> str:
-    return ", ".join(map(str, sorted(states)))
+def _states_text(allowed_states: frozenset[int]) -> str:
+    return ", ".join(map(str, sorted(allowed_states)))
 
 
-def _answer_array(values: object, sample: Sample) -> np.ndarray:
+def _command_array(command_values: object, sample: Sample) -> np.ndarray:
     """Values (W,) of a command as numbers; raises ControllerFailed where they are not one number per wheel."""
-    if np.ma.is_masked(values):
+    if np.ma.is_masked(command_values):
         raise ControllerFailed(sample, "not a number", "a masked value for a wheel")
     try:
-        array = np.asarray(values)
+        array = np.asarray(command_values)
         if array.dtype.kind == "c":
             raise TypeError("complex numbers")
         array = array.astype(float)

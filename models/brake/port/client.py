@@ -10,13 +10,13 @@ from models.brake.port.frame import QUESTION_LAYOUT, answer_frame, sample_of_que
 from models.brake.port.socket_port import LOOPBACK_ADDRESS
 
 
-def serve(controller: Controller, port: int) -> int:
+def serve_controller_at_port(controller: Controller, port_number: int) -> int:
     """Connect a controller to a port of this machine and answer every sample until the connection closes.
 
     Returns the number of answers.
     """
     count = 0
-    with socket.create_connection((LOOPBACK_ADDRESS, port)) as link, link.makefile("rb") as reader:
+    with socket.create_connection((LOOPBACK_ADDRESS, port_number)) as link, link.makefile("rb") as reader:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         while len(frame := reader.read(QUESTION_LAYOUT.size)) == QUESTION_LAYOUT.size:
             sample = sample_of_question(frame)
@@ -25,10 +25,10 @@ def serve(controller: Controller, port: int) -> int:
     return count
 
 
-def main(name: str, port: str, wheels: str = "4") -> None:
-    """Serve the controller ``name`` at a port of this machine, for a number of wheels."""
-    serve(named_controller(name, Path(), int(wheels), {}), int(port))
+def serve_named_controller(callable_path: str, port_number: str, wheel_count: str = "4") -> None:
+    """Serve the controller ``callable_path`` at a port of this machine, for a number of wheels."""
+    serve_controller_at_port(named_controller(callable_path, Path(), int(wheel_count), {}), int(port_number))
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    serve_named_controller(*sys.argv[1:])

@@ -13,7 +13,7 @@ from models.brake.controller import APPLY, RELEASE, Command, Controller, Sample
 from models.core.strict import Strict, quantity
 
 
-class Fault(Strict):
+class ControllerFault(Strict):
     """A planned fault. ``lost``: signals stay as they were at the last sample before it; ``delayed``: they are the
     signals of ``samples`` samples ago; ``stuck``: a valve stays in ``state``, or in the state of its last sample before
     it; ``tooth``: the tooth of this number is missing, for signals that are counted from teeth.
@@ -28,7 +28,7 @@ class Fault(Strict):
     tooth: int | None = Field(default=None, ge=0, description="number of the missing tooth, from 0")
 
     @model_validator(mode="after")
-    def _one_kind(self) -> "Fault":
+    def _one_kind(self) -> "ControllerFault":
         for key, kind, needed in (("samples", "delayed", True), ("state", "stuck", False), ("tooth", "tooth", True)):
             if getattr(self, key) is not None and self.kind != kind:
                 raise ValueError(f"{key} has no meaning for a fault of kind {self.kind}")
@@ -38,13 +38,13 @@ class Fault(Strict):
             raise ValueError("end must be after start")
         return self
 
-    def holds(self, time: float) -> bool:
+    def holds(self, fault_time: float) -> bool:
         """Whether the fault is active at a time (s)."""
-        return self.start <= time and (self.end is None or time < self.end)
+        return self.start <= fault_time and (self.end is None or fault_time < self.end)
 
-    def affected_wheels(self, wheels: int) -> list[int]:
+    def affected_wheels(self, wheel_count: int) -> list[int]:
         """Indices of the wheels that the fault affects, of so many wheels."""
-        return list(range(wheels)) if self.wheels is None else self.wheels
+        return list(range(wheel_count)) if self.wheels is None else self.wheels
 
 
 @dataclass
@@ -52,7 +52,7 @@ class FaultyController:
     """A controller whose signals and commands are changed by faults; a new one is made for every run."""
 
     controller: Controller
-    faults: list[Fault]
+    faults: list[ControllerFault]
     _past_signals: deque[np.ndarray] = field(init=False)
     _last_signals: np.ndarray | None = None
     _last_valves: np.ndarray | None = None
@@ -71,11 +71,11 @@ class FaultyController:
             else Command(valves=self._stuck_valves(np.array(command.valves), active_faults))
         )
 
-    def _faulty_signals(self, wheels: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
-        self._past_signals.append(wheels)
-        faulty_wheels = wheels.copy()
+    def _faulty_signals(self, wheel_speeds: np.ndarray, active_faults: list[ControllerFault]) -> np.ndarray:
+        self._past_signals.append(wheel_speeds)
+        faulty_wheels = wheel_speeds.copy()
         for fault in active_faults:
-            for i in fault.affected_wheels(wheels.size):
+            for i in fault.affected_wheels(wheel_speeds.size):
                 if fault.kind == "delayed":
                     faulty_wheels[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
                 elif fault.kind == "lost" and self._last_signals is not None:
@@ -83,23 +83,23 @@ class FaultyController:
         self._last_signals = faulty_wheels
         return faulty_wheels
 
-    def _stuck_valves(self, valves: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
+    def _stuck_valves(self, valve_states: np.ndarray, active_faults: list[ControllerFault]) -> np.ndarray:
         for fault in active_faults:
-            for i in fault.affected_wheels(valves.size) if fault.kind == "stuck" else ():
+            for i in fault.affected_wheels(valve_states.size) if fault.kind == "stuck" else ():
                 if fault.state is not None:
-                    valves[i] = fault.state
+                    valve_states[i] = fault.state
                 elif self._last_valves is not None:
-                    valves[i] = self._last_valves[i]
-        self._last_valves = valves
-        return valves
+                    valve_states[i] = self._last_valves[i]
+        self._last_valves = valve_states
+        return valve_states
 
 
-def missing_teeth(faults: list[Fault], wheel: int, tooth: int, time: float) -> bool:
+def missing_teeth(faults: list[ControllerFault], wheel_index: int, tooth_index: int, time: float) -> bool:
     """Whether a tooth of a wheel is missing at a time (s), by any of the faults."""
     return any(
         fault.kind == "tooth"
-        and fault.tooth == tooth
-        and (fault.wheels is None or wheel in fault.wheels)
+        and fault.tooth == tooth_index
+        and (fault.wheels is None or wheel_index in fault.wheels)
         and fault.holds(time)
         for fault in faults
     )

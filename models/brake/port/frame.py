@@ -35,7 +35,7 @@ import numpy as np
 from models.brake.controller import Command, Sample
 
 QUESTION_LAYOUT, ANSWER_LAYOUT = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
-MOST_WHEELS = 8
+FRAME_WHEEL_LIMIT = 8
 SWITCH, SPEED_GIVEN = 1, 2
 """Bits of the question's flags: brake switch closed, speed given."""
 
@@ -43,8 +43,8 @@ SWITCH, SPEED_GIVEN = 1, 2
 class WrongFrame(ValueError):
     """Error of bytes that do not form a frame of this port; name : as in ``ask.FAULT_NAMES``."""
 
-    def __init__(self, name: str, reason: str) -> None:
-        self.name = name
+    def __init__(self, fault_name: str, reason: str) -> None:
+        self.name = fault_name
         super().__init__(reason)
 
 
@@ -63,13 +63,13 @@ def question_frame(sample: Sample) -> bytes:
     )
 
 
-def sample_of_question(frame: bytes) -> Sample:
+def sample_of_question(question_bytes: bytes) -> Sample:
     """The sample in a question frame; raises WrongFrame."""
-    if len(frame) != QUESTION_LAYOUT.size:
-        raise WrongFrame("wrong length", f"a question of {len(frame)} bytes, not {QUESTION_LAYOUT.size}")
-    magic, number, time, wheels, flags, supply, speed, *signals = QUESTION_LAYOUT.unpack(frame)
-    if magic != b"TRQ1" or not 1 <= wheels <= MOST_WHEELS:
-        raise WrongFrame("wrong frame", f"begins with {magic!r}, not with b'TRQ1' and 1 to {MOST_WHEELS} wheels")
+    if len(question_bytes) != QUESTION_LAYOUT.size:
+        raise WrongFrame("wrong length", f"a question of {len(question_bytes)} bytes, not {QUESTION_LAYOUT.size}")
+    magic, number, time, wheels, flags, supply, speed, *signals = QUESTION_LAYOUT.unpack(question_bytes)
+    if magic != b"TRQ1" or not 1 <= wheels <= FRAME_WHEEL_LIMIT:
+        raise WrongFrame("wrong frame", f"begins with {magic!r}, not with b'TRQ1' and 1 to {FRAME_WHEEL_LIMIT} wheels")
     return Sample(number, time, np.array(signals[:wheels]), bool(flags & SWITCH), supply, speed)
 
 
@@ -80,19 +80,19 @@ def answer_frame(sample_number: int, command: Command) -> bytes:
     return ANSWER_LAYOUT.pack(b"TRA1", sample_number, mode[0], len(values), *_eight_values(values))
 
 
-def command_of_answer(frame: bytes, sample_number: int) -> Command:
+def command_of_answer(answer_bytes: bytes, sample_number: int) -> Command:
     """The command in an answer frame; raises WrongFrame if the frame does not answer the sample ``sample_number``."""
-    magic, answered, mode, wheels, *values = ANSWER_LAYOUT.unpack(frame)
+    magic, answered, mode, wheels, *values = ANSWER_LAYOUT.unpack(answer_bytes)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")
     if answered != sample_number:
         raise WrongFrame("wrong number", f"the answer is one to sample {answered}")
-    if wheels > MOST_WHEELS:
-        raise WrongFrame("wrong length", f"values for {wheels} wheels, at most {MOST_WHEELS} fit")
+    if wheels > FRAME_WHEEL_LIMIT:
+        raise WrongFrame("wrong length", f"values for {wheels} wheels, at most {FRAME_WHEEL_LIMIT} fit")
     array = np.array(values[:wheels])
     return Command(pressures=array) if mode == ord("P") else Command(valves=array)
 
 
-def _eight_values(values: np.ndarray) -> list[float]:
+def _eight_values(wheel_values: np.ndarray) -> list[float]:
     """Values for eight wheels, the largest number: the given ones, then zeros."""
-    return [*np.asarray(values, dtype=float).tolist(), *[0.0] * (MOST_WHEELS - len(values))]
+    return [*np.asarray(wheel_values, dtype=float).tolist(), *[0.0] * (FRAME_WHEEL_LIMIT - len(wheel_values))]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.brake.controller import Controller
-from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, ask, exception_text
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, checked_command, exception_text
 from models.brake.port.frame import QUESTION_LAYOUT, answer_frame, sample_of_question
 from models.brake.port.socket_port import LOOPBACK_ADDRESS
 from models.core.errors import InputError
@@ -42,17 +42,25 @@ class HostedController(NamedTuple):
 
 
 @contextmanager
-def made_controller(guest: HostedController) -> Iterator[Controller]:
-    """The controller that ``guest`` describes, as a context manager; raises InputError."""
-    if guest.fmu is not None:
+def controller_from_description(hosted_controller: HostedController) -> Iterator[Controller]:
+    """The controller that ``hosted_controller`` describes, as a context manager; raises InputError."""
+    if hosted_controller.fmu is not None:
         from models.brake.port.fmu_port import opened_fmu
 
-        with opened_fmu(guest.fmu, guest.folder, guest.wheels, guest.sample) as fmu:
+        with opened_fmu(
+            hosted_controller.fmu, hosted_controller.folder, hosted_controller.wheels, hosted_controller.sample
+        ) as fmu:
             yield fmu
     else:
         from models.brake.port.callable import named_controller
 
-        yield named_controller(str(guest.callable), guest.folder, guest.wheels, guest.parameters, guest.file)
+        yield named_controller(
+            str(hosted_controller.callable),
+            hosted_controller.folder,
+            hosted_controller.wheels,
+            hosted_controller.parameters,
+            hosted_controller.file,
+        )
 
 
 def failure_frame(**failure: Any) -> bytes:
@@ -61,28 +69,30 @@ def failure_frame(**failure: Any) -> bytes:
     return HEAD_LAYOUT.pack(FAILURE_MARK, len(text)) + text
 
 
-def serve(link: socket.socket) -> None:
+def serve_hosted_controller(connection: socket.socket) -> None:
     """Make the controller that the simulation's process describes, and answer samples until the connection closes."""
-    with link.makefile("rb") as reader:
+    with connection.makefile("rb") as reader:
         guest = pickle.loads(reader.read(LENGTH_LAYOUT.unpack(reader.read(LENGTH_LAYOUT.size))[0]))
         if guest.fmu is not None:
             import fmpy.fmi2  # noqa: F401 the library's time is none of the FMU's
-        link.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
-        with made_controller(guest) as controller:
-            link.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
+        connection.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
+        with controller_from_description(guest) as controller:
+            connection.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
             while len(frame := reader.read(QUESTION_LAYOUT.size)) == QUESTION_LAYOUT.size:
                 sample = sample_of_question(frame)
-                link.sendall(answer_frame(sample.number, ask(controller, sample, STATES_WITH_SLOW_APPLY)))
+                connection.sendall(
+                    answer_frame(sample.number, checked_command(controller, sample, STATES_WITH_SLOW_APPLY))
+                )
 
 
-def main(port: int) -> None:
+def main(port_number: int) -> None:
     """Serve a controller at a port of this machine; any exception is reported to the simulation's process if
     possible.
     """
-    with socket.create_connection((LOOPBACK_ADDRESS, port)) as link:
+    with socket.create_connection((LOOPBACK_ADDRESS, port_number)) as link:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:
-            serve(link)
+            serve_hosted_controller(link)
             return
         except ControllerFailed as error:
             failure = failure_frame(name=error.name, reason=error.why)

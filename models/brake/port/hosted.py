@@ -21,7 +21,7 @@ from models.brake.controller import Command, Sample
 from models.brake.port.ask import FAULT_NAMES, ControllerFailed
 from models.brake.port.frame import ANSWER_LAYOUT, WrongFrame, command_of_answer, question_frame
 from models.brake.port.host import FAILURE_MARK, HEAD_LAYOUT, LENGTH_LAYOUT, READY_MARK, HostedController
-from models.brake.port.socket_port import START_REMEDY, controller_behind_socket, end_of_process
+from models.brake.port.socket_port import START_REMEDY, controller_behind_socket, process_end_phrase
 from models.core.errors import InputError, RunFailed
 
 FAILURE_TEXT_BYTES = 100_000
@@ -33,8 +33,8 @@ STARTUP_SECONDS = 30.0
 class ProcessFailed(Exception):
     """Failure reported by the controller's process; what : its details as a table."""
 
-    def __init__(self, failure: dict[str, Any]) -> None:
-        self.what = failure
+    def __init__(self, failure_report: dict[str, Any]) -> None:
+        self.what = failure_report
         super().__init__()
 
 
@@ -46,9 +46,9 @@ class ProcessController:
     process: subprocess.Popen[bytes] | None
     timeout: float
 
-    def begin(self, guest: HostedController, start_seconds: float) -> None:
+    def begin(self, hosted_controller: HostedController, start_seconds: float) -> None:
         """Let the process make the controller within ``start_seconds`` seconds; raises InputError, RunFailed."""
-        text = pickle.dumps(guest)
+        text = pickle.dumps(hosted_controller)
         try:
             self._receive(LENGTH_LAYOUT.pack(len(text)) + text, HEAD_LAYOUT.size, READY_MARK, STARTUP_SECONDS)
             self._receive(b"", HEAD_LAYOUT.size, READY_MARK, start_seconds)
@@ -60,7 +60,7 @@ class ProcessController:
             ) from None
         except (OSError, EOFError):
             raise RunFailed(
-                "controller", f"crash: it ended as it was made{end_of_process(self.process, self.timeout)}"
+                "controller", f"crash: it ended as it was made{process_end_phrase(self.process, self.timeout)}"
             ) from None
 
     def sample(self, sample: Sample) -> Command:
@@ -79,16 +79,16 @@ class ProcessController:
         except TimeoutError:
             raise ControllerFailed(sample, "silence", f"no answer within {self.timeout:g} s") from None
         except (OSError, EOFError):
-            lost = f"the controller was lost{end_of_process(self.process, self.timeout)}"
+            lost = f"the controller was lost{process_end_phrase(self.process, self.timeout)}"
             raise ControllerFailed(sample, "crash", lost) from None
 
-    def _receive(self, sent: bytes, byte_count: int, begins: bytes, seconds: float) -> bytes:
-        """Bytes that the process sends back within ``seconds`` (s); raises ProcessFailed, TimeoutError, OSError,
+    def _receive(self, question_bytes: bytes, byte_count: int, expected_start: bytes, time_limit: float) -> bytes:
+        """Bytes that the process sends back within ``time_limit`` (s); raises ProcessFailed, TimeoutError, OSError,
         EOFError.
         """
-        end = time.perf_counter() + seconds
-        self.link.settimeout(seconds)
-        self.link.sendall(sent)
+        end = time.perf_counter() + time_limit
+        self.link.settimeout(time_limit)
+        self.link.sendall(question_bytes)
         got = self._receive_more(b"", byte_count, end)
         if got[:4] == FAILURE_MARK:
             length = HEAD_LAYOUT.unpack_from(got)[1]
@@ -97,27 +97,27 @@ class ProcessController:
                     self._receive_more(got, min(HEAD_LAYOUT.size + length, FAILURE_TEXT_BYTES), end)[HEAD_LAYOUT.size :]
                 )
             )
-        if not got.startswith(begins):
+        if not got.startswith(expected_start):
             raise EOFError
         return got
 
-    def _receive_more(self, received: bytes, byte_count: int, deadline: float) -> bytes:
+    def _receive_more(self, bytes_so_far: bytes, byte_count: int, deadline: float) -> bytes:
         """All bytes received until ``byte_count`` bytes are there, or until a complete, shorter frame reports a
         failure.
         """
-        while len(received) < byte_count and not (
-            received[:4] == FAILURE_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)
+        while len(bytes_so_far) < byte_count and not (
+            bytes_so_far[:4] == FAILURE_MARK and HEAD_LAYOUT.size <= len(bytes_so_far) == _failure_length(bytes_so_far)
         ):
-            received_part = self.link.recv(byte_count - len(received))
+            received_part = self.link.recv(byte_count - len(bytes_so_far))
             left = deadline - time.perf_counter()
             if left <= 0.0:
                 raise TimeoutError
             if not received_part:
                 raise EOFError
-            received += received_part
-            if len(received) < byte_count:
+            bytes_so_far += received_part
+            if len(bytes_so_far) < byte_count:
                 self.link.settimeout(left)
-        return received
+        return bytes_so_far
 
 
 def _failure_length(received: bytes) -> int:
@@ -125,17 +125,23 @@ def _failure_length(received: bytes) -> int:
     return HEAD_LAYOUT.size + int(HEAD_LAYOUT.unpack_from(received)[1])
 
 
-def _error_of_failure(failure: dict[str, Any]) -> InputError | RunFailed:
+def _error_of_failure(failure_report: dict[str, Any]) -> InputError | RunFailed:
     """The failure that a process reports, as the error to raise."""
-    if "place" not in failure:
-        return RunFailed("controller", f"{failure.get('name')}: {failure.get('reason')}")
+    if "place" not in failure_report:
+        return RunFailed("controller", f"{failure_report.get('name')}: {failure_report.get('reason')}")
     return InputError(
-        failure["file"], failure["place"], failure["value"], failure["allowed"], tuple(failure["choices"])
+        failure_report["file"],
+        failure_report["place"],
+        failure_report["value"],
+        failure_report["allowed"],
+        tuple(failure_report["choices"]),
     )
 
 
 @contextmanager
-def controller_in_process(guest: HostedController, timeout: float, start_seconds: float) -> Iterator[ProcessController]:
+def controller_in_process(
+    hosted_controller: HostedController, timeout: float, start_seconds: float
+) -> Iterator[ProcessController]:
     """The controller of a ``HostedController`` in a separate process, as a context manager; start_seconds : time (s)
     allowed for making it.
 
@@ -144,5 +150,5 @@ def controller_in_process(guest: HostedController, timeout: float, start_seconds
     code = f"import sys; sys.path[:] = {sys.path!r}; from models.brake.port.host import main; main(int(sys.argv[1]))"
     with controller_behind_socket([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP_SECONDS) as port:
         host = ProcessController(port.link, port.process, timeout)
-        host.begin(guest, start_seconds)
+        host.begin(hosted_controller, start_seconds)
         yield host

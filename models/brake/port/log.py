@@ -19,9 +19,9 @@ LOG_TITLE = b"twinrig braking port log 1\n"
 RECORD_LENGTH = QUESTION_LAYOUT.size + ANSWER_LAYOUT.size
 
 
-def scene_hash(scene: str) -> str:
+def scene_hash(scene_text: str) -> str:
     """Hash of a scene's text, 64 hexadecimal digits, by which a log identifies its scene."""
-    return sha256(scene.encode()).hexdigest()
+    return sha256(scene_text.encode()).hexdigest()
 
 
 @dataclass
@@ -40,43 +40,43 @@ class LoggedController:
 
 
 @contextmanager
-def logged_controller(controller: Controller, path: Path, scene: str) -> Iterator[LoggedController]:
-    """The controller with a log of its exchanges, as a context manager; scene : hash from ``scene_hash``."""
-    with path.open("wb") as file:
-        file.write(LOG_TITLE + scene.encode() + b"\n")
+def logged_controller(controller: Controller, log_path: Path, hash_of_scene: str) -> Iterator[LoggedController]:
+    """The controller with a log of its exchanges, as a context manager; hash_of_scene : hash from ``scene_hash``."""
+    with log_path.open("wb") as file:
+        file.write(LOG_TITLE + hash_of_scene.encode() + b"\n")
         yield LoggedController(controller, file)
 
 
-def log_refusal(path: Path) -> str:
+def log_refusal(log_path: Path) -> str:
     """Reason why no log can be written to a path, or "" if it can. An older log is overwritten, any other file is
     not.
     """
-    if path.is_dir():
+    if log_path.is_dir():
         return "is a folder: name a file"
-    if not path.parent.is_dir():
-        return f"no such folder: {str(path.parent)!r}"
-    if not path.exists():
+    if not log_path.parent.is_dir():
+        return f"no such folder: {str(log_path.parent)!r}"
+    if not log_path.exists():
         return ""
-    with path.open("rb") as file:
+    with log_path.open("rb") as file:
         known = file.read(len(LOG_TITLE)) == LOG_TITLE
     return "" if known else "is a file that is no log, and would be overwritten: name another one"
 
 
-class Replay:
+class ReplayedController:
     """Controller that repeats the commands of a log as long as the samples equal the logged ones; raises InputError for
     another scene's log.
     """
 
-    def __init__(self, path: Path, scene: str) -> None:
+    def __init__(self, log_path: Path, hash_of_scene: str) -> None:
         try:
-            title, name, records = (path.read_bytes() + b"\n\n").split(b"\n", 2)
+            title, name, records = (log_path.read_bytes() + b"\n\n").split(b"\n", 2)
         except OSError as error:
-            raise InputError(path.name, "replay", None, f"cannot be read: {error.strerror}") from None
+            raise InputError(log_path.name, "replay", None, f"cannot be read: {error.strerror}") from None
         if title + b"\n" != LOG_TITLE:
-            raise InputError(path.name, "replay", None, "is no log of the port, or of another version of it")
-        if name != scene.encode():
-            raise InputError(path.name, "replay", None, "is the log of another scene")
-        self._records, self._path = records, path
+            raise InputError(log_path.name, "replay", None, "is no log of the port, or of another version of it")
+        if name != hash_of_scene.encode():
+            raise InputError(log_path.name, "replay", None, "is the log of another scene")
+        self._records, self._path = records, log_path
 
     def sample(self, sample: Sample) -> Command:
         """The logged command for a sample; raises RunFailed if the log has ended, or if its sample differs from this

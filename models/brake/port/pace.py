@@ -7,7 +7,7 @@ from models.brake.controller import Command, Controller, Sample
 
 
 @dataclass
-class WallClock:
+class WallClockController:
     """A controller whose samples are paced by wall-clock time, counted from the first sample.
 
     An exchange overruns if its answer comes after the time (s) of the next sample. overruns : their number; worst : the

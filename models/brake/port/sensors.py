@@ -16,7 +16,7 @@ from models.core.noise import BRAKE_PRESSURES, BRAKE_SIGNALS, SAMPLES_PER_BLOCK,
 from models.core.strict import Strict, quantity
 
 
-class Conversion(Strict):
+class SensorConversion(Strict):
     """Conversion of a signal by its sensor; with ``bits`` it needs a ``range``."""
 
     gain: float = quantity("", "factor", default=1.0)
@@ -27,34 +27,36 @@ class Conversion(Strict):
     range: float | None = quantity("unit of the signal", "value of the last code", default=None)
 
     @model_validator(mode="after")
-    def _converted(self) -> "Conversion":
+    def _converted(self) -> "SensorConversion":
         if (self.bits is None) != (self.range is None):
             raise ValueError("bits and range are given together")
         return self
 
 
-class Channels:
+class SensorChannels:
     """Conversion of several signals by sensors, sample by sample from 0 on. source: of the noise, see
     ``models.core.noise``.
     """
 
-    def __init__(self, conversion: Conversion, channel_count: int, source: int) -> None:
-        self.conversion, self._count, self._source = conversion, channel_count, source
+    def __init__(self, conversion: SensorConversion, channel_count: int, noise_stream: int) -> None:
+        self.conversion, self._count, self._source = conversion, channel_count, noise_stream
         self._block, self._noise = -1, np.zeros((0, channel_count))
 
-    def __call__(self, sample_number: int, values: np.ndarray) -> np.ndarray:
+    def __call__(self, sample_number: int, true_values: np.ndarray) -> np.ndarray:
         """Values (count,) of one sample after gain, offset, noise and rounding of their sensors."""
         conversion = self.conversion
         if conversion.gain != 1.0 or conversion.offset != 0.0:
-            values = conversion.gain * values + conversion.offset
+            true_values = conversion.gain * true_values + conversion.offset
         if conversion.noise > 0.0:
-            values = values + conversion.noise * self._drawn(sample_number)
+            true_values = true_values + conversion.noise * self._drawn(sample_number)
         if conversion.bits is not None and conversion.range is not None:
             largest_code = 2.0**conversion.bits - 1.0
-            values = (
-                np.rint(np.clip(values / conversion.range, 0.0, 1.0) * largest_code) * conversion.range / largest_code
+            true_values = (
+                np.rint(np.clip(true_values / conversion.range, 0.0, 1.0) * largest_code)
+                * conversion.range
+                / largest_code
             )
-        return values
+        return true_values
 
     def _drawn(self, sample_number: int) -> np.ndarray:
         """Standard normal numbers (count,) for a sample's noise, taken from the block of numbers that contains them."""
@@ -75,8 +77,8 @@ class SensedController:
     """
 
     controller: Controller
-    wheels: Channels
-    pressures: Channels
+    wheels: SensorChannels
+    pressures: SensorChannels
     tooth_counter: ToothCounter | None = None
 
     def sample(self, sample: Sample) -> Command:
@@ -91,9 +93,16 @@ class SensedController:
 
 
 def controller_behind_sensors(
-    controller: Controller, wheels: int, signals: Conversion, pressures: Conversion, **extras: Any
+    controller: Controller,
+    wheel_count: int,
+    speed_conversion: SensorConversion,
+    pressure_conversion: SensorConversion,
+    **extras: Any,
 ) -> SensedController:
     """A controller that receives the signals of W wheels through sensors."""
     return SensedController(
-        controller, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **extras
+        controller,
+        SensorChannels(speed_conversion, wheel_count, BRAKE_SIGNALS),
+        SensorChannels(pressure_conversion, wheel_count, BRAKE_PRESSURES),
+        **extras,
     )

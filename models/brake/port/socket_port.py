@@ -21,7 +21,7 @@ STANDARD_ERROR = 2
 """File number of standard error, to which a controller's prints go: standard output is for the results alone."""
 START_REMEDY = "if it needs longer, give start (s) under [port]"
 """Text on the remedy where a controller does not connect in time."""
-GRACE_SECONDS = 0.5
+PROCESS_END_SECONDS = 0.5
 """Time (s) for a process to end by itself once its connection is closed at the end of a run."""
 
 
@@ -51,7 +51,7 @@ class SocketPort:
             raise ControllerFailed(
                 sample,
                 "crash",
-                f"the connection broke: {error.strerror or error}{end_of_process(self.process, self.timeout)}",
+                f"the connection broke: {error.strerror or error}{process_end_phrase(self.process, self.timeout)}",
             ) from None
 
     def _frame(self, sample: Sample, deadline: float) -> bytes:
@@ -71,7 +71,7 @@ class SocketPort:
                     sample,
                     "crash",
                     "the connection was closed after "
-                    f"{_received_bytes(got)}{end_of_process(self.process, self.timeout)}",
+                    f"{_received_bytes(got)}{process_end_phrase(self.process, self.timeout)}",
                 )
             got += received_part
             if len(got) < ANSWER_LAYOUT.size:
@@ -81,12 +81,12 @@ class SocketPort:
         return got
 
 
-def end_of_process(process: subprocess.Popen[bytes] | None, patience: float) -> str:
+def process_end_phrase(process: subprocess.Popen[bytes] | None, waiting_time: float) -> str:
     """Phrase on how a process with a closed connection ended; "" if it did not end within some tenths of a second."""
     if process is None:
         return ""
     with suppress(subprocess.TimeoutExpired):
-        status = process.wait(min(patience, GRACE_SECONDS))
+        status = process.wait(min(waiting_time, PROCESS_END_SECONDS))
         return (
             f", its process ended with status {status}" if status >= 0 else f", its process got {_signal_name(-status)}"
         )
@@ -118,18 +118,22 @@ def listening_socket(port_number: int = 0) -> Iterator[socket.socket]:
 
 @contextmanager
 def controller_behind_socket(
-    command_words: Sequence[str] | None, address: int, timeout: float, start_seconds: float, folder: Path = Path()
+    command_words: Sequence[str] | None,
+    port_number: int,
+    timeout: float,
+    start_seconds: float,
+    working_folder: Path = Path(),
 ) -> Iterator[SocketPort]:
     """A controller behind a socket, as a context manager: started by a command, or connecting by itself.
 
     command_words : the command, in which "{port}" stands for the number of the port; None waits for a controller that
-    somebody else starts; start_seconds : seconds until it must have connected; folder : in which the command runs.
-    However the block ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed
-    where none connects.
+    somebody else starts; start_seconds : seconds until it must have connected; working_folder : in which the command
+    runs. However the block ends, no process of it stays. Raises InputError for a command that cannot be started,
+    RunFailed where none connects.
     """
     with (
-        listening_socket(address) as server,
-        _started_process(command_words, server.getsockname()[1], folder) as process,
+        listening_socket(port_number) as server,
+        _started_process(command_words, server.getsockname()[1], working_folder) as process,
     ):
         link = _accepted_connection(server, process, start_seconds)
         with link:
@@ -138,46 +142,48 @@ def controller_behind_socket(
 
 
 def _accepted_connection(
-    server: socket.socket, process: subprocess.Popen[bytes] | None, start_seconds: float
+    server_socket: socket.socket, process: subprocess.Popen[bytes] | None, start_seconds: float
 ) -> socket.socket:
-    """The first connection to ``server`` within ``start_seconds`` seconds, while the process runs."""
+    """The first connection to ``server_socket`` within ``start_seconds`` seconds, while the process runs."""
     end = time.perf_counter() + start_seconds
-    server.settimeout(min(0.05, start_seconds))
+    server_socket.settimeout(min(0.05, start_seconds))
     while time.perf_counter() < end:
         with suppress(TimeoutError):
-            return server.accept()[0]
+            return server_socket.accept()[0]
         status = None if process is None else process.poll()
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
-    address = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
+    address = f"{LOOPBACK_ADDRESS}:{server_socket.getsockname()[1]}"
     raise RunFailed("controller", f"silence: nobody connected to {address} within {start_seconds:g} s; {START_REMEDY}")
 
 
 @contextmanager
-def _started_process(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[subprocess.Popen[bytes] | None]:
+def _started_process(
+    command: Sequence[str] | None, port_number: int, working_folder: Path
+) -> Iterator[subprocess.Popen[bytes] | None]:
     """The running process of a command, as a context manager that ends the process."""
-    if words is None:
+    if command is None:
         yield None
         return
-    command_words = [word.replace("{port}", str(port)) for word in words]
+    command_words = [word.replace("{port}", str(port_number)) for word in command]
     try:
         process = subprocess.Popen(
-            command_words, cwd=folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
+            command_words, cwd=working_folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
         )
     except OSError as error:
-        raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None
+        raise InputError("", "command", list(command), f"cannot be started: {error.strerror}") from None
     grace = 0.0
     try:
         yield process
-        grace = GRACE_SECONDS
+        grace = PROCESS_END_SECONDS
     finally:
         _wait_for_end(process, grace)
 
 
-def _wait_for_end(process: subprocess.Popen[bytes], grace: float) -> None:
-    """Wait ``grace`` seconds for the process to end; then kill it and all processes that it started."""
+def _wait_for_end(process: subprocess.Popen[bytes], waiting_time: float) -> None:
+    """Wait ``waiting_time`` seconds for the process to end; then kill it and all processes that it started."""
     with suppress(subprocess.TimeoutExpired):
-        process.wait(grace)
+        process.wait(waiting_time)
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
     process.wait()

@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.controller import Pressures
+from models.brake.controller import ConstantPressures
 from models.brake.figures_of_merit import (
     METRES_PER_SECOND_OF_KMH,
-    Axles,
+    AxleLoads,
     adhesion_front,
     adhesion_of_vehicle,
     adhesion_rear,
     adhesion_trailer,
     braking_rate,
     crossing_time,
-    mean_of_fastest,
-    split_rate,
+    least_braking_rate_on_split,
+    mean_of_shortest_times,
 )
 from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import RunFailed
@@ -79,12 +79,12 @@ class AdhesionUtilisation:
         return self.z / self.k_vehicle
 
 
-def axle_geometry(scene: BrakingScene) -> Axles:
+def axle_geometry(scene: BrakingScene) -> AxleLoads:
     """Axle loads (N), wheelbase (m) and height of the centre of mass (m) of the scene's vehicle."""
     truck = vehicle_of(scene)
     weight = truck.mass * GRAVITY
     front = weight * -truck.rear.x / truck.wheelbase
-    return Axles(front, weight - front, truck.wheelbase, truck.height)
+    return AxleLoads(front, weight - front, truck.wheelbase, truck.height)
 
 
 def trailer_loads(vehicle: BrakedVehicle, braking_rate_z: float) -> np.ndarray:
@@ -141,7 +141,7 @@ def _single_axle_braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle_
 
     def run(pressure: float) -> BrakingPath:
         return vehicle.run(
-            Pressures(np.where(wheels, pressure, 0.0)), 50.0 * METRES_PER_SECOND_OF_KMH, LONGEST_RUN_DURATION
+            ConstantPressures(np.where(wheels, pressure, 0.0)), 50.0 * METRES_PER_SECOND_OF_KMH, LONGEST_RUN_DURATION
         )
 
     low, high = 0.0, scene.brakes.supply
@@ -154,7 +154,9 @@ def _single_axle_braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle_
     if not np.isfinite(braking_times).any():
         raise NoAdhesion(f"the {AXLE_NAMES_IN_ERRORS[axle_index]} alone does not slow the vehicle down to 20 km/h")
     return braking_rate(
-        40.0 * METRES_PER_SECOND_OF_KMH, 20.0 * METRES_PER_SECOND_OF_KMH, mean_of_fastest(np.array(braking_times))
+        40.0 * METRES_PER_SECOND_OF_KMH,
+        20.0 * METRES_PER_SECOND_OF_KMH,
+        mean_of_shortest_times(np.array(braking_times)),
     )
 
 
@@ -205,7 +207,7 @@ class SplitAdhesion:
     @property
     def required_braking_rate(self) -> float:
         """Smallest braking rate z on split friction that the regulation requires."""
-        return split_rate(self.k_low, self.k_high)
+        return least_braking_rate_on_split(self.k_low, self.k_high)
 
 
 def measured_split_adhesion(scene: BrakingScene, procedure_name: str) -> SplitAdhesion:

@@ -9,16 +9,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FATAL_ENDS, FINE, ending_sentence
-from models.brake.brake import Brakes
-from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
-from models.brake.plane_records import PlaneMotion, Report
-from models.brake.plane_vehicle import Plane
-from models.brake.port.ask import STATES_WITH_SLOW_APPLY, VALVE_STATES, ask
+from models.brake.advance import AT_REST, FATAL_END_STATUSES, FINE, ending_sentence
+from models.brake.brake import WheelBrakes
+from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLING_PERIOD, Command, Controller, Sample, is_steady
+from models.brake.plane_records import PlaneMotion, WheelReport
+from models.brake.plane_vehicle import PlaneVehicle
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, VALVE_STATES, checked_command
 from models.brake.port.sensors import SensedController
-from models.brake.pressure import Chambers, resting_chambers
-from models.brake.samples import Braking, Commands, Record, Row, by_steps, parts, row
-from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, check_way
+from models.brake.pressure import BrakeChambers, air_at_rest
+from models.brake.samples import (
+    BrakeCommands,
+    BrakeSystem,
+    RecordedRow,
+    SampleRecord,
+    compiled_plane_samples,
+    empty_row,
+    rows_in_one,
+)
+from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad, check_step_distance
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
@@ -42,7 +50,7 @@ class BrakingPath:
     turning: np.ndarray
     pressures: np.ndarray
     torques: np.ndarray
-    reports: Report
+    reports: WheelReport
     ended_at_rest: bool
     coordinates: tuple[str, ...] = ()
     clock: str = ""
@@ -64,19 +72,19 @@ class BrakedVehicle:
     kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s),
     evaluated in the middle of each sample; engine : ``models.engines.braking.EngineChassis`` if an engine is to carry
     the chassis.
-    sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then integrates.
+    sprung : ``models.brake.sprung.SprungVehicle`` of a vehicle on its suspension, which its engine then integrates.
     """
 
-    plane: Plane
+    plane: PlaneVehicle
     kind: np.ndarray
     tables: Tables
     slope: float
-    road: Road
-    brakes: Brakes
-    chambers: Chambers
+    road: RoadSurfaces
+    brakes: WheelBrakes
+    chambers: BrakeChambers
     steer: np.ndarray
     substeps: int = 4
-    sample: float = SAMPLE
+    sample: float = SAMPLING_PERIOD
     speed_given: bool = True
     switch_time: float = 0.0
     engine: Any = None
@@ -110,15 +118,15 @@ class BrakedVehicle:
             start_or_speed if isinstance(start_or_speed, StartState) else self.rolling(start_or_speed),
             self.plane.wheels,
         )
-        check_way(self.road, self.sample / self.substeps * float(np.hypot(*start_state.state[1, :2])))
-        current_row = row(start_state.state.shape[1], wheels)
+        check_step_distance(self.road, self.sample / self.substeps * float(np.hypot(*start_state.state[1, :2])))
+        current_row = empty_row(start_state.state.shape[1], wheels)
         current_row.state[:], current_row.turning[:] = start_state.state, start_state.turning
-        commands = Commands(
+        commands = BrakeCommands(
             np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy()
         )
         steady = self.steering is None and is_steady(controller)
         samples_at_once = int(min(longest_duration / self.sample + 2.0, LARGEST_SAMPLE_BATCH)) if steady else 1
-        record = Record(
+        record = SampleRecord(
             current_row.whole,
             np.empty((samples_at_once, current_row.whole.size)),
             np.zeros(1, dtype=np.int64),
@@ -132,7 +140,7 @@ class BrakedVehicle:
         rows, status = [current_row.whole[None].copy()], FINE
         try:
             for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, current_row, motion)):
-                if status in FATAL_ENDS:
+                if status in FATAL_END_STATUSES:
                     raise RunFailed("braking", ending_sentence(status, self.plane, motion), time)
                 _move_rows(rows, record)
                 if status == AT_REST or time >= record.until:
@@ -142,7 +150,7 @@ class BrakedVehicle:
                 known = speed if self.speed_given else math.nan
                 rims = np.abs(current_row.turning) * self.plane.radius
                 sample = Sample(number, round(time * 1e9), rims, braked, supply, known)
-                _write_command(commands, ask(controller, sample, states, max(beyond, supply)), braked)
+                _write_command(commands, checked_command(controller, sample, states, max(beyond, supply)), braked)
                 if self.steering is not None:
                     commands.steer[:] = self.steering(time + 0.5 * self.sample)
         except RunFailed as error:
@@ -152,29 +160,27 @@ class BrakedVehicle:
         return _braking_path(rows, current_row, status == AT_REST, self.coordinates)
 
     @property
-    def on_road(self) -> OnRoad:
+    def on_road(self) -> VehicleOnRoad:
         """Vehicle, tyre tables and road in the form that compiled functions take."""
-        return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
+        return VehicleOnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
-        self, commands: Commands, sample_record: Record, sample_row: Row, motion: PlaneMotion
+        self, commands: BrakeCommands, sample_record: SampleRecord, sample_row: RecordedRow, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
         """Returns the iterator that integrates the motion sample by sample from the state in ``sample_row`` and
         ``motion``; it yields status, time (s), speed (m/s) and supply pressure (bar).
         """
-        air = resting_chambers(self.chambers, self.sample)._replace(
-            pressure=sample_row.pressure, torque=sample_row.torque
-        )
+        air = air_at_rest(self.chambers, self.sample)._replace(pressure=sample_row.pressure, torque=sample_row.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
-        braking = Braking(air, self.chambers, self.brakes, torques)
-        go, arguments = by_steps, [commands, sample_record, self.sample, braking, motion, self.on_road]
+        braking = BrakeSystem(air, self.chambers, self.brakes, torques)
+        go, arguments = compiled_plane_samples, [commands, sample_record, self.sample, braking, motion, self.on_road]
         if self.relaxation is not None:
-            from models.brake.relaxation import Lag, by_lagging_steps
+            from models.brake.relaxation import TyreLag, compiled_lagging_samples
 
             # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady
             # one
             angle = np.full(self.plane.wheels, np.nan if sample_row.state[1, 1:].any() else 0.0)
-            go, arguments = by_lagging_steps, [*arguments, Lag(self.relaxation, angle)]
+            go, arguments = compiled_lagging_samples, [*arguments, TyreLag(self.relaxation, angle)]
         moving: Iterator[tuple[int, float, float, float]] = (go if self.engine is None else self.engine.moving)(
             *arguments
         )
@@ -182,11 +188,11 @@ class BrakedVehicle:
 
 
 def braked_vehicle_on_tyres(
-    plane_vehicle: Plane,
+    plane_vehicle: PlaneVehicle,
     tyres: Sequence[TyreTable],
-    brakes: Brakes,
-    chambers: Chambers,
-    road: Road = UNIFORM_ROAD,
+    brakes: WheelBrakes,
+    chambers: BrakeChambers,
+    road: RoadSurfaces = UNIFORM_ROAD,
     **other_fields: Any,
 ) -> BrakedVehicle:
     """Build a braked vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
@@ -205,7 +211,7 @@ def braked_vehicle_on_tyres(
     return BrakedVehicle(plane=plane_vehicle, road=road, brakes=brakes, chambers=chambers, **vehicle_fields)
 
 
-def _write_command(commands: Commands, command: Command, brake_switch_closed: bool) -> None:
+def _write_command(commands: BrakeCommands, command: Command, brake_switch_closed: bool) -> None:
     """Write a controller's command into ``commands`` for the next sample; valves release until the brake switch
     closes.
     """
@@ -216,23 +222,23 @@ def _write_command(commands: Commands, command: Command, brake_switch_closed: bo
         commands.pressures[0] = math.nan
 
 
-def _move_rows(recorded_rows: list[np.ndarray], sample_record: Record) -> None:
+def _move_rows(recorded_rows: list[np.ndarray], sample_record: SampleRecord) -> None:
     """Append a copy of the recorded rows to ``recorded_rows``, and empty the record."""
     recorded_rows.append(sample_record.rows[: sample_record.left[0]].copy())
     sample_record.left[0] = 0
 
 
 def _braking_path(
-    recorded_rows: list[np.ndarray], last_row: Row, stands_at_end: bool, coordinate_names: tuple[str, ...]
+    recorded_rows: list[np.ndarray], last_row: RecordedRow, stands_at_end: bool, coordinate_names: tuple[str, ...]
 ) -> BrakingPath:
-    all_of = parts(recorded_rows, last_row)
+    all_of = rows_in_one(recorded_rows, last_row)
     return BrakingPath(
         all_of.time[:, 0],
         all_of.state,
         all_of.turning,
         all_of.pressure,
         all_of.torque,
-        Report(*np.moveaxis(all_of.report[1:], 1, 0)),
+        WheelReport(*np.moveaxis(all_of.report[1:], 1, 0)),
         stands_at_end,
         coordinate_names,
     )

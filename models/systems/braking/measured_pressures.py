@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.controller import LARGEST_PRESSURE, SAMPLE, Command, Sample
+from models.brake.controller import LARGEST_PRESSURE, SAMPLING_PERIOD, Command, Sample
 from models.core.errors import InputError
 from models.core.tables import SECONDS, read_table, write_table
 
@@ -37,7 +37,7 @@ class MeasuredPressures:
     times: np.ndarray
     pressures: np.ndarray
     speeds: np.ndarray | None = None
-    period: float = SAMPLE
+    period: float = SAMPLING_PERIOD
 
     def sample(self, sample: Sample) -> Command:
         """Returns the command of a sample: the means (W,) of the measured pressures over the sample."""
@@ -60,7 +60,7 @@ class MeasuredPressures:
         return np.sqrt(((wheel_speeds[shared] - measured) ** 2).mean(axis=0))
 
 
-def read_pressures(csv_path: str | Path, wheel_count: int, sample_period: float = SAMPLE) -> MeasuredPressures:
+def read_pressures(csv_path: str | Path, wheel_count: int, sample_period: float = SAMPLING_PERIOD) -> MeasuredPressures:
     """Reads measured pressures of a number of wheels from a CSV file with units. Raises InputError for a file that
     cannot be used.
     """

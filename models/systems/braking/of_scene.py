@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels
+from models.brake.brake import Brake, brakes_of_wheels
 from models.brake.controller import Controller
 from models.brake.controllers import CONTROLLERS
-from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane, Truck, plane_of_truck
-from models.brake.pressure import Chambers
-from models.brake.surfaces import Road, road
-from models.brake.surfaces import Stretch as NumberedStretch
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, PlaneVehicle, Truck, plane_of_truck
+from models.brake.pressure import BrakeChambers
+from models.brake.surfaces import RoadStretch as NumberedStretch
+from models.brake.surfaces import RoadSurfaces, road_of_stretches
 from models.brake.trailer import plane_of_train
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
@@ -53,7 +53,7 @@ def braked_vehicle(scene: BrakingScene, procedure: BrakingProcedure) -> BrakedVe
     vehicle = braked_vehicle_on_tyres(
         plane,
         [tyre_table_of(scene, name, kind) for name in names for kind in kinds],
-        of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
+        brakes_of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
         chambers_of(scene, plane.wheels),
         road_of(scene, procedure, names),
         kind=np.where(on_front_unit, 0, len(kinds) - 1),
@@ -73,10 +73,10 @@ def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest_relaxation
     """Raise InputError for time steps so long that the vehicle at rest would start to rock on its tyres.
     ``shortest_relaxation_length`` : shortest relaxation length (m).
     """
-    from models.brake.relaxation import longest_step
+    from models.brake.relaxation import longest_stable_step
 
     lively = GRAVITY if vehicle.engine is None else vehicle.engine.liveliness
-    longest = longest_step(vehicle.slope, lively, shortest_relaxation_length)
+    longest = longest_stable_step(vehicle.slope, lively, shortest_relaxation_length)
     if vehicle.sample / vehicle.substeps > longest:
         least_substeps = math.ceil(vehicle.sample / longest)
         if least_substeps > LARGEST_SUBSTEP_COUNT:
@@ -91,13 +91,13 @@ def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest_relaxation
         raise InputError(scene.file, "run.substeps", vehicle.substeps, allowed)
 
 
-def plane_of(scene: BrakingScene) -> Plane:
+def plane_of(scene: BrakingScene) -> PlaneVehicle:
     """Returns the plane model of the truck, of truck and trailer, or of a vehicle on its suspension with what it
     tows.
     """
     transfer = scene.load_transfer is not None
     if scene.vehicle.file is not None:
-        plane: Plane = sprung_of(scene).in_plane(transfer)
+        plane: PlaneVehicle = sprung_of(scene).in_plane(transfer)
         return plane
     vehicle = vehicle_of(scene)
     try:
@@ -121,11 +121,11 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
 
 
 def sprung_of(scene: BrakingScene) -> Any:
-    """Returns the scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; raises InputError."""
+    """Returns the scene's vehicle on its suspension, a ``models.brake.sprung.SprungVehicle``; raises InputError."""
     from models.brake.sprung import suspended_vehicle
 
     return suspended_vehicle(
-        spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces
+        spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), trailer_spring_code=scene.run.forces
     )
 
 
@@ -190,14 +190,14 @@ def surfaces_of(scene: BrakingScene, procedure: BrakingProcedure) -> list[str]:
     )
 
 
-def road_of(scene: BrakingScene, procedure: BrakingProcedure, surface_names: list[str]) -> Road:
+def road_of(scene: BrakingScene, procedure: BrakingProcedure, surface_names: list[str]) -> RoadSurfaces:
     """Returns the road of a procedure, with surfaces numbered by their index in ``surface_names``."""
     stretches = [
         NumberedStretch(s.x, *(surface_names.index(name) for name in surfaces_of_stretch(procedure, s)))
         for s in scene.road.stretches
     ]
     try:
-        return road(stretches, scene.road.line, len(tyre_kinds_of(scene)))
+        return road_of_stretches(stretches, scene.road.line, len(tyre_kinds_of(scene)))
     except InputError as error:
         raise InputError(scene.file, "road.stretches", error.value, error.allowed) from None
 
@@ -255,12 +255,12 @@ def brake_of(scene: BrakingScene, axle_name: str) -> Brake:
     )
 
 
-def chambers_of(scene: BrakingScene, wheel_count: int) -> Chambers:
+def chambers_of(scene: BrakingScene, wheel_count: int) -> BrakeChambers:
     """Returns the brake chambers of all wheels; without [pressure] their time constants are zero."""
     pressure, zeros = scene.pressure, np.zeros(wheel_count)
     if pressure is None:
-        return Chambers(zeros, zeros, scene.brakes.supply)
-    chambers = Chambers(zeros + pressure.fill, zeros + pressure.empty, scene.brakes.supply, delay=pressure.delay)
+        return BrakeChambers(zeros, zeros, scene.brakes.supply)
+    chambers = BrakeChambers(zeros + pressure.fill, zeros + pressure.empty, scene.brakes.supply, delay=pressure.delay)
     chambers = chambers if pressure.slow is None else chambers._replace(slow=zeros + pressure.slow)
     return (
         chambers

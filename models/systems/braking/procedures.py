@@ -7,13 +7,13 @@ from pathlib import Path as Folder
 
 import numpy as np
 
-from models.brake.controller import Pressures, Sample
+from models.brake.controller import ConstantPressures, Sample
 from models.brake.plane_records import motion_of
-from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import Plane
-from models.brake.port.setup import ControllerRun, controller_of_run
+from models.brake.plane_step import advance_one_step
+from models.brake.plane_vehicle import PlaneVehicle
+from models.brake.port.setup import ControllerRunData, controller_of_run
 from models.brake.steering import Steering, YawResponse, yaw_response
-from models.brake.surfaces import check_way, surfaces, under_wheels
+from models.brake.surfaces import check_step_distance, fill_surfaces_under_wheels, new_wheel_surfaces
 from models.core.errors import InputError
 from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked_vehicle, controller_of
@@ -42,7 +42,7 @@ def vehicle_and_start_state(scene: BrakingScene, procedure_name: str) -> tuple[B
     procedure = scene.procedures[procedure_name]
     vehicle = braked_vehicle(scene, procedure)
     try:
-        check_way(vehicle.road, scene.run.sample / scene.run.substeps * procedure.speed)
+        check_step_distance(vehicle.road, scene.run.sample / scene.run.substeps * procedure.speed)
     except InputError as error:
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
     if procedure.radius is not None:
@@ -66,7 +66,9 @@ def step_steer_response(scene: BrakingScene, procedure_name: str) -> YawResponse
     """Computes the yaw rate's response to the steering of a J-turn without brakes; None where it does not settle."""
     vehicle, start = vehicle_and_start_state(scene, procedure_name)
     steering = steering_of(scene.procedures[procedure_name], vehicle)
-    path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED_DURATION)
+    path = vehicle.run(
+        ConstantPressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED_DURATION
+    )
     return yaw_response(path.times, path.states[:, 1, 2], steering.half)
 
 
@@ -126,13 +128,13 @@ def controller_commands(
     return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
-def port_run_of(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
+def port_run_of(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRunData:
     """Returns the facts of a run that the port needs. The key of a log depends on vehicle and procedure, not on the
     controller.
     """
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([procedure_name, known], sort_keys=True)
-    return ControllerRun(
+    return ControllerRunData(
         vehicle.plane.radius,
         scene.run.sample,
         text,
@@ -242,7 +244,9 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, turn_radius: float) -> Ste
     return circle.steady_turn(unknown) if steady else None
 
 
-def _rolling_speeds(plane_vehicle: Plane, motion_state: np.ndarray, wheel_steer_angles: np.ndarray) -> np.ndarray:
+def _rolling_speeds(
+    plane_vehicle: PlaneVehicle, motion_state: np.ndarray, wheel_steer_angles: np.ndarray
+) -> np.ndarray:
     """Angular speeds (W,) in rad/s of wheels that roll without slip, for positions and rates (2, 2 + U) of a plane
     vehicle.
     """
@@ -269,10 +273,10 @@ def _accelerations(
         np.zeros((2, vehicle.plane.wheels)),
         _rolling_speeds(vehicle.plane, motion_state, wheel_steer_angles),
     )
-    motion, ground = motion_of(motion_state.copy(), turning.copy()), surfaces(plane.wheels)
+    motion, ground = motion_of(motion_state.copy(), turning.copy()), new_wheel_surfaces(plane.wheels)
     motion.accelerations[:2] = motion_state[1, 2] * np.array([-motion_state[1, 1], motion_state[1, 0]])
-    under_wheels(motion_state, 0.0, vehicle.on_road, ground)
-    step_on(
+    fill_surfaces_under_wheels(motion_state, 0.0, vehicle.on_road, ground)
+    advance_one_step(
         motion,
         no_torques,
         ACCELERATION_INTERVAL,

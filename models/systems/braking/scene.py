@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from models.brake.controller import LARGEST_PRESSURE, SAMPLE
+from models.brake.controller import LARGEST_PRESSURE, SAMPLING_PERIOD
 from models.brake.port.setup import PortTable
 from models.brake.trailer import Trailer
 from models.core.errors import InputError
@@ -159,7 +159,7 @@ class BrakingProcedure(Strict):
 class BrakingRunTable(Strict):
     """[run]: sample time of the controller, time steps within a sample, and duration."""
 
-    sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
+    sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLING_PERIOD)
     substeps: int = Field(default=4, ge=1, le=LARGEST_SUBSTEP_COUNT, description="steps of the vehicle within a sample")
     forces: Literal["native", "compiled"] = Field(
         default="native",

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
+from models.brake.figures_of_merit import (
+    WheelLockTimes,
+    equivalent_deceleration,
+    mean_fully_developed_deceleration,
+    wheel_lock_times,
+    yaw_rate_ratio,
+)
 from models.systems.braking.march import BrakingPath
 
 WHEEL_NAMES = "front left", "front right", "rear left", "rear right"
@@ -95,7 +101,7 @@ class StopHistory:
             if path.ended_at_rest
             else float("nan"),
             "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
-            "MFDD [m/s^2]": mean_fully_developed(path.times, distances, speed),
+            "MFDD [m/s^2]": mean_fully_developed_deceleration(path.times, distances, speed),
             "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
             "largest side slip at [s]": float(path.times[slip]),
             "largest lateral acceleration [m/s^2]": float(self.lateral_acceleration[lateral]),
@@ -185,15 +191,15 @@ class StopHistory:
         vx, vy = self.path.states[0, 1, :2] / self.speed[0]
         centre = self.path.states[0, 0, :2] + turn_radius * np.array([-vy, vx])
         return {
-            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, turn_radius),
+            "yaw rate by that of the circle": yaw_rate_ratio(yaw_rate, speed, turn_radius),
             "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time_after_braking,
             "outside of the circle [m]": float(np.hypot(*(position - centre)) - abs(turn_radius)),
             "side slip [deg]": float(np.degrees(slip)),
         }
 
-    def lock_times(self) -> Locks:
+    def lock_times(self) -> WheelLockTimes:
         """Times for which wheels lock at speeds above 15 km/h."""
-        return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
+        return wheel_lock_times(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 
 def _index_of_peak(signed_values: np.ndarray) -> int:

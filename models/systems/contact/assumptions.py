@@ -15,7 +15,7 @@ from models.contact.limits import (
     YIELD_PRESSURE,
     yield_is_known,
 )
-from models.contact.theories import Fastsim, LinearTheory, OnEllipse, OnPatches, RollingContact
+from models.contact.theories import FastsimTheory, LinearTheory, RollingContact, RollingOnEllipse, RollingOnPatches
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.core.tables import METRES, table_blocks
@@ -31,7 +31,7 @@ def assumptions(scene: ContactScene, rolling_contact: RollingContact) -> list[As
     listed = [*pressing_assumptions(scene, rolling_contact), *_creepage_assumptions(rolling_contact)]
     if isinstance(rolling_contact, LinearTheory):
         listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, rolling_contact)}))
-    if isinstance(rolling_contact, LinearTheory | Fastsim):
+    if isinstance(rolling_contact, LinearTheory | FastsimTheory):
         listed.append(_slender_assumption(lambda run: {"contact": np.array([rolling_contact.a / rolling_contact.b])}))
     if rolling_contact.pair.mismatch != 0.0 and rolling_contact.friction > 0.0:
         listed.append(_like_bodies_assumption(rolling_contact))
@@ -45,7 +45,7 @@ def pressing_assumptions(scene: ContactScene, rolling_contact: RollingContact) -
         listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * rolling_contact.pressing.peak])}))
     return listed + (
         _profile_assumptions(rolling_contact)
-        if scene.profiles is not None and isinstance(rolling_contact, OnPatches)
+        if scene.profiles is not None and isinstance(rolling_contact, RollingOnPatches)
         else []
     )
 
@@ -84,7 +84,7 @@ def _axes_divided_by_radii(scene: ContactScene, rolling_contact: RollingContact)
     The radii are those of both bodies, or else of the distance between the undeformed surfaces.
     """
     shares: dict[str, np.ndarray] = {}
-    if isinstance(rolling_contact, OnEllipse):
+    if isinstance(rolling_contact, RollingOnEllipse):
         axes = {"x": rolling_contact.a, "y": rolling_contact.b}
         if scene.radii is not None:
             shares = {f"radii.{name}": np.array([axes[name[-1]] / abs(r)]) for name, r in scene.radii if r is not None}
@@ -93,7 +93,7 @@ def _axes_divided_by_radii(scene: ContactScene, rolling_contact: RollingContact)
                 "along": 2.0 * rolling_contact.a * rolling_contact.hertz.A,
                 "across": 2.0 * rolling_contact.b * rolling_contact.hertz.B,
             }
-    elif isinstance(rolling_contact, OnPatches):
+    elif isinstance(rolling_contact, RollingOnPatches):
         for k, patch_pressure in enumerate(rolling_contact.pressed.patches, 1):
             curvature_along, across = patch_pressure.patch.distance.curvatures
             x0, x1, y0, y1 = patch_pressure.box
@@ -126,7 +126,7 @@ def _creepage_assumptions(rolling_contact: RollingContact) -> list[Assumption]:
         }
 
     if isinstance(rolling_contact, LinearTheory) or (
-        isinstance(rolling_contact, Fastsim) and rolling_contact.choices["falling"] is not None
+        isinstance(rolling_contact, FastsimTheory) and rolling_contact.choices["falling"] is not None
     ):
         return [_small_creepage_assumption(creepages)]
     return [
@@ -200,7 +200,7 @@ def _like_bodies_assumption(rolling_contact: RollingContact) -> Assumption:
     )
 
 
-def _profile_assumptions(rolling_contact: OnPatches) -> list[Assumption]:
+def _profile_assumptions(rolling_contact: RollingOnPatches) -> list[Assumption]:
     """Assumptions that contact patches lie within the profiles, and do not overlap."""
     parts = sorted(rolling_contact.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
     free_distances = {}

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import (
-    band,
     cells_error,
     coarser_cells,
-    moment_band,
-    slenderness,
-    spin_share,
-    used_with_moment,
+    force_error_band,
+    friction_share_with_moment,
+    moment_error_band,
+    slenderness_factor,
+    spin_weight_of_motion,
 )
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
@@ -193,7 +193,7 @@ def _forces(
         coarse = fastsim(ellipses, pair, cells=coarser_cells(contact_method.cells), **choices)
         limit = friction * np.maximum(load, 0.0)
         a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
-        share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
+        share = spin_weight_of_motion(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
         forces += _force_errors(fine, coarse, limit, a, b, share, contact_method)
     return np.column_stack(forces) + 0.0
 
@@ -221,12 +221,14 @@ def _force_errors(
         for creep in (fine_forces, coarse_forces)
     )
     left = cells_error(relative, relative_coarse, contact_method.cells, contact_method.order)
-    used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
-    theory = wider * friction_limit * band(contact_method.error_band_name, used, spin_share_of_creepage)
+    used, wider = np.hypot(relative[0], relative[1]), slenderness_factor(a, b)
+    theory = wider * friction_limit * force_error_band(contact_method.error_band_name, used, spin_share_of_creepage)
     moment = (
         wider
         * moment_limit
-        * moment_band(contact_method.error_band_name, used_with_moment(used, relative[2]), spin_share_of_creepage)
+        * moment_error_band(
+            contact_method.error_band_name, friction_share_with_moment(used, relative[2]), spin_share_of_creepage
+        )
     )
     return [friction_limit * left, theory, moment_limit * left, moment]
 

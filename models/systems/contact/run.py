@@ -11,26 +11,26 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.contact.accuracy import Error, rolled
-from models.contact.hertz import Hertz, by_approach, by_axes, by_load
-from models.contact.material import Falling, MaterialPair
+from models.contact.accuracy import ContactErrors, rolled_with_errors
+from models.contact.hertz import HertzContact, by_approach, by_axes, by_load
+from models.contact.material import FallingFriction, MaterialPair
 from models.contact.profile_files import read_profile
 from models.contact.profiles import ContactProfile
-from models.contact.simplified_theory import PLAIN, NormalContact, SimplifiedOptions, press
-from models.contact.standard_profiles import RAILS, WHEELS, built_in
+from models.contact.simplified_theory import DEFAULT_OPTIONS, NormalContact, SimplifiedOptions, solve_normal_contact
+from models.contact.standard_profiles import BUILT_IN_RAILS, BUILT_IN_WHEELS, built_in_profile
 from models.contact.theories import (
-    Exact,
-    ExactOnEllipse,
-    Fastsim,
+    CreepagesAndSpin,
+    ExactTheory,
+    ExactTheoryOnEllipse,
+    FastsimTheory,
     LinearTheory,
-    Motion,
-    Rolled,
     RollingContact,
-    Simplified,
-    beyond_friction,
+    RollingResult,
+    SimplifiedTheory,
+    friction_warning,
 )
 from models.contact.undeformed_distance import quadratic
-from models.contact.wheel_on_rail import TouchingPlace, Track, Wheelset, wheel_on_rail
+from models.contact.wheel_on_rail import TouchingPlace, TrackGeometry, WheelsetGeometry, wheel_on_rail
 from models.core.assumptions import with_assumptions
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -44,7 +44,7 @@ from models.systems.contact.cases_table import column_sizes, compile_kernels, fi
 from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
-BUILT_IN_PROFILES = {"wheel": WHEELS, "rail": RAILS}
+BUILT_IN_PROFILES = {"wheel": BUILT_IN_WHEELS, "rail": BUILT_IN_RAILS}
 FORCES_OF_ROLLED = attrgetter("fx", "fy", "mz", "stick", "dissipation")
 ERRORS_OF_ROLLED = attrgetter("cells", "theory", "moment_cells", "moment_theory")
 CONTACT_CHANNELS = {
@@ -90,7 +90,7 @@ class Built:
     friction: Any
     load: Any = None
     approach: float | None = None
-    falling: Falling | None = None
+    falling: FallingFriction | None = None
     profiles: Mapping[str, ContactProfile] = field(default_factory=dict)
 
 
@@ -102,9 +102,9 @@ class ContactResults:
     """
 
     contact: RollingContact
-    motions: list[Motion]
-    rolled: Sequence[Rolled]
-    errors: Sequence[Error]
+    motions: list[CreepagesAndSpin]
+    rolled_with_errors: Sequence[RollingResult]
+    errors: Sequence[ContactErrors]
     pressing_seconds: float
     rolling_seconds: np.ndarray
 
@@ -133,13 +133,13 @@ def run(
         return _table_result(scene, answers, report_progress, error)
     motions, cells = swept_creepages(scene), scene.method.cells
     report_progress("loading", 0.0)
-    shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
+    shown = rolled_with_errors(solved_contact(scene), motions[-1], cells, with_fields=True) if with_fields else None
     begun, start = time.process_time(), time.perf_counter()
     contact = solved_contact(scene)
-    steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
+    steps, marks = list[tuple[RollingResult, ContactErrors | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
         report_progress("rolling", i / len(motions))
-        steps.append(rolled(contact, motion, cells) if error else (contact.roll(motion, cells), None))
+        steps.append(rolled_with_errors(contact, motion, cells) if error else (contact.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun
     if shown is not None:
@@ -165,7 +165,7 @@ def _labelled_result(scene: ContactScene, contact_results: ContactResults, run_s
     if isinstance(contact, LinearTheory):
         with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
             used = np.array([np.linalg.norm(force.force) for force in contact_results.rolled])
-            doubt = beyond_friction(used / (contact.friction * contact.pressing.load))
+            doubt = friction_warning(used / (contact.friction * contact.pressing.load))
     return result(
         scene,
         {
@@ -281,19 +281,19 @@ def solved_contact(scene: ContactScene) -> RollingContact:
     if scene.profiles is not None:
         with scene_errors(scene):
             patches = [touch.patch for touch in touching_points(scene, built)]
-            pressed = press(patches, pair, load=built.load, approach=built.approach)
+            pressed = solve_normal_contact(patches, pair, load=built.load, approach=built.approach)
             exact = method.name == "exact"
-            return Exact(pressed, friction, method.cells) if exact else Simplified(pressed, friction)
+            return ExactTheory(pressed, friction, method.cells) if exact else SimplifiedTheory(pressed, friction)
     hertz = hertzian_contact(scene)
     if method.name == "simplified":
-        return Simplified(interpenetration_contact(hertz, pair), friction)
+        return SimplifiedTheory(interpenetration_contact(hertz, pair), friction)
     if method.name == "fastsim":
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
-        return Fastsim(hertz, friction, pair, **choices, falling=built.falling)
-    return (LinearTheory if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
+        return FastsimTheory(hertz, friction, pair, **choices, falling=built.falling)
+    return (LinearTheory if method.name == "linear" else ExactTheoryOnEllipse)(hertz, friction, pair)
 
 
-def swept_creepages(scene: ContactScene) -> list[Motion]:
+def swept_creepages(scene: ContactScene) -> list[CreepagesAndSpin]:
     """Creepages (xi_x, xi_y, spin) of a scene, with spin in 1/m: a single triple, or one for each value of [sweep]."""
     fixed = scene.creepage.model_dump()
     values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
@@ -301,14 +301,16 @@ def swept_creepages(scene: ContactScene) -> list[Motion]:
 
 
 def interpenetration_contact(
-    hertz_contact: Hertz, material_pair: MaterialPair, simplified_options: SimplifiedOptions = PLAIN
+    hertz_contact: HertzContact, material_pair: MaterialPair, simplified_options: SimplifiedOptions = DEFAULT_OPTIONS
 ) -> NormalContact:
     """Solve the normal problem of a Hertzian contact by the simplified theory of 1983 (interpenetration), on a
     rectangle larger than the ellipse.
     """
     A, B = float(hertz_contact.A), float(hertz_contact.B)
     x, y = (float(np.sqrt(1.5 * hertz_contact.approach / curvature)) for curvature in (A, B))
-    return press(quadratic(A, B, x, y), material_pair, load=float(hertz_contact.load), options=simplified_options)
+    return solve_normal_contact(
+        quadratic(A, B, x, y), material_pair, load=float(hertz_contact.load), simplified_options=simplified_options
+    )
 
 
 def touching_points(scene: ContactScene, built_contact: Built) -> list[TouchingPlace]:
@@ -320,8 +322,8 @@ def touching_points(scene: ContactScene, built_contact: Built) -> list[TouchingP
         built_contact.profiles["rail"],
         lateral_shift=p.lateral_shift,
         yaw=p.yaw,
-        track=Track(p.gauge, p.gauge_depth, p.inclination),
-        wheelset=Wheelset(p.radius, p.back_to_back),
+        track=TrackGeometry(p.gauge, p.gauge_depth, p.inclination),
+        wheelset=WheelsetGeometry(p.radius, p.back_to_back),
     )
 
 
@@ -330,7 +332,7 @@ def _profile_by_name(scene: ContactScene, wheel_or_rail: Literal["wheel", "rail"
     assert scene.profiles is not None
     name = getattr(scene.profiles, wheel_or_rail)
     if name in BUILT_IN_PROFILES[wheel_or_rail]:
-        return built_in(name)
+        return built_in_profile(name)
     if "." not in name:
         raise InputError(
             scene.file,
@@ -344,7 +346,7 @@ def _profile_by_name(scene: ContactScene, wheel_or_rail: Literal["wheel", "rail"
     )
 
 
-def hertzian_contact(scene: ContactScene) -> Hertz:
+def hertzian_contact(scene: ContactScene) -> HertzContact:
     """Solve the Hertzian contact of a scene from semi-axes, curvatures or radii, under a load or at an approach."""
     built = inputs_of_scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair

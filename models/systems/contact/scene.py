@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
-from models.contact.material import STEEL, Falling, Material, MaterialPair
+from models.contact.material import STEEL, FallingFriction, Material, MaterialPair
 from models.core.errors import InputError
 from models.core.scene_effects import check, with_effect_tables
 from models.core.scene_file import SceneFile, checked
@@ -162,7 +162,9 @@ class ContactScene(SceneFile):
     profiles: WheelRailProfiles | None = Field(default=None, description="cross-sections of wheel and rail")
     cases: CasesFile | None = Field(default=None, description="a contact in every row of a file")
     contact: ContactTable | None = Field(default=None, description="table with load or approach, and friction")
-    falling_friction: Falling | None = Field(default=None, description="friction that falls with the speed of slip")
+    falling_friction: FallingFriction | None = Field(
+        default=None, description="friction that falls with the speed of slip"
+    )
     creepage: CreepageTable = CreepageTable()
     sweep: CreepageSweep | None = Field(default=None, description="one creepage through a range")
     method: ContactMethod = ContactMethod()

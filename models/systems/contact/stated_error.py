@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.contact.accuracy import Error
+from models.contact.accuracy import ContactErrors
 from models.contact.theories import LinearTheory, RollingContact
 from models.core.discretisation import (
     Estimate,
@@ -23,7 +23,7 @@ BAND_TEXT = "which 95 % of such contacts keep to"
 
 
 def with_error(
-    run_result: Result, scene: ContactScene, rolling_contact: RollingContact, contact_errors: Sequence[Error]
+    run_result: Result, scene: ContactScene, rolling_contact: RollingContact, contact_errors: Sequence[ContactErrors]
 ) -> Result:
     """Returns the result with the stated errors of force and moment, each as the root mean square over all creepages.
 

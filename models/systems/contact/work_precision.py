@@ -13,12 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Ellipse
+from models.contact.fastsim import FastsimEllipse
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
-from models.contact.linear_theory import coefficients
+from models.contact.linear_theory import kalker_coefficients
 from models.contact.material import MaterialPair
-from models.contact.theories import ExactOnEllipse, LinearTheory, Motion, OnEllipse, Simplified
+from models.contact.theories import (
+    CreepagesAndSpin,
+    ExactTheoryOnEllipse,
+    LinearTheory,
+    RollingOnEllipse,
+    SimplifiedTheory,
+)
 from models.core.assumptions import with_assumptions
 from models.core.discretisation import finite_rms, grid_error, with_stated_errors
 from models.core.errors import RunFailed
@@ -45,7 +51,7 @@ CREEPAGE_KINDS: dict[str, CreepageParts] = {
 EXACT_GRID_CELLS, GRID_ERROR_LIMIT = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error. The finer grid is
 used where the error on the coarser grid, divided by mu N, is above GRID_ERROR_LIMIT."""
-ForcesOfMotion = Callable[[Motion], Any]
+ForcesOfMotion = Callable[[CreepagesAndSpin], Any]
 
 
 @dataclass(frozen=True)
@@ -76,11 +82,11 @@ class ContactCase:
         return self.friction * self.load
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> CreepagesAndSpin:
         """Creepages xi_x, xi_y and spin (1/m) of the case. At ``level`` 1 a single creepage reaches mu N by the linear
         theory.
         """
-        c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
+        c, size = kalker_coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
         parts = np.array(self.parts)
         unit = self.friction_limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
@@ -90,7 +96,7 @@ class ContactCase:
         """Exact tangential force (2,), fx and fy, divided by mu N."""
         return np.array([self.fx, self.fy])
 
-    def contact(self, theory_class: Callable[..., OnEllipse], **theory_choices: Any) -> OnEllipse:
+    def contact(self, theory_class: Callable[..., RollingOnEllipse], **theory_choices: Any) -> RollingOnEllipse:
         """Returns the case's contact as an object of ``theory_class``, a theory of elliptic contacts."""
         return theory_class(
             by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **theory_choices
@@ -102,7 +108,7 @@ def with_exact_forces(contact_case: ContactCase, finest_cell_counts: tuple[int, 
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
     """
-    contact = contact_case.contact(ExactOnEllipse)
+    contact = contact_case.contact(ExactTheoryOnEllipse)
     scale = contact_case.friction_limit * np.array([1.0, 1.0, np.sqrt(contact_case.a * contact_case.b)])
     best, error = np.full(3, np.nan), np.inf
     for fine in finest_cell_counts:
@@ -150,7 +156,9 @@ class TheorySettings:
 
 def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
     def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
-        ellipse = Ellipse(contact_case.a / contact_case.b, contact_case.pair, cells=cell_count, **fastsim_choices)
+        ellipse = FastsimEllipse(
+            contact_case.a / contact_case.b, contact_case.pair, cells=cell_count, **fastsim_choices
+        )
         return lambda motion: ellipse(contact_case.a, contact_case.load, contact_case.friction, *motion)
 
     return rolled
@@ -160,11 +168,11 @@ def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
     pressed = interpenetration_contact(
         by_axes(contact_case.a, contact_case.b, contact_case.pair, load=contact_case.load), contact_case.pair
     )
-    contact = Simplified(pressed, contact_case.friction)
+    contact = SimplifiedTheory(pressed, contact_case.friction)
     return lambda motion: contact.roll(motion, cell_count)
 
 
-def _rolled_by_theory(theory_class: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
+def _rolled_by_theory(theory_class: Callable[..., RollingOnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
     def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
         contact = contact_case.contact(theory_class)
         return lambda motion: contact.roll(motion, cell_count)
@@ -189,7 +197,7 @@ THEORIES_COMPARED = (
     TheorySettings("FASTSIM, three flexibilities", SECOND_ORDER_CELLS, _fastsim(flexibilities="three")),
     TheorySettings("FASTSIM, parabolic", SECOND_ORDER_CELLS, _fastsim(bound="parabolic")),
     TheorySettings("theory of 1983", SIMPLIFIED_CELLS, _simplified),
-    TheorySettings("exact theory", EXACT_CELLS, _rolled_by_theory(ExactOnEllipse)),
+    TheorySettings("exact theory", EXACT_CELLS, _rolled_by_theory(ExactTheoryOnEllipse)),
 )
 
 
@@ -243,7 +251,9 @@ LEAST_TIMED_SECONDS = 2e-5
 """Least time (s) over which an evaluation is repeated to measure its time."""
 
 
-def _forces_and_seconds(forces_of_motion: ForcesOfMotion, motion: Motion, repeat_count: int) -> tuple[Any, float]:
+def _forces_and_seconds(
+    forces_of_motion: ForcesOfMotion, motion: CreepagesAndSpin, repeat_count: int
+) -> tuple[Any, float]:
     start = time.perf_counter()
     answer = forces_of_motion(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))
@@ -309,7 +319,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], rep
         "uncertainty": Channel("contact", [case.error for case in known], "mu N", "of the exact force"),
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
-    with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactOnEllipse)))
+    with_assumptions(price, pressing_assumptions(scene, cases[0].contact(ExactTheoryOnEllipse)))
     left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, LARGEST_CELL_COUNT)
     return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 

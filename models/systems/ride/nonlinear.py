@@ -169,7 +169,7 @@ class CopiesJob:
 
     def _copies_at_speed(self, speed: float) -> Copies:
         s = self.sampling
-        return copies_in_time(self.vehicle, self.road, speed, s.lasting, copies=s.copies, seed=s.seed)
+        return copies_in_time(self.vehicle, self.road, speed, s.lasting, copy_count=s.copies, seed=s.seed)
 
     def facts(self) -> dict[str, Any]:
         """Returns no facts, as the blocks of this job are not stored."""

@@ -129,7 +129,10 @@ def road_of(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) -> Two
         )
     level = road.level if road.iso8608 is None else level_of_class(road.iso8608)
     return road_of_level(
-        half_track_of(scene, wheel_positions), level, corners=(road.corner_mean, road.corner_roll), cutoff=road.cutoff
+        half_track_of(scene, wheel_positions),
+        level,
+        corner_wavenumbers=(road.corner_mean, road.corner_roll),
+        cutoff_wavenumber=road.cutoff_wavenumber,
     )
 
 

@@ -226,7 +226,7 @@ def _cycle_on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, sought_qu
         return solved_orbit(
             guess_from_orbit(coarse, replace(limit_cycle.equations, cells=coarser_cells(scene.contact.cells))),
             sought_quantity,
-            precise=False,
+            is_precise=False,
         )
     except RunFailed:
         return None
@@ -240,7 +240,7 @@ def _cycle_reached_at_speed(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
     return attained_cycle(
-        equations_of(scene, "reference", speed), start_displacement=scene.run.displacement, step=scene.run.step
+        equations_of(scene, "reference", speed), initial_displacement=scene.run.displacement, time_step=scene.run.step
     )
 
 
@@ -269,7 +269,7 @@ def cycles_of_engines(
     for engine in engines:
         try:
             guess = guess_from_orbit(first, equations_of(scene, engine, speed))
-            orbit = refined_orbit(solved_orbit(guess, AMPLITUDE, precise=False), AMPLITUDE)
+            orbit = refined_orbit(solved_orbit(guess, AMPLITUDE, is_precise=False), AMPLITUDE)
             results[engine] = _one_period_result(scene, engine, orbit, estimate_error)
         except RunFailed as failure:
             failed[engine] = str(failure)

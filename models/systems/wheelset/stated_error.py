@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from models.contact.accuracy import LIKELY_SHARE, coarser_cells
+from models.contact.accuracy import LIKELY_ERROR_SHARE, coarser_cells
 from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
@@ -196,7 +196,7 @@ def with_error_of_cycles(
                 getattr(limit_cycles[k], name) - getattr(coarse_orbit, name)
                 for k, coarse_orbit in coarse_limit_cycles.items()
             ]
-            left = LIKELY_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
+            left = LIKELY_ERROR_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
             estimates[f"{name} of cells"] = grid_error(
                 left, size, unit, cell_count, CELL_ERROR_ORDER, LARGEST_CELL_COUNT
             )

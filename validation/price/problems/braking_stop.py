@@ -15,12 +15,12 @@ from functools import cache, partial
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.brake.brake import PAPER_FRONT, of_wheels
-from models.brake.controller import SAMPLE, Command, Controller, Sample
+from models.brake.brake import PAPER_FRONT_BRAKE, brakes_of_wheels
+from models.brake.controller import SAMPLING_PERIOD, Command, Controller, Sample
 from models.brake.controllers import CONTROLLERS
-from models.brake.pressure import Chambers, by_valves, resting_chambers
-from models.brake.quarter import braked
-from models.brake.surfaces import Stretch, road
+from models.brake.pressure import BrakeChambers, advance_by_valves, air_at_rest
+from models.brake.quarter import stop_of_quarter_vehicle
+from models.brake.surfaces import RoadStretch, road_of_stretches
 from models.core.errors import RunFailed
 from models.systems.braking.march import BrakedVehicle, braked_vehicle_on_tyres
 from models.tyre.magic_formula import table_of_surface
@@ -96,9 +96,9 @@ class BrakingStop:
 
     key = "braking"
     note = (
-        f"Steps are those of {1e3 * SAMPLE:g} ms, the paper's, and its parts. The exact wheel walks twice in one, "
-        "from node to node; literal is the paper's scheme as it is written. An engine that carries the chassis "
-        "leaves wheel and tyre with the exact step, and gives its digits."
+        f"Steps are those of {1e3 * SAMPLING_PERIOD:g} ms, the paper's, and its parts. The exact wheel walks "
+        "twice in one, from node to node; literal is the paper's scheme as it is written. An engine that carries "
+        "the chassis leaves wheel and tyre with the exact step, and gives its digits."
     )
 
     def __init__(self, quick: bool) -> None:
@@ -112,10 +112,13 @@ class BrakingStop:
         self._tables = [table_of_surface(name) for name in SURFACES]
         self.slips = np.unique(np.concatenate([table.slips for table in self._tables]))
         self.mu = np.array([np.interp(self.slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
-        self._road = road([Stretch(0.0, 0, 0), Stretch(self.change, 1, 1)])
-        self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
+        self._road = road_of_stretches([RoadStretch(0.0, 0, 0), RoadStretch(self.change, 1, 1)])
+        self._chambers, self._brakes = (
+            BrakeChambers(np.array([FILL]), np.array([EMPTY]), SUPPLY),
+            brakes_of_wheels(PAPER_FRONT_BRAKE),
+        )
         self.valves = self._recorded_commands()
-        self.duration = self.valves.size * SAMPLE
+        self.duration = self.valves.size * SAMPLING_PERIOD
         solvers = REFERENCE_SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self.true, other_distance = (self._distance_by_scipy(*solver_arguments) for solver_arguments in solvers)
@@ -125,7 +128,7 @@ class BrakingStop:
         """Settings of FULL_SUBSTEPS, or for the quick report of QUICK_SUBSTEPS."""
         chosen = QUICK_SUBSTEPS if quick else FULL_SUBSTEPS
         return tuple(
-            self.setting("reference", method, SAMPLE / n)
+            self.setting("reference", method, SAMPLING_PERIOD / n)
             for method, substep_counts in chosen.items()
             for n in substep_counts
         )
@@ -133,18 +136,18 @@ class BrakingStop:
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
         """Setting of an engine and a method with the longest step (s) up to ``step_or_tolerance`` that divides a
         sample."""
-        substeps = math.ceil(SAMPLE / step_or_tolerance * (1 - 1e-9))
+        substeps = math.ceil(SAMPLING_PERIOD / step_or_tolerance * (1 - 1e-9))
         return Setting(
             engine,
             method,
-            SAMPLE / substeps,
+            SAMPLING_PERIOD / substeps,
             METHOD_ORDERS.get(method, 0),
             default=DEFAULT_METHODS.get((method, substeps), ""),
         )
 
     def build(self, setting: Setting) -> StopSolver:
         """The braking stop by the method and step of a setting, ready to run."""
-        substeps = round(SAMPLE / setting.value)
+        substeps = round(SAMPLING_PERIOD / setting.value)
         run = (
             self._stop_by_twinrig
             if setting.method == EXACT_WHEEL_METHOD
@@ -170,7 +173,7 @@ class BrakingStop:
         """Stopping distance (m) by an adaptive method of scipy; changes of friction, locking and release are events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
         return reference_distance_on_stretches(
-            FRONT_WHEEL, PAPER_FRONT, stretches, ReplayedController(self.valves), self.speed, tolerance, method
+            FRONT_WHEEL, PAPER_FRONT_BRAKE, stretches, ReplayedController(self.valves), self.speed, tolerance, method
         )
 
     def _friction(self, surface_number: int, slip: float) -> float:
@@ -178,20 +181,20 @@ class BrakingStop:
 
     def _torques(self, substeps: int) -> np.ndarray:
         """Brake torques (n, 1) in N m at the start and at the end of every step."""
-        air, substep_torques = resting_chambers(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
+        air, substep_torques = air_at_rest(self._chambers, SAMPLING_PERIOD), np.zeros((substeps + 1, 1))
         torques = [np.zeros(1)]
         for valve in self.valves:
-            by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, substep_torques)
+            advance_by_valves(np.array([valve]), SAMPLING_PERIOD, air, self._chambers, self._brakes, substep_torques)
             torques.append(substep_torques[1:, 0].copy())
         return np.concatenate(torques)
 
     def _stop_by_twinrig(self, substeps: int) -> StopResult:
-        stop = braked(
+        stop = stop_of_quarter_vehicle(
             FRONT_WHEEL,
             stacked_tables(self._tables),
             self._road,
             self._torques(substeps),
-            SAMPLE / substeps,
+            SAMPLING_PERIOD / substeps,
             self.speed,
         )
         if stop.step_of_rest < 0:
@@ -203,7 +206,7 @@ class BrakingStop:
 
     def _stop_by_method(self, method: str, substeps: int) -> StopResult:
         number = (EULER, RK4, LITERAL).index(method)
-        torques, step = self._torques(substeps), SAMPLE / substeps
+        torques, step = self._torques(substeps), SAMPLING_PERIOD / substeps
         friction = FrictionChange(
             FrictionCurve(self.slips, self.mu[0]), FrictionCurve(self.slips, self.mu[1]), self.change
         )

@@ -12,7 +12,7 @@ from functools import cache, partial
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.contact.theories import beyond_friction
+from models.contact.theories import friction_warning
 from models.systems.contact.work_precision import THEORIES_COMPARED, TheorySettings, tangential_force_of
 from validation.contact.contact_set import read_contacts
 
@@ -108,7 +108,7 @@ class ContactAlone:
         )
         linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
-        return ContactResult(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")
+        return ContactResult(forces, counts, friction_warning(np.linalg.norm(forces, axis=1)) if linear else "")
 
 
 @cache

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.brake import PAPER_FRONT
-from models.brake.controller import SAMPLE
+from models.brake.brake import PAPER_FRONT_BRAKE
+from models.brake.controller import SAMPLING_PERIOD
 from models.brake.plane_vehicle import GRAVITY
 from validation.braking.quarter_stops import FRONT_WHEEL
 from validation.braking.sampled_quarter import EMPTY, FILL, LAST_SPEED, SUPPLY
@@ -21,13 +21,13 @@ SHEET_TEXT = f"""A wheel, and the mass that it carries, are braked straight ahea
 mu is linear between the lines of `braking_friction.csv`, whose second column holds up to x = {SURFACE_CHANGE:g} m, the
 third ({SURFACES[1]}) behind it. A wheel that stops, w = 0, stands as long as T >= r F with slip 1.
 
-Brake: pressure p (bar) and torque T (N m) begin at 0. In each sample of {1e3 * SAMPLE:g} ms a valve of
+Brake: pressure p (bar) and torque T (N m) begin at 0. In each sample of {1e3 * SAMPLING_PERIOD:g} ms a valve of
 `braking_valves.csv` is set (the last one for ever):
 
     1:  p' = ({SUPPLY:g} - p) / {FILL:g} s        0:  p' = 0        -1:  p' = -p / {EMPTY:g} s
     T = max(up(p), min(down(p), T before))
-    up(p) = {PAPER_FRONT.rising:g} max(p - {PAPER_FRONT.push_out:g}, 0)
-    down(p) = {PAPER_FRONT.falling:g} max(p - {PAPER_FRONT.release:g}, 0)
+    up(p) = {PAPER_FRONT_BRAKE.rising:g} max(p - {PAPER_FRONT_BRAKE.push_out:g}, 0)
+    down(p) = {PAPER_FRONT_BRAKE.falling:g} max(p - {PAPER_FRONT_BRAKE.release:g}, 0)
 
 with T before that at the start of the sample. Parameters (SI): m = {FRONT_WHEEL.mass:.17g}, r =
 {FRONT_WHEEL.radius:.17g}, J = {FRONT_WHEEL.spin_inertia:.17g}, g = {GRAVITY:g}. Start: x = 0, u = {SPEED:g} m/s, w = u

@@ -173,7 +173,7 @@ def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sam
     result = linearised_result(scene, vehicle, sampling, lambda text, share: None, estimate_error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
     fine = copies_in_time(
-        vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + sample_number, longest_step=run.step / 4.0
+        vehicle, road, speed, 10.0, copy_count=TRUTH_COPIES, seed=1000 + sample_number, longest_step=run.step / 4.0
     )
     chance = json.loads(result.data.attrs["error"])["chance"]["channels"]
     estimates, true = dict[str, Estimate](), dict[str, float]()
