@@ -81,10 +81,10 @@ def braked_truck_turn(end_speed: float, steer: float = STEER, step_function: Cal
     """End of a braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s), interpolated linearly within the
     last step."""
     truck = RollingTruck(
-        on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
+        on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), cornering_slope=ICE_TABLE.cornering),
         SPEED,
         steer=steer,
-        step_function=step_function,
+        advance_step=step_function,
     )
     while True:
         passed, position, fast = truck.time, truck.state[0].copy(), truck.speed

@@ -88,12 +88,12 @@ def shift_ratio(engine: str) -> float:
 
 
 def _reference_row(vehicle: str, engine: str, duration: float) -> Row:
-    path = whole.run(whole.VEHICLES[vehicle](), engine, duration, lags=True)
+    path = whole.run(whole.VEHICLES[vehicle](), engine, duration, with_lags=True)
     return Observed(
         f"braking_relaxation.reference.{vehicle}.{engine}",
         SYSTEM,
         f"difference of {duration:g} s of a stop in {engine} from plain code: {vehicle}, relaxing tyres, slip control",
-        whole.path_difference(path, whole.plain_run(vehicle, duration, lags=True)),
+        whole.path_difference(path, whole.plain_run(vehicle, duration, with_lags=True)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 

@@ -191,7 +191,7 @@ def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row],
         step=SAMPLE_PERIOD,
         duration=ROUGH_ROAD_SECONDS,
         interpolation="smooth",
-        override=paper,
+        parameter_changes=paper,
         effects=PRESCRIBED_PITCH,
     )
     true = exact_moment(scene)

@@ -96,7 +96,9 @@ def _prepared_runs(folder: Path) -> FreeRuns:
     noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
     quiet = assembly_of_scene(force_scene(folder, step=STEP, duration=DURATION))
     noisy = assembly_of_scene(
-        force_scene(folder, step=STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise)
+        force_scene(
+            folder, step=STEP, duration=DURATION, parameter_changes=perturbed_parameters(PARAMETERS), effects=noise
+        )
     )
     predicted_stiffness = holding_stiffness(quiet.parameters, pitch_error_growth(quiet).rate)
     return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness)

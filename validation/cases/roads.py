@@ -54,7 +54,7 @@ def _round_trip_rows(folder: Path) -> list[Row]:
             road_scene(
                 duration=2.5,
                 road={"source": source, "file": f"study.{suffix}", "speed": 20.0, "beyond_end": "refused"},
-                folder=folder,
+                scene_folder=folder,
             ),
             "reference",
         )

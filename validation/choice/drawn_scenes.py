@@ -25,12 +25,12 @@ class ChoiceQuestion:
         return import_module(SYSTEMS[self.table.get("system", "pitch-plane")].scene).build(self.table, "drawn")
 
 
-def draw_scene(system: str, seed: int) -> ChoiceQuestion:
+def draw_scene(system_name: str, seed: int) -> ChoiceQuestion:
     """Random scene of a system with quantities and tolerance, for a seed."""
     draw = np.random.default_rng([SEED, seed])
-    table, quantities = DRAWN_SYSTEMS[system](draw)
+    table, quantities = DRAWN_SYSTEMS[system_name](draw)
     return ChoiceQuestion(
-        {"title": f"drawn {seed}", "system": system, **table}, quantities, TOLERANCES[seed % len(TOLERANCES)]
+        {"title": f"drawn {seed}", "system": system_name, **table}, quantities, TOLERANCES[seed % len(TOLERANCES)]
     )
 
 

@@ -75,7 +75,8 @@ def force_driven_scene(
     parameters are wrong."""
     override = perturbed_parameters(PARAMETERS) if perturbed else {}
     return changed_scene(
-        force_scene(folder, duration=duration, override=override, effects=effects), vehicle={"geometry": geometry}
+        force_scene(folder, duration=duration, parameter_changes=override, effects=effects),
+        vehicle={"geometry": geometry},
     )
 
 

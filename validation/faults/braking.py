@@ -33,7 +33,7 @@ def _truck_after_first_step(course: Road, steer: float = 0.0) -> RollingTruck:
     side is dry and the right side ice; else the road is ice."""
     tables = tyre_table.stacked_tables([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
     truck = RollingTruck(
-        on_road(plane_vehicle.plane_of_truck(PAPER_TRUCK), tables, course), 10.0, steer=steer, step_function=advance
+        on_road(plane_vehicle.plane_of_truck(PAPER_TRUCK), tables, course), 10.0, steer=steer, advance_step=advance
     )
     if not steer:
         truck.turning[:] = 0.0

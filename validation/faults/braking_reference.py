@@ -49,8 +49,8 @@ def _stop_difference() -> float:
 
 
 def _lagging_difference() -> float:
-    path = whole.run(whole.car(), ENGINE, DURATION, lags=True)
-    return whole.path_difference(path, whole.plain_run("car", DURATION, lags=True))
+    path = whole.run(whole.car(), ENGINE, DURATION, with_lags=True)
+    return whole.path_difference(path, whole.plain_run("car", DURATION, with_lags=True))
 
 
 CHECKS = {
