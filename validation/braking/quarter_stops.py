@@ -166,7 +166,7 @@ def exact_distance(quarter_car: Quarter, tyre_table: TyreTable, brake_torque: fl
     """Exact stopping distance (m), to a relative accuracy of 1e-9, under a constant torque (N m) from a speed (m/s)
     with a rolling wheel.
 
-    In a stretched time q with dt = u dq, where u is the speed, the slip has an equation of its own, s' = -(r^2 / J) (F - T / r) - (1 - s) F / m,
+    In a stretched time q, dt = u dq, the slip has an equation of its own, s' = -(r^2 / J) (F - T / r) - (1 - s) F / m,
     and ln u falls by F / m: no speed stands in a denominator. Once the slip has settled, or is 1, the force is
     constant and the rest u^2 m / (2 F).
     """
