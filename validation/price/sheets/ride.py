@@ -10,13 +10,13 @@ from validation.price.sheets.page import ReferenceValue, write_matrices
 from validation.price.sheets.page import write as write_page
 
 
-def write(folder: Path) -> list[ReferenceValue]:
-    """Write the problem sheet and its matrices into ``folder``; returns the reference standard deviation of each
+def write(output_folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet and its matrices into ``output_folder``; returns the reference standard deviation of each
     output."""
     problem = ride.problem()
     vehicle = problem.vehicle
     write_matrices(
-        folder,
+        output_folder,
         "ride",
         {
             "M": vehicle.mass,
@@ -35,7 +35,7 @@ def write(folder: Path) -> list[ReferenceValue]:
         for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)
     ]
     write_page(
-        folder,
+        output_folder,
         "ride",
         f"Standard deviations of a passenger car of 19 freedoms at {ride.SPEED:g} m/s",
         _sheet_text(problem),
