@@ -90,7 +90,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     seeds = QUICK_SEEDS if quick else range(SCENE_COUNT)
     choices = [
         judged_choice_of(
-            random_linear_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+            random_linear_ride(seed, TOLERANCE if seed % 2 == 0 else None, with_details=seed % 4 != 0),
             quick or seed < FREQUENCY_JUDGED_COUNT,
         )
         for seed in seeds

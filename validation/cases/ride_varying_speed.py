@@ -76,7 +76,7 @@ def vehicle_and_road(
     """
     spatial = load_vehicle(vehicle_name)
     vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
-    return vehicle, paper_road(vehicle.wheels, cutoff=cutoff)
+    return vehicle, paper_road(vehicle.wheels, cutoff_wavenumber=cutoff)
 
 
 def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
