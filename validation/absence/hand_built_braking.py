@@ -35,9 +35,9 @@ class Truck(NamedTuple):
     y: np.ndarray
     load: np.ndarray
     radius: np.ndarray
-    spin: np.ndarray
+    spin_inertia: np.ndarray
     mass: float
-    inertia: float
+    yaw_inertia: float
     tables: Tables
     cosine: float
     sine: float
@@ -46,7 +46,7 @@ class Truck(NamedTuple):
 class Step(NamedTuple):
     """Length of a time step (s), and the speed (m/s) below which slip angles are computed as at this speed."""
 
-    time: float
+    duration: float
     regularising_speed: float
 
 
@@ -141,7 +141,7 @@ def store_tyre_forces(i, step_input, truck_state, truck, workspace):
         StepInput(
             sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
         ),
-        Wheel(truck.radius[i], truck.spin[i], sign * truck_state.turning[i]),
+        Wheel(truck.radius[i], truck.spin_inertia[i], sign * truck_state.turning[i]),
         Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
     k, cell_share = cell_and_share(tables.slips, abs(slip))
@@ -176,7 +176,7 @@ def accelerations_by_tyres(truck_state, torques_before, torques_after, step, tru
         fx, fy, e, f = report.force_x[i], report.force_y[i], workspace.east[i], workspace.north[i]
         ax, ay = ax + e * fx - f * fy, ay + f * fx + e * fy
         turn += workspace.arm[i] * fx + workspace.side[i] * fy
-    return ax / truck.mass, ay / truck.mass, turn / truck.inertia
+    return ax / truck.mass, ay / truck.mass, turn / truck.yaw_inertia
 
 
 @inlined
@@ -213,7 +213,7 @@ def iterate_accelerations(truck_state, torques, step, truck, workspace):
 @inlined
 def time_of_rest(truck_state, start, step, truck):
     """Time (s) within the step at which the truck comes to rest, or -1 if it still moves at the end."""
-    accelerations, mass, inertia = truck_state.accelerations, truck.mass, truck.inertia
+    accelerations, mass, inertia = truck_state.accelerations, truck.mass, truck.yaw_inertia
     speed = mass * (start[3] * start[3] + start[4] * start[4]) + inertia * start[5] * start[5]
     if speed == 0.0 and not truck_state.turning.any():
         return 0.0
@@ -246,22 +246,22 @@ def advance_truck(truck_state, torques, step, truck, workspace):
     for i in range(4):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     store_wheel_kinematics(truck_state, step.regularising_speed, True, truck, workspace)
-    accelerations = accelerations_by_tyres(truck_state, torques[0], middle, 0.5 * step.time, truck, workspace)
+    accelerations = accelerations_by_tyres(truck_state, torques[0], middle, 0.5 * step.duration, truck, workspace)
     truck_state.accelerations[0], truck_state.accelerations[1], truck_state.accelerations[2] = accelerations
-    rest_time = time_of_rest(truck_state, first, step.time, truck)
+    rest_time = time_of_rest(truck_state, first, step.duration, truck)
     if rest_time >= 0.0:
         advance_state(truck_state, rest_time, workspace)
         truck_state.state[3:], truck_state.turning[:] = 0.0, 0.0
         return rest_time
-    advance_state(truck_state, 0.5 * step.time, workspace)
+    advance_state(truck_state, 0.5 * step.duration, workspace)
     store_wheel_kinematics(truck_state, step.regularising_speed, False, truck, workspace)
-    if not iterate_accelerations(truck_state, torques, step.time, truck, workspace):
+    if not iterate_accelerations(truck_state, torques, step.duration, truck, workspace):
         return -1.0
-    advance_state(truck_state, step.time, workspace)
+    advance_state(truck_state, step.duration, workspace)
     turning = report_of(truck_state.report).turning
     for i in range(4):
         truck_state.turning[i] = turning[i]
-    return step.time
+    return step.duration
 
 
 @lean
@@ -269,7 +269,7 @@ def advance_in_substeps(substep_count, truck_state, torques, step, truck, worksp
     """Advance the truck by one time step in equal substeps. Returns how long (s) it moved, or -1 if the accelerations
     did not converge. The wheels' report becomes the mean over the substeps; locked times are added."""
     rows, sums, ends, time = truck_state.report, truck_state.weighted_sums, workspace.end_torques, 0.0
-    step_part = Step(step.time / substep_count, step.regularising_speed / substep_count)
+    step_part = Step(step.duration / substep_count, step.regularising_speed / substep_count)
     sums[:] = 0.0
     for k in range(substep_count):
         for i in range(4):
@@ -290,7 +290,7 @@ def advance_in_substeps(substep_count, truck_state, torques, step, truck, worksp
             rows[c, i] = sums[c, i] / substep_count
     for i in range(4):
         report.locked[i], report.turning[i] = locked[i], truck_state.turning[i]
-    return step.time
+    return step.duration
 
 
 @njit(cache=True, error_model="numpy")
@@ -311,7 +311,7 @@ def march(truck_state, brake_torques, steps_per_sample, step, truck, workspace, 
                 time_moved = advance_in_substeps(parts, truck_state, torques, step, truck, workspace)
             torques[0] = brake_torques
             used += time_moved
-            if time_moved < step.time:
+            if time_moved < step.duration:
                 break
         record.times[n], record.states[n], record.turning[n] = (
             record.times[n - 1] + used,
@@ -319,7 +319,7 @@ def march(truck_state, brake_torques, steps_per_sample, step, truck, workspace, 
             truck_state.turning,
         )
         record.reports[n] = truck_state.report
-        if time_moved < step.time:
+        if time_moved < step.duration:
             return n + 1 if time_moved >= 0.0 else 0
     return record.times.size
 

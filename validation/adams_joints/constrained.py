@@ -25,8 +25,8 @@ class ConstrainedBody:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self.arm = mechanism.body.position - mechanism.centre
-        self.joint_axes = mechanism.ground.axes.T
+        self.arm = mechanism.body_marker.position - mechanism.centre
+        self.joint_axes = mechanism.ground_marker.axes.T
 
     def start(self) -> np.ndarray:
         """State (14,) at the start. Raises InputError where the joint does not allow the start velocity."""
@@ -92,7 +92,7 @@ class ConstrainedBody:
 
     def _constraints(self, body_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix (c, 6) of the joint's constraints on the accelerations, and its right-hand side (c,)."""
-        kind, turning = self.mechanism.kind, body_state[ANGULAR_VELOCITY]
+        kind, turning = self.mechanism.joint_kind, body_state[ANGULAR_VELOCITY]
         rotation = _rotation_matrix(body_state[QUATERNION])
         arm = rotation @ self.arm
         point = np.hstack([np.eye(3), -_skew_matrix(arm)])
@@ -108,12 +108,12 @@ class ConstrainedBody:
         if kind == "spherical":
             return point, bent
         if kind == "universal":
-            on_body = rotation @ self.mechanism.body.axes[:, 2]
+            on_body = rotation @ self.mechanism.body_marker.axes[:, 2]
             row = _vector_product(on_body, axes[2]) @ turn
             swing = -axes[2] @ _vector_product(turning, _vector_product(turning, on_body))
             return np.vstack([point, row]), np.append(bent, swing)
         if kind == "distance":
-            offset = body_state[POSITION] + arm - self.mechanism.ground.position
+            offset = body_state[POSITION] + arm - self.mechanism.ground_marker.position
             speed = body_state[VELOCITY] + _vector_product(turning, arm)
             return (offset @ point)[None], np.array([offset @ bent - speed @ speed])
         return np.empty((0, 6)), np.empty(0)

@@ -42,8 +42,8 @@ class JointTree:
         """Vehicle description of the mechanism: its joints as massless bodies, then the body at its centre."""
         m = self.mechanism
         ground, end = (
-            _vector_of(self.to_vehicle_axes(m.ground.position)),
-            _vector_of(self.to_vehicle_axes(m.body.position)),
+            _vector_of(self.to_vehicle_axes(m.ground_marker.position)),
+            _vector_of(self.to_vehicle_axes(m.body_marker.position)),
         )
         joint_bodies = {
             "revolute": [Body("joint", 0.0, end, ("rz",))],
@@ -56,7 +56,7 @@ class JointTree:
                 Body("joint", 0.0, end, ("rx", "ry", "rz"), parent="rod"),
             ],
             "free": [Body("joint", 0.0, _vector_of(self.to_vehicle_axes(m.centre)), FREEDOMS)],
-        }[m.kind]
+        }[m.joint_kind]
         inertia = self.axes.T @ m.inertia @ self.axes
         rows = tuple(_vector_of(row) for row in 0.5 * (inertia + inertia.T))
         body = Body(
@@ -139,19 +139,21 @@ def joint_tree(mechanism: Mechanism, body_path: BodyMotion) -> JointTree:
 
 def _candidate_axes(mechanism: Mechanism) -> list[np.ndarray]:
     """Candidate axes (3, 3) for the chain of joints, as columns."""
-    if mechanism.kind in ("revolute", "prismatic", "cylindrical"):
-        return [mechanism.ground.axes]
-    if mechanism.kind == "universal":
-        x, y = mechanism.ground.axes[:, 2], mechanism.body.axes[:, 2]
+    if mechanism.joint_kind in ("revolute", "prismatic", "cylindrical"):
+        return [mechanism.ground_marker.axes]
+    if mechanism.joint_kind == "universal":
+        x, y = mechanism.ground_marker.axes[:, 2], mechanism.body_marker.axes[:, 2]
         return [np.column_stack([x, y, np.cross(x, y)])]
-    arm = (mechanism.body.position if mechanism.kind == "distance" else mechanism.centre) - mechanism.ground.position
+    arm = (
+        mechanism.body_marker.position if mechanism.joint_kind == "distance" else mechanism.centre
+    ) - mechanism.ground_marker.position
     arm_direction = arm / np.linalg.norm(arm) if np.linalg.norm(arm) > 0.0 else np.array([0.0, 0.0, 1.0])
     side = np.cross(arm_direction, mechanism.gravity)
     if np.linalg.norm(side) < 1e-6 * (1.0 + np.linalg.norm(mechanism.gravity)):
         side = np.cross(arm_direction, np.eye(3)[np.argmin(np.abs(arm_direction))])
     x = side / np.linalg.norm(side)
     base = np.column_stack([x, np.cross(arm_direction, x), arm_direction])
-    if mechanism.kind == "distance":
+    if mechanism.joint_kind == "distance":
         return [base, np.column_stack([base[:, 1], -base[:, 0], base[:, 2]])]
     return [np.roll(base, shift, axis=1) for shift in range(3)]
 
@@ -159,14 +161,14 @@ def _candidate_axes(mechanism: Mechanism) -> list[np.ndarray]:
 def _least_hinge_cosine(chain_of_joints: JointTree, body_path: BodyMotion) -> float:
     """Least cosine of the second hinge's angle of a ball joint or rod along a path: 0 at the hinges' singularity, 1
     where the mechanism has no such hinge."""
-    if chain_of_joints.mechanism.kind not in ("spherical", "free", "distance"):
+    if chain_of_joints.mechanism.joint_kind not in ("spherical", "free", "distance"):
         return 1.0
     rotation = chain_of_joints.axes.T @ body_path.rotation @ chain_of_joints.axes
-    if chain_of_joints.mechanism.kind != "distance":
+    if chain_of_joints.mechanism.joint_kind != "distance":
         return float(np.sqrt(1.0 - np.minimum(rotation[:, 0, 2] ** 2, 1.0)).min())
     m = chain_of_joints.mechanism
-    end = body_path.position + body_path.rotation @ (m.body.position - m.centre)
-    d = (end - m.ground.position) @ chain_of_joints.axes / m.length
+    end = body_path.position + body_path.rotation @ (m.body_marker.position - m.centre)
+    d = (end - m.ground_marker.position) @ chain_of_joints.axes / m.rod_length
     of_rod = np.sqrt(np.maximum(1.0 - d[:, 0] ** 2, 0.0))
     tilt = np.arctan2(-d[:, 1], d[:, 2])
     first = np.column_stack([of_rod, d[:, 0] * np.sin(tilt), -d[:, 0] * np.cos(tilt)])  # the rod's own x axis

@@ -64,9 +64,9 @@ class Mechanism:
     """A rigid body on a joint. mass (kg), centre (3,) m, inertia (3, 3) kg m^2, axes (3, 3) of the marker at the
     centre; gravity (3,) m/s^2.
 
-    kind, ground, body : the joint and its markers on ground and body; length (m): of a distance joint. velocity (3,)
-    m/s and angular_velocity (3,) rad/s at the start. on_body : whether the joint's first marker, at which the file
-    states reactions, lies on the body.
+    joint_kind, ground_marker, body_marker : the joint and its markers on ground and body; rod_length (m): of a distance
+    joint. velocity (3,) m/s and angular_velocity (3,) rad/s at the start. is_first_marker_on_body : whether the joint's
+    first marker, at which the file states reactions, lies on the body.
     """
 
     mass: float
@@ -74,14 +74,14 @@ class Mechanism:
     inertia: np.ndarray
     axes: np.ndarray
     gravity: np.ndarray
-    kind: Kind
-    ground: Marker
-    body: Marker
-    length: float
+    joint_kind: Kind
+    ground_marker: Marker
+    body_marker: Marker
+    rod_length: float
     springs: tuple[Spring, ...]
     velocity: np.ndarray
     angular_velocity: np.ndarray
-    on_body: bool = False
+    is_first_marker_on_body: bool = False
 
     def with_spring(self, **spring_parameters: float) -> "Mechanism":
         """A copy of the mechanism with parameters of its only spring replaced."""
@@ -94,7 +94,7 @@ class Mechanism:
         return replace(
             self,
             centre=self.centre + displacement,
-            body=replace(self.body, position=self.body.position + displacement),
+            body_marker=replace(self.body_marker, position=self.body_marker.position + displacement),
             springs=tuple(replace(spring, body_point=spring.body_point + displacement) for spring in self.springs),
         )
 
@@ -118,7 +118,7 @@ class _MechanismReader:
             raise InputError(
                 file_name, "PART", part_counts, "must be one GROUND and one body: other counts are not supported"
             )
-        self.ground, self.part = grounds[0], bodies[0]
+        self.ground_marker, self.part = grounds[0], bodies[0]
         self.markers = {
             part_statement.number: self._marker(part_statement, parts)
             for part_statement in self.statements_named("MARKER")
@@ -145,11 +145,11 @@ class _MechanismReader:
     ) -> tuple[Marker, Marker]:
         """Two markers given by their numbers, sorted: first the marker on the ground, then the marker on the body."""
         marker_pair = self.marker(statement, first_marker_number), self.marker(statement, second_marker_number)
-        if {marker.part for marker in marker_pair} != {self.ground.number, self.part.number}:
+        if {marker.part for marker in marker_pair} != {self.ground_marker.number, self.part.number}:
             raise statement.refuse(
                 "", [first_marker_number, second_marker_number], "must be a marker of the ground and one of the body"
             )
-        return marker_pair if marker_pair[0].part == self.ground.number else marker_pair[::-1]
+        return marker_pair if marker_pair[0].part == self.ground_marker.number else marker_pair[::-1]
 
     def mechanism(self) -> Mechanism:
         body_part = self.part
@@ -169,16 +169,16 @@ class _MechanismReader:
             inertia=centre.axes @ inertia_at_marker @ centre.axes.T,
             axes=centre.axes,
             gravity=np.array(gravity),
-            kind=kind,
-            ground=ground,
-            body=body,
-            length=length,
+            joint_kind=kind,
+            ground_marker=ground,
+            body_marker=body,
+            rod_length=length,
             springs=tuple(
                 self._spring(spring_statement, kind, ground)
                 for spring_statement in self.statements_named("SFORCE", "SPRINGDAMPER")
             ),
             velocity=np.array([body_part.numbers(f"V{axis}", (0.0,))[0] for axis in "XYZ"]),
-            on_body=any(
+            is_first_marker_on_body=any(
                 self.marker(j, j.reference("I")).part == body_part.number for j in self.statements_named("JOINT")
             ),
             angular_velocity=centre.axes @ [body_part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
@@ -193,7 +193,7 @@ class _MechanismReader:
                 self.ground_and_body_markers(s, s.reference("I"), s.reference("J"))
                 for s in self.statements_named("SFORCE", "SPRINGDAMPER")
             ]
-            origin = Marker(self.ground.number, np.zeros(3), np.eye(3))
+            origin = Marker(self.ground_marker.number, np.zeros(3), np.eye(3))
             return "free", (springs[0][0] if springs else origin, centre_marker), 0.0
         (joint,) = joints
         if joint.name == "GCON":
@@ -204,7 +204,7 @@ class _MechanismReader:
         ends = self.ground_and_body_markers(joint, joint.reference("I"), joint.reference("J"))
         first = self.marker(joint, joint.reference("I"))
         if kind == "universal":
-            ends = _crossed_markers(*ends, first.part == self.ground.number)
+            ends = _crossed_markers(*ends, first.part == self.ground_marker.number)
         _check_assembled(joint, kind, *ends)
         return kind, ends, 0.0
 

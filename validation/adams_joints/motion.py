@@ -45,10 +45,10 @@ def reaction_about_marker(
     mechanism: Mechanism, body_motion: BodyMotion, force: np.ndarray, moment: np.ndarray
 ) -> Reaction:
     """Reaction about the joint's marker, from the force and moment (m, 3) that act on the body about its centre."""
-    if mechanism.on_body:
-        arm = np.einsum("mij,j->mi", body_motion.rotation, mechanism.centre - mechanism.body.position)
+    if mechanism.is_first_marker_on_body:
+        arm = np.einsum("mij,j->mi", body_motion.rotation, mechanism.centre - mechanism.body_marker.position)
         return Reaction(force, moment + np.cross(arm, force))
-    return Reaction(-force, -moment - np.cross(body_motion.position - mechanism.ground.position, force))
+    return Reaction(-force, -moment - np.cross(body_motion.position - mechanism.ground_marker.position, force))
 
 
 def marker_axes(mechanism: Mechanism, body_motion: BodyMotion) -> np.ndarray:

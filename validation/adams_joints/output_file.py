@@ -18,17 +18,17 @@ COLUMN_GROUPS = {"Pos": 3, "Quat": 4, "Vel": 3, "Avel": 3, "Acc": 3, "Aacc": 3, 
 
 @dataclass(frozen=True, eq=False)
 class OutputFile:
-    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in COLUMN_GROUPS; digits: number
-    of significant digits in the file."""
+    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in COLUMN_GROUPS; digit_count:
+    number of significant digits in the file."""
 
     times: np.ndarray
     columns: dict[str, np.ndarray]
-    digits: int
+    digit_count: int
 
     def rounding_error(self, column_group: str) -> np.ndarray:
         """Largest rounding error (m, 3 or 4) of the numbers of a column group: half of their last digit."""
         size = np.maximum(np.abs(self.columns[column_group]), 1e-30)
-        return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digits + 1)
+        return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digit_count + 1)
 
     def motion(self, mechanism: Mechanism) -> BodyMotion:
         """Motion of the body as stated in the file."""

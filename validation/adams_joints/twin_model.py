@@ -50,7 +50,7 @@ def _numbers_text(numbers: np.ndarray) -> str:
 
 def _joints(mechanism: Mechanism, torsion_springs: list[Spring]) -> str:
     """MJCF text of the body's joints, in the order in which they act. Raises Refused where MJCF has no such joint."""
-    first, second = mechanism.ground.axes[:, 2], mechanism.body.axes[:, 2]
+    first, second = mechanism.ground_marker.axes[:, 2], mechanism.body_marker.axes[:, 2]
     kinds = {
         "revolute": [(HINGE, first)],
         "prismatic": [(SLIDE, first)],
@@ -59,17 +59,17 @@ def _joints(mechanism: Mechanism, torsion_springs: list[Spring]) -> str:
         "universal": [(HINGE, first), (HINGE, second)],
         "free": [("free", first)],
     }
-    if mechanism.kind not in kinds:
-        raise Refused(mechanism.kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
+    if mechanism.joint_kind not in kinds:
+        raise Refused(mechanism.joint_kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
     law = "".join(
         f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.free_length!r}"' for s in torsion_springs
     )
-    anchor = mechanism.body.position - mechanism.centre
+    anchor = mechanism.body_marker.position - mechanism.centre
     return "".join(
         f'<joint name="{kind} {i}" type="{kind}"/>'
         if kind == "free"
         else f'<joint name="{kind} {i}" type="{kind}" axis="{_numbers_text(axis)}" pos="{_numbers_text(anchor)}"{law}/>'
-        for i, (kind, axis) in enumerate(kinds[mechanism.kind])
+        for i, (kind, axis) in enumerate(kinds[mechanism.joint_kind])
     )
 
 

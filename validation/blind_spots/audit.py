@@ -88,37 +88,37 @@ class FaultFreeTrace:
     """Record of all cases and tests that ran without a planted fault: name -> functions that it ran, its time, and how
     it ended.
 
-    functions : names of all functions, by number; items : cases and tests; the entry "numbers" contains the functions
+    functions : names of all functions, by number; checks : cases and tests; the entry "numbers" contains the functions
     that gave numbers.
     """
 
     functions: list[str]
-    items: dict[str, LogLine]
+    checks: dict[str, LogLine]
 
     @cached_property
     def numbers(self) -> set[str]:
         """Functions that returned or wrote a number in any case or test."""
-        return {name for item in self.items.values() for name in item["numbers"]}
+        return {name for item in self.checks.values() for name in item["numbers"]}
 
     def callers(self, function_name: str, by_judges: bool) -> list[str]:
         """Names of the judges (cases and tests with independent grounds), or of all other cases and tests, in which a
         function gave numbers; the quickest first."""
-        names = (name for name, item in self.items.items() if function_name in item["numbers"])
+        names = (name for name, item in self.checks.items() if function_name in item["numbers"])
         return sorted(
-            (name for name in names if self.is_judge(name) == by_judges), key=lambda name: self.items[name]["seconds"]
+            (name for name in names if self.is_judge(name) == by_judges), key=lambda name: self.checks[name]["seconds"]
         )
 
     def is_judge(self, check_name: str) -> bool:
         """Whether a case or test judges by independent grounds, such as a closed form or a published value."""
-        item = self.items[check_name]
+        item = self.checks[check_name]
         rows = item.get("rows", [{"id": check_name, "independence": item.get("grounds", "")}])
         return any(is_independent(row["id"], row["independence"]) for row in rows)
 
     @cached_property
     def failing_already(self) -> frozenset[str]:
         """Ids of rows and tests that fail already without a planted fault."""
-        rows = (row["id"] for item in self.items.values() for row in item.get("rows", ()) if row["status"] == "failed")
-        return frozenset((*rows, *(name for name, item in self.items.items() if item.get("failed"))))
+        rows = (row["id"] for item in self.checks.values() for row in item.get("rows", ()) if row["status"] == "failed")
+        return frozenset((*rows, *(name for name, item in self.checks.items() if item.get("failed"))))
 
 
 class WorkerPool:
@@ -179,14 +179,14 @@ class FaultChecks:
     """
 
     pool: WorkerPool
-    traced: FaultFreeTrace
+    fault_free_trace: FaultFreeTrace
     by_judges: bool
     engines: Mapping[str, tuple[str, ...]]
 
     def audited_line(self, function_name: str) -> Line:
         """Plant a fault in a function, run the checks in which it gives numbers, and return the table line with the
         checks that notice the fault."""
-        traced, sound = self.traced, self.traced.failing_already
+        traced, sound = self.fault_free_trace, self.fault_free_trace.failing_already
         callers, ended = traced.callers(function_name, self.by_judges), unspoiled_reason(function_name, traced)
         if ended or not callers:
             return self.line(function_name, ended or "whole", len(callers), len(callers))
@@ -384,7 +384,7 @@ def unspoiled_reason(function_name: str, fault_free_trace: FaultFreeTrace) -> st
         return "not spoiled"
     if function_name in fault_free_trace.numbers:
         return ""
-    return "no numbers" if any(function_name in item["ran"] for item in fault_free_trace.items.values()) else "not run"
+    return "no numbers" if any(function_name in item["ran"] for item in fault_free_trace.checks.values()) else "not run"
 
 
 def _failed_rows(log_lines: list[LogLine]) -> Iterator[tuple[str, str]]:

@@ -18,23 +18,23 @@ CONTROLLERS = ("none", "none", "slip_bang_bang", "acceleration_phases", "five_ph
 class Draw:
     """Random generator of numbers and choices for scenes."""
 
-    random: np.random.Generator
+    generator: np.random.Generator
 
     def within(self, lower_limit: float, upper_limit: float) -> float:
         """A random number, uniformly distributed between two limits."""
-        return float(self.random.uniform(lower_limit, upper_limit))
+        return float(self.generator.uniform(lower_limit, upper_limit))
 
     def integer(self, lower_limit: int, upper_limit: int) -> int:
         """A random integer from lower_limit to upper_limit - 1."""
-        return int(self.random.integers(lower_limit, upper_limit))
+        return int(self.generator.integers(lower_limit, upper_limit))
 
     def choice(self, *choices: Any) -> Any:
         """A random element of ``choices``, all equally likely."""
-        return self.random.choice(choices).item()
+        return self.generator.choice(choices).item()
 
     def chance(self, probability: float) -> bool:
         """True with a given probability."""
-        return bool(self.random.random() < probability)
+        return bool(self.generator.random() < probability)
 
 
 def random_stop(seed: int, scene_number: int) -> dict[str, Any]:

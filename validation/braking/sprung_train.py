@@ -37,8 +37,8 @@ class PulledCaravan:
     force (N) by which the caravan pulls at the tow ball."""
 
     deceleration: float
-    load: float
-    pull: float
+    axle_load: float
+    ball_force: float
 
 
 def locked_stop_and_closed_form(speed: float = 1.5) -> tuple[float, float]:
@@ -120,6 +120,6 @@ def relative_difference(measured_pull: PulledCaravan, expected_pull: PulledCarav
     """Relative difference of each quantity: the run's value divided by the expected value, minus 1."""
     return PulledCaravan(
         measured_pull.deceleration / expected_pull.deceleration - 1.0,
-        measured_pull.load / expected_pull.load - 1.0,
-        measured_pull.pull / expected_pull.pull - 1.0,
+        measured_pull.axle_load / expected_pull.axle_load - 1.0,
+        measured_pull.ball_force / expected_pull.ball_force - 1.0,
     )

@@ -16,13 +16,15 @@ TOLERANCES = (0.02, 0.005, 0.05)
 class ChoiceQuestion:
     """A random scene, as a table, with the quantities and the tolerance for which effects are to be chosen."""
 
-    table: dict[str, Any]
+    scene_table: dict[str, Any]
     quantities: tuple[str, ...]
     tolerance: float
 
     def scene(self) -> Any:
         """Scene built from the table."""
-        return import_module(SYSTEMS[self.table.get("system", "pitch-plane")].scene).build(self.table, "drawn")
+        return import_module(SYSTEMS[self.scene_table.get("system", "pitch-plane")].scene).build(
+            self.scene_table, "drawn"
+        )
 
 
 def draw_scene(system_name: str, seed: int) -> ChoiceQuestion:

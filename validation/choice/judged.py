@@ -95,7 +95,7 @@ class ChoiceCheckedByRuns:
 
     system: str
     engine: str
-    asked: ChoiceQuestion | NonlinearRide
+    question: ChoiceQuestion | NonlinearRide
     choice: ChoiceByRuns
     repeated_changes: np.ndarray
 
@@ -103,7 +103,7 @@ class ChoiceCheckedByRuns:
     def is_honest(self) -> bool:
         """False if the choice claims to keep the tolerance and the further runs exceed it."""
         return not self.choice.within_tolerance or bool(
-            (self.repeated_changes <= self.asked.tolerance * (1 + 1e-9)).all()
+            (self.repeated_changes <= self.question.tolerance * (1 + 1e-9)).all()
         )
 
 

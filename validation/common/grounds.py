@@ -22,10 +22,10 @@ ANY_ASSUMPTION = ""
 
 @dataclass(frozen=True)
 class Breach:
-    """An assumption that a run broke. run: title and engine; permission: reason why this is allowed, "" if it is
+    """An assumption that a run broke. run_name: title and engine; permission: reason why this is allowed, "" if it is
     not."""
 
-    run: str
+    run_name: str
     assumption: BrokenAssumption
     permission: str
 
@@ -70,7 +70,7 @@ class Grounds:
 def _assumption_text(similar_breaches: list[Breach]) -> str:
     worst = max(similar_breaches, key=lambda breach: breach.assumption.share)
     runs = f"{len(similar_breaches)} runs, the longest " if len(similar_breaches) > 1 else ""
-    return f"{worst.assumption.fact()} ({runs}{worst.run}){f': {worst.permission}' if worst.permission else ''}"
+    return f"{worst.assumption.fact()} ({runs}{worst.run_name}){f': {worst.permission}' if worst.permission else ''}"
 
 
 _CURRENT_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)

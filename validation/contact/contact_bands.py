@@ -37,16 +37,16 @@ class TheoryErrors:
     """Forces of a contact theory and their errors against the exact theory: force (n, 2) divided by mu N, moment (n,)
     divided by mu N times the longer semi-axis.
 
-    error, moment_error (n,) : of force and moment, in the same units; spin_share (n,) : share of spin in the creepage;
-    group (n,) : numbers by ``groups_of_contacts``.
+    force_error, moment_error (n,) : of force and moment, in the same units; spin_share (n,) : share of spin in the
+    creepage; group_number (n,) : numbers by ``groups_of_contacts``.
     """
 
     force: Array
     moment: Array
-    error: Array
+    force_error: Array
     moment_error: Array
     spin_share: Array
-    group: Array
+    group_number: Array
 
     @property
     def used_friction(self) -> Array:
@@ -122,7 +122,7 @@ def shares_within_bands(theory_name: str, theory_errors_of_contacts: TheoryError
     return (
         float(
             np.mean(
-                theory_errors_of_contacts.error
+                theory_errors_of_contacts.force_error
                 <= band(theory_name, theory_errors_of_contacts.used_friction, theory_errors_of_contacts.spin_share)
             )
         ),
@@ -139,7 +139,7 @@ def measured_bands(
     within = [(used_friction >= low) & (used_friction <= high) for low, high in zip(ends, ends[2:], strict=False)]
     kinds = theory_errors_of_contacts.spin_share < 0.5, theory_errors_of_contacts.spin_share >= 0.5
     return tuple(
-        [_largest_quantile(relative_errors, rows & some, theory_errors_of_contacts.group) for some in within]
+        [_largest_quantile(relative_errors, rows & some, theory_errors_of_contacts.group_number) for some in within]
         for rows in kinds
     )
 

@@ -53,13 +53,13 @@ class PlainBodies:
 
     x: Array
     y: Array
-    height: Array
+    heights: Array
     bottom: tuple[float, float]
 
     @cached_property
     def padded(self) -> Array:
         """Heights with one extrapolated node added on every side."""
-        return extrapolated_rows(extrapolated_rows(self.height).T).T
+        return extrapolated_rows(extrapolated_rows(self.heights).T).T
 
     def line(self, y: float, derivative_order: int = 0) -> CubicHermiteSpline:
         """Spline over x of the undeformed distance at a position y, or of its y derivative of an order."""
@@ -79,7 +79,7 @@ class PlainBodies:
     def valleys(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """For lines across x and across y: their positions (two per node spacing, and one through the lowest point),
         and the square root of each line's least distance above the lowest point."""
-        swapped = PlainBodies(self.y, self.x, self.height.T, self.bottom[::-1])
+        swapped = PlainBodies(self.y, self.x, self.heights.T, self.bottom[::-1])
         return swapped._valley(), self._valley()
 
     def _valley(self) -> tuple[Array, Array]:
@@ -141,7 +141,7 @@ class PlainPatch:
     stiffness: float
     approach: float
     box: Box
-    cover: Array
+    coverage: Array
 
     @property
     def load(self) -> float:
@@ -227,8 +227,8 @@ class Strips:
     (strips, cells) in Pa from the leading edge back."""
 
     y: Array
-    low: Array
-    high: Array
+    lower_x: Array
+    upper_x: Array
     width: float
     pressure: Array
 
@@ -258,7 +258,7 @@ def strip_tractions(
     creepages_and_spin: creepages xi_x, xi_y, spin (1/m)."""
     xi_x, xi_y, spin = creepages_and_spin
     tractions, slips = np.zeros(patch_strips.pressure.shape, complex), np.zeros(patch_strips.pressure.shape, bool)
-    for s, (y, low, high) in enumerate(zip(patch_strips.y, patch_strips.low, patch_strips.high, strict=True)):
+    for s, (y, low, high) in enumerate(zip(patch_strips.y, patch_strips.lower_x, patch_strips.upper_x, strict=True)):
         n = patch_strips.pressure.shape[1]
         dx, p, slipping, before = (high - low) / n, 0j, False, 0.0
         for i, bound in enumerate(mu * patch_strips.pressure[s]):
@@ -286,8 +286,10 @@ def mean_tractions(patch_strips: Strips, tractions: Array, grid_box: Box, cell_c
         np.linspace(*grid_box[2:], cell_count + 1),
     )
     cells = (
-        patch_strips.high[:, None]
-        - np.arange(tractions.shape[1] + 1) * (patch_strips.high - patch_strips.low)[:, None] / tractions.shape[1]
+        patch_strips.upper_x[:, None]
+        - np.arange(tractions.shape[1] + 1)
+        * (patch_strips.upper_x - patch_strips.lower_x)[:, None]
+        / tractions.shape[1]
     )
     along = np.array([_common_lengths(row[1:], row[:-1], np.linspace(*grid_box[:2], cell_count + 1)) for row in cells])
     mean = (
@@ -312,7 +314,7 @@ def fitted_flexibility(
     u = np.array(
         [sum(surface_displacement(p[m], step, material_pair, np.array([k, m])) for m in range(2)) for k in range(2)]
     )
-    return fitted_slopes(u, p, patch.cover, step, solver_options)
+    return fitted_slopes(u, p, patch.coverage, step, solver_options)
 
 
 def _common_lengths(interval_starts: Array, interval_ends: Array, segment_edges: Array) -> Array:
@@ -339,7 +341,7 @@ def roll(
     first, _ = strip_tractions(net, mu, 1.0 / patch.stiffness, creepages_and_spin)
     flexibility = fitted_flexibility(patch, net, first, material_pair, solver_options)
     p, slips = strip_tractions(net, mu, flexibility, creepages_and_spin)
-    area = ((net.high - net.low) / cell_count * net.width)[:, None] * np.ones(cell_count)
-    x = np.array([interval_midpoints(b, a, cell_count) for a, b in zip(net.low, net.high, strict=True)])
+    area = ((net.upper_x - net.lower_x) / cell_count * net.width)[:, None] * np.ones(cell_count)
+    x = np.array([interval_midpoints(b, a, cell_count) for a, b in zip(net.lower_x, net.upper_x, strict=True)])
     force, turn = np.sum(p * area), np.sum((x * p.imag - net.y[:, None] * p.real) * area)
     return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), flexibility

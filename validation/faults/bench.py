@@ -56,13 +56,13 @@ def bench_scene(parameter_set: str, duration: float) -> Scene:
 class Bench:
     """A vehicle, named by its parameter set, in several situations of a duration (s), for checks on planted faults."""
 
-    parameters: str
+    parameter_set: str
     duration: float
 
     @cached_property
     def road(self) -> Assembly:
         """The vehicle on the study road."""
-        return assembly_of_scene(bench_scene(self.parameters, self.duration))
+        return assembly_of_scene(bench_scene(self.parameter_set, self.duration))
 
     @cached_property
     def flat_road(self) -> Assembly:

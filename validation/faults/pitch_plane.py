@@ -48,7 +48,7 @@ def measure(
 def _error_ratios(engine_fault: EngineFault, benches: list[Bench]) -> Saved:
     """Record of a fault: ratio of error to tolerance by vehicle, engine and check; None for a refused or failed run."""
     ratios = {
-        bench.parameters: {
+        bench.parameter_set: {
             engine: {name: _error_ratio(engine_fault, engine, name, bench) for name in CHECKS}
             for engine in engine_fault.engines
         }

@@ -31,21 +31,21 @@ WORKERS = (2, 10, 100, 1000)
 
 @dataclass(frozen=True)
 class Ensemble:
-    """An ensemble that is computed in blocks. block: number of paths in each; thinning_factor: factor by which workers
-    thin the time rows that they send back."""
+    """An ensemble that is computed in blocks. paths_per_block: number of paths in each; thinning_factor: factor by
+    which workers thin the time rows that they send back."""
 
-    block: int = 50
+    paths_per_block: int = 50
     thinning_factor: int = 1
 
     @property
     def block_seconds(self) -> float:
         """Computing time (s) of a block on a worker."""
-        return self.block * PATH_SECONDS
+        return self.paths_per_block * PATH_SECONDS
 
     @property
     def result_bytes(self) -> float:
         """Size (bytes) of the result that a worker sends back for a block."""
-        return self.block * PATH_BYTES / self.thinning_factor
+        return self.paths_per_block * PATH_BYTES / self.thinning_factor
 
     @property
     def station_times(self) -> dict[str, float]:

@@ -51,8 +51,8 @@ class TwoBuilds:
     """A vehicle built twice: by its system's builder, and by the builder of free vehicles. ``sign`` : sign of the free
     vehicle's coordinates relative to those of the system."""
 
-    system: Any
-    free: FreeModel
+    system_model: Any
+    free_model: FreeModel
     sign: float = 1.0
 
     def gap(self, state_count: int) -> float:
@@ -60,9 +60,9 @@ class TwoBuilds:
         of the state."""
         rng, worst = np.random.default_rng(SEED), 0.0
         for _ in range(state_count):
-            q, v = rng.uniform(-0.05, 0.05, self.free.size), rng.uniform(-0.5, 0.5, self.free.size)
-            expected = self.system.acceleration(0.0, q, v)
-            free = self.sign * self.free.acceleration(0.0, self.sign * q, self.sign * v)
+            q, v = rng.uniform(-0.05, 0.05, self.free_model.size), rng.uniform(-0.5, 0.5, self.free_model.size)
+            expected = self.system_model.acceleration(0.0, q, v)
+            free = self.sign * self.free_model.acceleration(0.0, self.sign * q, self.sign * v)
             worst = max(worst, float(np.abs(free - expected).max() / np.abs(expected).max()))
         return worst
 
@@ -178,10 +178,10 @@ def time_ratios(round_count: int, minimum_seconds: float) -> dict[str, tuple[flo
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
         for system, sides in (("ride", ride_builds(engine)), ("pitch plane", pitch_plane_builds(engine))):
-            jobs += [sides.system.run, sides.free.run]
+            jobs += [sides.system_model.run, sides.free_model.run]
             names.append(f"{system}, {engine}: the free builder to today's")
     with single_tree_context():
-        jobs += [ride_builds("exudyn").system.run]
+        jobs += [ride_builds("exudyn").system_model.run]
     seconds = interleave(jobs, round_count, minimum_seconds, clock=time.process_time)
     ratios = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
     return ratios | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}

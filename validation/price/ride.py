@@ -64,7 +64,7 @@ class PricedRide:
 
     vehicle: LinearVehicle
     roads: dict[str, Excitation]
-    truth: np.ndarray
+    true_deviations: np.ndarray
     uncertainty: float
 
     @property
@@ -74,7 +74,7 @@ class PricedRide:
 
     def errors(self, computed_deviations: np.ndarray) -> dict[str, float]:
         """Largest relative error of computed standard deviations (p,), by kind of output."""
-        relative_errors = np.abs(computed_deviations / self.truth - 1.0)
+        relative_errors = np.abs(computed_deviations / self.true_deviations - 1.0)
         return {
             name: float(max(e for e, o in zip(relative_errors, self.vehicle.outputs, strict=True) if o.kind == kind))
             for name, kind in OUTPUT_KINDS.items()
@@ -140,7 +140,10 @@ def measure_routes(is_quick: bool, round_count: int, minimum_seconds: float) -> 
         )
         start_time = time.perf_counter()
         estimate: VarianceEstimate = jobs[-1]()
-        errors, z = ride.errors(np.sqrt(estimate.variance[0])), float(np.abs(estimate.z(ride.truth[None])).max())
+        errors, z = (
+            ride.errors(np.sqrt(estimate.variance[0])),
+            float(np.abs(estimate.z(ride.true_deviations[None])).max()),
+        )
         name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - start_time
         points.append(RoutePoint(name, "copies", copies, errors, seconds, z))
     quick_points = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]

@@ -65,17 +65,17 @@ def compute_in_two_processes(process_pools: list[Executor], noise_ensemble: Any)
 
 @dataclass(frozen=True)
 class Sender:
-    """Ensemble job that computes nothing and sends back ``numbers`` zeros per path."""
+    """Ensemble job that computes nothing and sends back ``numbers_per_path`` zeros per path."""
 
-    numbers: int
+    numbers_per_path: int
 
     def __call__(self, path_range: range) -> dict[str, np.ndarray]:
         """Array "x" (paths, numbers) of zeros."""
-        return {"x": np.zeros((len(path_range), self.numbers))}
+        return {"x": np.zeros((len(path_range), self.numbers_per_path))}
 
     def facts(self) -> dict[str, Any]:
         """Settings on which the result of a block depends."""
-        return {"numbers": self.numbers}
+        return {"numbers": self.numbers_per_path}
 
 
 def cost_of_blocks(executor: Executor) -> dict[int, float]:

@@ -39,7 +39,7 @@ class PlainAxle(NamedTuple):
     velocity: np.ndarray
     axle: np.ndarray
     forward: np.ndarray
-    turning: np.ndarray
+    angular_velocity: np.ndarray
 
 
 class PatchForces(NamedTuple):
@@ -144,9 +144,9 @@ def patch_forces(
     """Force and moment of a rail on the wheelset, by a creep law; wheel_side : 1 right, -1 left."""
     w, speed, touch = wheelset, axle_motion.velocity[0], contact_of_wheel(wheelset, wheel_side, axle_motion)
     across = np.cross(touch.normal, np.array([1.0, 0.0, 0.0]))
-    velocity = axle_motion.velocity + np.cross(axle_motion.turning, touch.position)
+    velocity = axle_motion.velocity + np.cross(axle_motion.angular_velocity, touch.position)
     slip, approach = (
-        np.array([velocity[0], velocity @ across, axle_motion.turning @ touch.normal]),
+        np.array([velocity[0], velocity @ across, axle_motion.angular_velocity @ touch.normal]),
         velocity @ touch.normal,
     )
     elastic, a, b = hertz_force(touch.depth, touch.curvature_along, 0.5 / w.head_radius, w.material_pair.modulus)
@@ -223,7 +223,7 @@ class PlainWheelset:
         for side in (1.0, -1.0):
             arm = side * w.half_spacing * axle.axle
             extension = axle.centre + arm - np.array([0.0, side * w.half_spacing, self.approach_at_rest])
-            pull = -stiffness * extension - damping * (moving + np.cross(axle.turning, arm))
+            pull = -stiffness * extension - damping * (moving + np.cross(axle.angular_velocity, arm))
             force, moment = force + pull, moment + np.cross(arm, pull)
         return force, moment
 

@@ -53,9 +53,9 @@ class OddFile:
     """A damaged or unusual file, and what reading it must give.
 
     difficulty : why it is hard to read. make : function that writes it. expected_outcome : see ``ExpectedOutcome``.
-    expected_text : phrase that the refusal or the message must contain. truth : for each channel, times and values; a
-    file whose outcome is "named" may give only the first of them. greedy : whether the file states a huge size, for
-    which no memory may be allocated.
+    expected_text : phrase that the refusal or the message must contain. expected_channels : for each channel, times and
+    values; a file whose outcome is "named" may give only the first of them. is_greedy : whether the file states a huge
+    size, for which no memory may be allocated.
     """
 
     name: str
@@ -63,8 +63,8 @@ class OddFile:
     make: FileMaker
     expected_outcome: ExpectedOutcome
     expected_text: str = ""
-    truth: Truth = field(default_factory=usual_truth)
-    greedy: bool = False
+    expected_channels: Truth = field(default_factory=usual_truth)
+    is_greedy: bool = False
 
     def error(self, work_folder: Path) -> float:
         """Largest difference between the values read and the expected ones; infinite if a channel or a sample is
@@ -85,15 +85,19 @@ class OddFile:
 
     def _measured(self, file_path: Path) -> float:
         """Error of the values read. For a greedy file, time and memory are limited to those of a small file."""
-        if not self.greedy:
+        if not self.is_greedy:
             return reading_error(
-                open_source(file_path), self.truth, self.expected_text if self.expected_outcome == "named" else ""
+                open_source(file_path),
+                self.expected_channels,
+                self.expected_text if self.expected_outcome == "named" else "",
             )
         tracemalloc.start()
         began = time.perf_counter()
         try:
             return reading_error(
-                open_source(file_path), self.truth, self.expected_text if self.expected_outcome == "named" else ""
+                open_source(file_path),
+                self.expected_channels,
+                self.expected_text if self.expected_outcome == "named" else "",
             )
         finally:
             peak = tracemalloc.get_traced_memory()[1]

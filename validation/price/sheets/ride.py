@@ -27,12 +27,12 @@ def write(output_folder: Path) -> list[ReferenceValue]:
             **dict(zip("AVPHE", vehicle.read, strict=True)),
         },
     )
-    sure = problem.truth * max(
-        0.5 * problem.uncertainty, float(np.abs(ride.lyapunov_deviations(problem) / problem.truth - 1).max())
+    sure = problem.true_deviations * max(
+        0.5 * problem.uncertainty, float(np.abs(ride.lyapunov_deviations(problem) / problem.true_deviations - 1).max())
     )
     values = [
         ReferenceValue("ride", output.name, output.unit, 0.0, *map(float, known))
-        for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)
+        for output, *known in zip(vehicle.outputs, problem.true_deviations, sure, strict=True)
     ]
     write_page(
         output_folder,
