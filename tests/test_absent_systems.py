@@ -37,7 +37,7 @@ CHEAP = [(system, name) for system in ("contact", "braking") for name in addable
 
 @pytest.mark.parametrize(("system", "effect"), CHEAP)
 def test_an_effect_adds_what_its_file_says(system, effect):
-    found = added_counts(system, effect, quick=True)
+    found = added_counts(system, effect, is_quick=True)
     assert found and found == declared_counts(system, effect, found)
 
 
@@ -49,7 +49,7 @@ def test_a_bare_scene_names_nothing():
 def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
     """Positive control of the comparison: a file that declares too little is found out."""
     monkeypatch.setitem(TABLE, "load_transfer", replace(TABLE["load_transfer"], counts={}))
-    found = added_counts("braking", "load_transfer", quick=True)
+    found = added_counts("braking", "load_transfer", is_quick=True)
     assert found == {"reference": {"moving loads": 4}} != declared_counts("braking", "load_transfer", found)
 
 

@@ -120,7 +120,7 @@ def test_swapped_axis_of_a_universal_joint_is_seen(model):
 def test_pendulum_on_a_skew_axis(model):
     """Start: angular acceleration g' m a / (I + m a^2), with what of gravity and arm is square to the axis."""
     mechanism = model("revolute")
-    axis, arm = mechanism.ground.axes[:, 2], mechanism.centre - mechanism.ground.position
+    axis, arm = mechanism.ground_marker.axes[:, 2], mechanism.centre - mechanism.ground_marker.position
     turning = axis @ np.cross(arm, mechanism.mass * mechanism.gravity)
     inertia = axis @ mechanism.inertia @ axis + mechanism.mass * (arm @ arm - (arm @ axis) ** 2)
     motion, _ = ConstrainedBody(mechanism).run(0.02, 2e-3, 10)
@@ -130,7 +130,7 @@ def test_pendulum_on_a_skew_axis(model):
 def test_start_velocity(model):
     """A turn about the joint's axis is taken; any other is refused by both."""
     mechanism = model("revolute")
-    axis, arm = mechanism.ground.axes[:, 2], mechanism.centre - mechanism.ground.position
+    axis, arm = mechanism.ground_marker.axes[:, 2], mechanism.centre - mechanism.ground_marker.position
     turning = replace(mechanism, angular_velocity=2.0 * axis, velocity=np.cross(2.0 * axis, arm))
     assert compared(turning) < 1e-8
     motion, _ = ConstrainedBody(mechanism).run(0.02, 2e-3, 10)
@@ -240,11 +240,20 @@ def test_a_ball_swings_as_a_hinge_does_and_a_fault_is_seen(model, monkeypatch, t
 def _level_pendulum(mechanism):
     """2 m long and at rest, level: it swings in a plane on a ball as on a hinge about y."""
     place, axes = np.array([2.0, 0.0, 0.0]), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    ground, body = (replace(each, position=np.zeros(3), axes=axes.T) for each in (mechanism.ground, mechanism.body))
+    ground, body = (
+        replace(each, position=np.zeros(3), axes=axes.T) for each in (mechanism.ground_marker, mechanism.body_marker)
+    )
     still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3), "gravity": np.array([0.0, 0.0, -9.80665])}
     inertia = np.diag([0.04, 0.1, 0.1])
     return replace(
-        mechanism, mass=1.0, centre=place, inertia=inertia, axes=np.eye(3), ground=ground, body=body, **still
+        mechanism,
+        mass=1.0,
+        centre=place,
+        inertia=inertia,
+        axes=np.eye(3),
+        ground_marker=ground,
+        body_marker=body,
+        **still,
     )
 
 

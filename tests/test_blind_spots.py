@@ -314,7 +314,7 @@ def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
 @pytest.fixture(scope="module")
 def probes(folder):
     """A process of an audit."""
-    with WorkerPool(folder, workers=1) as started:
+    with WorkerPool(folder, worker_count=1) as started:
         yield started
 
 

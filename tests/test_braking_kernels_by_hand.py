@@ -142,7 +142,7 @@ def test_wheels_at_the_edge_of_locking_bear_the_load_that_just_locks_them(inerti
     plane = plane_of_truck(PAPER_TRUCK)._replace(spin=np.full(4, inertia))
     load = (plane.static - plane.by_x * MU * GRAVITY) * (1.0 - share)  # a little less than behind if all are locked
     torques = np.where(plane.place[:, 0] < 0.0, plane.radius * MU * load, LOCKING)
-    moving = RollingTruck(on_road(plane, falling(), slope=1e-6), speed)
+    moving = RollingTruck(on_road(plane, falling(), cornering_slope=1e-6), speed)
     moving.turning[:] = 0.0
     moving.on(torques, step)
     lift, mass = PAPER_TRUCK.mass * PAPER_TRUCK.height / (2.0 * PAPER_TRUCK.wheelbase), PAPER_TRUCK.mass

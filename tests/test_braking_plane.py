@@ -87,7 +87,7 @@ def test_backwards_is_forwards_seen_from_behind():
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
     own, carried = (
-        RollingTruck(truck_on_tables(), 10.0, steer=0.03, step_function=go).braked(ROLLING, 1e-3, duration=0.5).state
+        RollingTruck(truck_on_tables(), 10.0, steer=0.03, advance_step=go).braked(ROLLING, 1e-3, duration=0.5).state
         for go in (advance, EngineChassis(engine, plane_of_truck(PAPER_TRUCK)).advance)
     )
     assert own[0, 1] > 0.05

@@ -83,8 +83,8 @@ def test_accelerations_are_those_of_plain_code_and_wheels_that_keep_to_the_car_a
 @pytest.mark.grounds("plain counterpart")
 @pytest.mark.parametrize(("name", "lags"), [("train", False), ("caravan", True)])
 def test_a_piece_of_a_stop_is_that_of_plain_code(name, lags):
-    compiled = whole.run(whole.TRAINS[name](), "mujoco", 0.03, lags=lags)
-    assert whole.path_difference(compiled, whole.plain_run(name, 0.03, lags=lags)) < 1e-11
+    compiled = whole.run(whole.TRAINS[name](), "mujoco", 0.03, with_lags=lags)
+    assert whole.path_difference(compiled, whole.plain_run(name, 0.03, with_lags=lags)) < 1e-11
 
 
 def test_springs_of_a_trailer_are_the_engines_own_and_the_table_has_no_more_of_them():

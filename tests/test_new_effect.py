@@ -82,7 +82,7 @@ def test_a_new_effect_of_another_system(new_file, capsys):
     new_file("braking", "slow_chambers", SLOW)
     list_scenes()
     assert "Chambers that are clogged" in capsys.readouterr().out
-    found = added_counts("braking", "slow_chambers", quick=True)
+    found = added_counts("braking", "slow_chambers", is_quick=True)
     assert found == declared_counts("braking", "slow_chambers", ["reference"])
     scene = with_effects(bare_scene("braking"), "slow_chambers")
     assert "effect     slow_chambers" in import_module(SYSTEMS["braking"].plan).describe(scene)

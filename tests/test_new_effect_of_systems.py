@@ -176,14 +176,14 @@ def test_a_new_effect_is_one_file(system, new_file):
         rebuilt_scene(table, scene)
     new_file(system, new.name, new.text)
     assert effect_sentences(system)[new.name] == f"New: {new.name}"
-    assert added_counts(system, new.name, quick=True) == declared_counts(system, new.name, [next(iter(before))])
+    assert added_counts(system, new.name, is_quick=True) == declared_counts(system, new.name, [next(iter(before))])
     own = with_effects(scene, new.name)
     assert f" {new.name}: what {new.name} costs" in import_module(SYSTEMS[system].plan).describe(own)
     _judged(before, counts_and_paths(system, own), new.apart)
     assert scene_without(own, new.name) == scene  # and the very path that it had before there was a file:
     assert all(
         before[engine] == found
-        for engine, found in counts_and_paths(system, scene_without(own, new.name), quick=True).items()
+        for engine, found in counts_and_paths(system, scene_without(own, new.name), is_quick=True).items()
     )
     with pytest.raises(InputError, match=rf"effects.{new.name}.{new.parameter} = -1"):
         rebuilt_scene(table | {"effects": {new.name: {new.parameter: -1.0}}}, scene)

@@ -29,10 +29,10 @@ def test_an_axis_that_turns_with_its_body_is_noticed():
 def test_in_exudyn_it_would_take_every_spring_from_the_engine():
     """Ride has the ground, 6 trees, 2 sliders, 19 springs and the tyres; the free builder the ground and one tree."""
     sides = ride_builds("exudyn")
-    assert sides.free.plan()["native items"] == 2
-    assert sides.system.plan()["native items"] == 29
+    assert sides.free_model.plan()["native items"] == 2
+    assert sides.system_model.plan()["native items"] == 29
     settings = Settings("RK44", STEP, STEP)
     with single_tree_context():
-        joined = one_builder.TwoBuilds(build("exudyn", ride_vehicle(), settings), sides.free)
+        joined = one_builder.TwoBuilds(build("exudyn", ride_vehicle(), settings), sides.free_model)
     assert joined.gap(5) < INSTANT
-    assert joined.system.plan()["native items"] < sides.system.plan()["native items"]
+    assert joined.system_model.plan()["native items"] < sides.system_model.plan()["native items"]

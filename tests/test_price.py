@@ -167,7 +167,7 @@ def test_status(vice, status):
 def test_a_lying_solver_fails_its_row(vice, row):
     for planted, expected in (("none", "passed"), (vice, "failed")):
         problem = PlantedProblem(planted)
-        rows = {one.id: one for one in rows_of(problem, measured_of(problem), quick=False)}
+        rows = {one.id: one for one in rows_of(problem, measured_of(problem), is_quick=False)}
         assert rows[f"price.planted.{row}"].status == expected
     assert "exudyn fourth 1 ms" in rows[f"price.planted.{row}"].quantity, "the row names the offender"
 
@@ -188,7 +188,7 @@ def test_a_run_that_counts_otherwise_when_repeated_fails_its_row():
             return planted
 
     for problem, expected in ((PlantedProblem(), "passed"), (Restless(), "failed")):
-        rows = {one.id: one for one in rows_of(problem, measured_of(problem), quick=True)}
+        rows = {one.id: one for one in rows_of(problem, measured_of(problem), is_quick=True)}
         assert rows["price.planted.counts.repeat"].status == expected
     assert "exudyn first 0.25 ms" in rows["price.planted.counts.repeat"].quantity
 
@@ -218,7 +218,7 @@ def test_a_wrong_order_fails_its_row():
         else cost.WorkPrecisionPoint(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
         for p in measured_of(problem).points
     ]
-    rows = {one.id: one for one in rows_of(problem, with_points(points), quick=True)}
+    rows = {one.id: one for one in rows_of(problem, with_points(points), is_quick=True)}
     assert rows["price.planted.order.force.exudyn-fourth"].status == "failed"
     assert rows["price.planted.order.force.exudyn-first"].status == "passed"
 

@@ -74,5 +74,5 @@ def test_the_effect_of_the_pages_is_one_file(new_file):
     from validation.absence.of_systems import added_counts, declared_counts
 
     new_file("handling", "side_wind", of_page("how-to/own_effect.md", "python", "def extend"))
-    assert added_counts("handling", "side_wind", quick=True) == declared_counts("handling", "side_wind", ["mujoco"])
+    assert added_counts("handling", "side_wind", is_quick=True) == declared_counts("handling", "side_wind", ["mujoco"])
     assert declared_counts("handling", "side_wind", ["mujoco"]) == {"mujoco": {"pushes": 1}}

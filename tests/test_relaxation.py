@@ -119,7 +119,7 @@ def test_slip_angles_on_a_suspension_rise_by_the_way_and_tend_to_those_without_l
 
 @pytest.mark.grounds("plain counterpart")
 def test_a_stop_on_a_suspension_is_that_of_plain_code():
-    found = whole.run(whole.car(), "exudyn", 0.05, lags=True)
-    plain = whole.plain_run("car", 0.05, lags=True)
+    found = whole.run(whole.car(), "exudyn", 0.05, with_lags=True)
+    plain = whole.plain_run("car", 0.05, with_lags=True)
     assert whole.path_difference(found, plain) < 1e-10
     assert whole.path_difference(found, whole.run(whole.car(), "exudyn", 0.05)) > 1e-3

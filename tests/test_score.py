@@ -58,7 +58,7 @@ def place(tmp_path_factory):
 
 
 def run(folder, effects=None, engine="reference", **override):
-    scene = force_scene(folder, duration=DURATION, override=override, effects=effects)
+    scene = force_scene(folder, duration=DURATION, parameter_changes=override, effects=effects)
     return simulate(scene, engine), scene.vehicle_parameters()
 
 

@@ -41,8 +41,8 @@ INSTANT, PATH = 1e-12, 1e-10
 def test_a_cut_car_moves_as_in_mujoco(name):
     vehicle = cut_cars()[name]
     assert cut_car_acceleration_difference(vehicle, "mujoco", 18) < INSTANT
-    assert cut_car_path_difference(vehicle, "mujoco", 0.01, rough_road=True) < PATH
-    assert cut_car_path_difference(vehicle, "mujoco", 0.01, rough_road=False) < PATH
+    assert cut_car_path_difference(vehicle, "mujoco", 0.01, on_rough_road=True) < PATH
+    assert cut_car_path_difference(vehicle, "mujoco", 0.01, on_rough_road=False) < PATH
 
 
 def test_what_is_felt_inside_is_that_of_its_own_state():

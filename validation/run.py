@@ -71,15 +71,15 @@ class Cases:
         """Array "record" (n,): rows and seconds of each of the n cases as JSON text."""
         return _json_array([self.record(self.names[i]) for i in paths])
 
-    def record(self, name: str) -> Saved:
+    def record(self, case_name: str) -> Saved:
         """Measure one case and save its data; returns its rows and seconds. Exceptions of the case pass through."""
         start = time.perf_counter()
-        case = import_module(f"validation.cases.{name}")
+        case = import_module(f"validation.cases.{case_name}")
         with TemporaryDirectory(
             ignore_cleanup_errors=True
         ) as case_folder:  # what cases write to run is no part of the report
-            rows, data = rows_on_grounds(name, partial(case.measure, self.quick, Path(case_folder)))
-        write_whole(self.folder / "data" / f"{name}.json", json.dumps(data).encode())
+            rows, data = rows_on_grounds(case_name, partial(case.measure, self.quick, Path(case_folder)))
+        write_whole(self.folder / "data" / f"{case_name}.json", json.dumps(data).encode())
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
     def facts(self) -> Saved:
@@ -100,68 +100,81 @@ class Cases:
         }
 
 
-def _json_array(records: list[Saved]) -> ArraysByName:
-    return {"record": np.array([json.dumps(record) for record in records])}
+def _json_array(case_records: list[Saved]) -> ArraysByName:
+    return {"record": np.array([json.dumps(record) for record in case_records])}
 
 
 def measured_cases(
-    job: Cases, pool: Executor | None, progress: Callable[[int], None], runs_alone: bool = False
+    cases_to_measure: Cases,
+    executor: Executor | None,
+    report_progress: Callable[[int], None],
+    are_run_alone: bool = False,
 ) -> Outcomes:
     """Rows and computing times (s) of all cases; cases that an earlier, interrupted run finished are read, not measured
     again.
 
-    runs_alone : one after the other; progress : called with the number of finished cases. A case that raises, or whose
-    process dies repeatedly, is a failed row and is measured again in the next run. Raises InputError for a folder of
-    another version or share, RunFailed for a full disk.
+    are_run_alone : one after the other; report_progress : called with the number of finished cases. A case that raises,
+    or whose process dies repeatedly, is a failed row and is measured again in the next run. Raises InputError for a
+    folder of another version or share, RunFailed for a full disk.
     """
 
     def lost(case_numbers: range, reason: str) -> ArraysByName:
         return _json_array(
-            [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in case_numbers]
+            [
+                {"rows": [_row_of_failed_case(cases_to_measure.names[i], reason).as_dict()], "seconds": 0.0}
+                for i in case_numbers
+            ]
         )
 
     store, blocks = (
-        job.folder / FINISHED_CASES / ("alone" if runs_alone else "together"),
-        PathBlocks(1, 1) if runs_alone else PathBlocks(1),
+        cases_to_measure.folder / FINISHED_CASES / ("alone" if are_run_alone else "together"),
+        PathBlocks(1, 1) if are_run_alone else PathBlocks(1),
     )
     record_texts = run_paths(
-        job, len(job.names), store, pool, blocks, lambda progress_count: progress(progress_count.done), lost
+        cases_to_measure,
+        len(cases_to_measure.names),
+        store,
+        executor,
+        blocks,
+        lambda progress_count: report_progress(progress_count.done),
+        lost,
     )["record"]
     records = (json.loads(str(record_text)) for record_text in record_texts)
     return {
         name: ([Row(**row) for row in record["rows"]], record["seconds"])
-        for name, record in zip(job.names, records, strict=True)
+        for name, record in zip(cases_to_measure.names, records, strict=True)
     }
 
 
-def _row_of_failed_case(name: str, reason: str) -> Row:
+def _row_of_failed_case(case_name: str, reason: str) -> Row:
     """Failed row for a case that gave no rows, with the reason."""
-    return failed_row(f"{name}.broken", f"case {name}", reason)
+    return failed_row(f"{case_name}.broken", f"case {case_name}", reason)
 
 
 def validate(
-    folder: Path,
+    output_folder: Path,
     quick: bool,
     command: str,
     earlier_report: Saved | None = None,
-    resumed: bool = False,
-    crew: Crew | None = None,
+    is_resumed: bool = False,
+    worker_crew: Crew | None = None,
 ) -> int:
-    """Measure all validation cases, save results and report in ``folder``; returns the number of failed rows.
+    """Measure all validation cases, save results and report in ``output_folder``; returns the number of failed rows.
 
-    crew : measures the cases that need not be alone; its workers see the folder, too. earlier_report : ``changes.read``
-    of a report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
+    worker_crew : measures the cases that need not be alone; its workers see the folder, too. earlier_report :
+    ``changes.read`` of a report. is_resumed : the folder may hold cases that have ended; the time of them all together
+    is then not known.
     """
     start, start_date = time.perf_counter(), datetime.now(UTC)
-    (folder / "data").mkdir(exist_ok=True)
-    with exclusive_folder(folder), (crew or Crew.given()).at_work(len(CASES), folder) as pool:
-        outcomes = _outcomes_of_cases(pool, quick, folder)
+    (output_folder / "data").mkdir(exist_ok=True)
+    with exclusive_folder(output_folder), (worker_crew or Crew.given()).at_work(len(CASES), output_folder) as pool:
+        outcomes = _outcomes_of_cases(pool, quick, output_folder)
         rows = [row for name in CASES for row in outcomes[name][0]]
         seconds = {name: outcomes[name][1] for name in CASES}
-        wall = None if resumed else time.perf_counter() - start
+        wall = None if is_resumed else time.perf_counter() - start
         source = {**provenance(command), "date": f"{start_date:%Y-%m-%d %H:%M} UTC", "data": _data_text()}
         save(
-            folder,
+            output_folder,
             rows,
             {
                 **source,
@@ -172,7 +185,7 @@ def validate(
             },
             earlier_report,
         )
-        path = _write_report(pool, folder)
+        path = _write_report(pool, output_folder)
     return print_summary(rows, time.perf_counter() - start, path)
 
 
@@ -185,57 +198,57 @@ def _data_text() -> str:
     return f"{len(sizes)} measured files of {sum(sizes) / 1e6:.3g} MB, in the folder that TWINRIG_DATA names"
 
 
-def _outcomes_of_cases(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
+def _outcomes_of_cases(executor: Executor | None, is_quick: bool, output_folder: Path) -> Outcomes:
     """Rows and computing time (s) of every case; cases that may run in parallel are measured first, then those that
     need the machine alone."""
     from rich.console import Console
     from rich.progress import Progress
 
-    names_alone = CASES_ALONE[quick]
+    names_alone = CASES_ALONE[is_quick]
     together = tuple(sorted((name for name in CASES if name not in names_alone), key=_last_duration, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
-        resolved_folder = folder.resolve()
+        resolved_folder = output_folder.resolve()
         first = measured_cases(
-            Cases(together, quick, resolved_folder),
-            pool,
+            Cases(together, is_quick, resolved_folder),
+            executor,
             lambda progress_count: bar.update(task, completed=progress_count),
         )
         return first | measured_cases(
-            Cases(names_alone, quick, resolved_folder),
-            pool,
+            Cases(names_alone, is_quick, resolved_folder),
+            executor,
             lambda progress_count: bar.update(task, completed=len(together) + progress_count),
-            runs_alone=True,
+            are_run_alone=True,
         )
 
 
-def _last_duration(name: str) -> float:
+def _last_duration(case_name: str) -> float:
     """Computing time (s) of a case in the last full report, by which cases are ordered; infinite if unknown."""
-    return float(full_report_data()[name]["seconds"]) if name in full_report_data() else math.inf
+    return float(full_report_data()[case_name]["seconds"]) if case_name in full_report_data() else math.inf
 
 
-def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Value of function(*arguments), computed in a process of the pool, or in this process if one of the pool has
-    died."""
-    if pool is None:
-        return function(*arguments)
+def _value_from_pool(executor: Executor | None, computed_function: Callable[..., Any], *arguments: Any) -> Any:
+    """Value of computed_function(*arguments), computed in a process of the pool, or in this process if one of the pool
+    has died."""
+    if executor is None:
+        return computed_function(*arguments)
     try:
-        return pool.submit(function, *arguments).result()
+        return executor.submit(computed_function, *arguments).result()
     except BrokenProcessPool:
-        return function(*arguments)
+        return computed_function(*arguments)
 
 
-def _write_report(pool: Executor | None, folder: Path) -> Path:
+def _write_report(executor: Executor | None, output_folder: Path) -> Path:
     """Write the report's page and return its path; figures are drawn by the pool, or by this process if one of the pool
     has died."""
     from validation.report.page import write
 
-    if pool is None:
-        return write(folder)
+    if executor is None:
+        return write(output_folder)
     try:
-        return write(folder.resolve(), pool.map)
+        return write(output_folder.resolve(), executor.map)
     except BrokenProcessPool:
-        return write(folder)
+        return write(output_folder)
 
 
 def seeds_of_rows() -> dict[str, int]:
@@ -246,28 +259,30 @@ def seeds_of_rows() -> dict[str, int]:
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
-def save(folder: Path, rows: list[Row], report_source: Saved, earlier_report: Saved | None = None) -> None:
+def save(
+    output_folder: Path, report_rows: list[Row], report_source: Saved, earlier_report: Saved | None = None
+) -> None:
     """Write the rows and their provenance to results.json and results.csv, and print changes since an earlier
     report."""
-    table = [row.as_dict() for row in rows]
+    table = [row.as_dict() for row in report_rows]
     content: Saved = {"provenance": report_source, "rows": table}
     if earlier_report is not None:
         content["against"] = comparison_with_earlier(earlier_report, table, report_source)
         print("\n".join(change_lines(content["against"])))
-    write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
-    with whole_file(folder / "results.csv") as partial_path, partial_path.open("w", newline="") as file:
+    write_whole(output_folder / "results.json", json.dumps(content, indent=1).encode())
+    with whole_file(output_folder / "results.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(Row.__dataclass_fields__))
         writer.writeheader()
         writer.writerows(table)
 
 
-def print_summary(rows: list[Row], seconds: float | None, page: Path) -> int:
+def print_summary(report_rows: list[Row], seconds: float | None, page_path: Path) -> int:
     """Print the number of rows by status, and each row that failed, missed its aim or was not run; returns the number
     of failed rows."""
-    rows_of_status = {status: [row for row in rows if row.status == status] for status in STATUSES}
+    rows_of_status = {status: [row for row in report_rows if row.status == status] for status in STATUSES}
     counts = ", ".join(f"{len(rows_of_status[status])} {status}" for status in reversed(STATUSES))
-    print(f"{len(rows)} rows: {counts}{'' if seconds is None else f'; {seconds:.0f} s'}")
+    print(f"{len(report_rows)} rows: {counts}{'' if seconds is None else f'; {seconds:.0f} s'}")
     for row in (*rows_of_status["failed"], *rows_of_status["missed"], *rows_of_status["not run"]):
         print(f"  {row.status}: {row.id}: {row.quantity}: {row.reason}")
-    print(f"report: {page}")
+    print(f"report: {page_path}")
     return len(rows_of_status["failed"])

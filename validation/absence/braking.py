@@ -23,11 +23,11 @@ HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-def write(folder: Path) -> None:
+def write(scene_folder: Path) -> None:
     """Write a file of brake pressures that rise at all wheels and stay below the supply of 6 bar."""
     rows = (f"{time},{','.join([str(5.0 * time)] * 4)}" for time in (0.0, 0.5, 1.0))
     names = ",".join(f"pressure_{wheel} [bar]" for wheel in ("fl", "fr", "rl", "rr"))
-    (folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
+    (scene_folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
 
 
 def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
@@ -38,9 +38,9 @@ def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dic
 
     counts, march = dict[str, int](), BrakedVehicle.run
 
-    def watched(vehicle: BrakedVehicle, controller: Any, *arguments_of_march: Any) -> Any:
+    def watched(vehicle: BrakedVehicle, controller: Any, *march_arguments: Any) -> Any:
         counts.update(_counts_of_run(vehicle, controller))
-        return march(vehicle, controller, *arguments_of_march)
+        return march(vehicle, controller, *march_arguments)
 
     with mock.patch.object(BrakedVehicle, "run", watched):
         path = run(scene, engine, procedure=STOP).detail

@@ -103,7 +103,7 @@ def exudyn_march(
     ti.adaptiveStep = False
     ti.explicit.computeEndOfStepAccelerations = False
 
-    def march(kept_container: Any = container) -> list[np.ndarray]:  # the system lives as long as its container
+    def march(container_kept_alive: Any = container) -> list[np.ndarray]:  # the system lives as long as its container
         mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
         return [mbs.GetSensorStoredData(sensor) for sensor in sensors]
 

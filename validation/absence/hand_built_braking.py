@@ -35,9 +35,9 @@ class Truck(NamedTuple):
     y: np.ndarray
     load: np.ndarray
     radius: np.ndarray
-    spin: np.ndarray
+    spin_inertia: np.ndarray
     mass: float
-    inertia: float
+    yaw_inertia: float
     tables: Tables
     cosine: float
     sine: float
@@ -46,7 +46,7 @@ class Truck(NamedTuple):
 class Step(NamedTuple):
     """Length of a time step (s), and the speed (m/s) below which slip angles are computed as at this speed."""
 
-    time: float
+    duration: float
     regularising_speed: float
 
 
@@ -128,7 +128,7 @@ def store_wheel_kinematics(truck_state, regularising_speed, at_step_start, truck
 
 @inlined
 def store_tyre_forces(i, step_input, truck_state, truck, workspace):
-    """Compute the forces, slip and angular velocity of wheel i at the end of a step, and store them in the report."""
+    """Compute the forces, slip and angular velocity of a wheel at the end of a step, and store them in the report."""
     report, tables, load, u0, v = (
         report_of(truck_state.report),
         truck.tables,
@@ -141,7 +141,7 @@ def store_tyre_forces(i, step_input, truck_state, truck, workspace):
         WheelStepInput(
             sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
         ),
-        BrakedWheel(truck.radius[i], truck.spin[i], sign * truck_state.turning[i]),
+        BrakedWheel(truck.radius[i], truck.spin_inertia[i], sign * truck_state.turning[i]),
         TyreGrip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
     k, cell_share = cell_and_share(tables.slips, abs(slip))
@@ -176,7 +176,7 @@ def accelerations_by_tyres(truck_state, torques_before, torques_after, step, tru
         fx, fy, e, f = report.force_x[i], report.force_y[i], workspace.east[i], workspace.north[i]
         ax, ay = ax + e * fx - f * fy, ay + f * fx + e * fy
         turn += workspace.arm[i] * fx + workspace.side[i] * fy
-    return ax / truck.mass, ay / truck.mass, turn / truck.inertia
+    return ax / truck.mass, ay / truck.mass, turn / truck.yaw_inertia
 
 
 @inlined
@@ -211,15 +211,13 @@ def iterate_accelerations(truck_state, torques, step, truck, workspace):
 
 
 @inlined
-def time_of_rest(truck_state, state0, step, truck):
+def time_of_rest(truck_state, start, step, truck):
     """Time (s) within the step at which the truck comes to rest, or -1 if it still moves at the end."""
-    accelerations, mass, inertia = truck_state.accelerations, truck.mass, truck.inertia
-    speed = mass * (state0[3] * state0[3] + state0[4] * state0[4]) + inertia * state0[5] * state0[5]
+    accelerations, mass, inertia = truck_state.accelerations, truck.mass, truck.yaw_inertia
+    speed = mass * (start[3] * start[3] + start[4] * start[4]) + inertia * start[5] * start[5]
     if speed == 0.0 and not truck_state.turning.any():
         return 0.0
-    power = (
-        mass * (state0[3] * accelerations[0] + state0[4] * accelerations[1]) + inertia * state0[5] * accelerations[2]
-    )
+    power = mass * (start[3] * accelerations[0] + start[4] * accelerations[1]) + inertia * start[5] * accelerations[2]
     rate = (
         mass * (accelerations[0] * accelerations[0] + accelerations[1] * accelerations[1])
         + inertia * accelerations[2] * accelerations[2]
@@ -230,12 +228,12 @@ def time_of_rest(truck_state, state0, step, truck):
 
 
 @inlined
-def advance_state(truck_state, time, workspace):
+def advance_state(truck_state, time_in_step, workspace):
     """Set the truck's state to the one a time (s) after the start of the step, at the present accelerations."""
     state, first, accelerations = truck_state.state, workspace.initial_state, truck_state.accelerations
     for a in range(3):
-        state[3 + a] = first[3 + a] + time * accelerations[a]
-        state[a] = first[a] + 0.5 * time * (first[3 + a] + state[3 + a])
+        state[3 + a] = first[3 + a] + time_in_step * accelerations[a]
+        state[a] = first[a] + 0.5 * time_in_step * (first[3 + a] + state[3 + a])
 
 
 @lean
@@ -248,35 +246,35 @@ def advance_truck(truck_state, torques, step, truck, workspace):
     for i in range(4):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     store_wheel_kinematics(truck_state, step.regularising_speed, True, truck, workspace)
-    accelerations = accelerations_by_tyres(truck_state, torques[0], middle, 0.5 * step.time, truck, workspace)
+    accelerations = accelerations_by_tyres(truck_state, torques[0], middle, 0.5 * step.duration, truck, workspace)
     truck_state.accelerations[0], truck_state.accelerations[1], truck_state.accelerations[2] = accelerations
-    rest_time = time_of_rest(truck_state, first, step.time, truck)
+    rest_time = time_of_rest(truck_state, first, step.duration, truck)
     if rest_time >= 0.0:
         advance_state(truck_state, rest_time, workspace)
         truck_state.state[3:], truck_state.turning[:] = 0.0, 0.0
         return rest_time
-    advance_state(truck_state, 0.5 * step.time, workspace)
+    advance_state(truck_state, 0.5 * step.duration, workspace)
     store_wheel_kinematics(truck_state, step.regularising_speed, False, truck, workspace)
-    if not iterate_accelerations(truck_state, torques, step.time, truck, workspace):
+    if not iterate_accelerations(truck_state, torques, step.duration, truck, workspace):
         return -1.0
-    advance_state(truck_state, step.time, workspace)
+    advance_state(truck_state, step.duration, workspace)
     turning = report_of(truck_state.report).turning
     for i in range(4):
         truck_state.turning[i] = turning[i]
-    return step.time
+    return step.duration
 
 
 @lean
-def advance_in_substeps(part_count, truck_state, torques, step, truck, workspace):
+def advance_in_substeps(substep_count, truck_state, torques, step, truck, workspace):
     """Advance the truck by one time step in equal substeps. Returns how long (s) it moved, or -1 if the accelerations
     did not converge. The wheels' report becomes the mean over the substeps; locked times are added."""
     rows, sums, ends, time = truck_state.report, truck_state.weighted_sums, workspace.end_torques, 0.0
-    step_part = Step(step.time / part_count, step.regularising_speed / part_count)
+    step_part = Step(step.duration / substep_count, step.regularising_speed / substep_count)
     sums[:] = 0.0
-    for k in range(part_count):
+    for k in range(substep_count):
         for i in range(4):
             for side in range(2):
-                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / part_count
+                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / substep_count
         used = advance_truck(truck_state, ends, step_part, truck, workspace)
         if used < 0.0:
             return used
@@ -289,20 +287,20 @@ def advance_in_substeps(part_count, truck_state, torques, step, truck, workspace
     report, locked = report_of(rows), report_of(sums).locked
     for c in range(REPORT_SIZE):
         for i in range(4):
-            rows[c, i] = sums[c, i] / part_count
+            rows[c, i] = sums[c, i] / substep_count
     for i in range(4):
         report.locked[i], report.turning[i] = locked[i], truck_state.turning[i]
-    return step.time
+    return step.duration
 
 
 @njit(cache=True, error_model="numpy")
-def march(truck_state, torque, steps_per_sample, step, truck, workspace, stop):
-    """Simulate a stop and fill ``stop`` sample by sample. The brake torque (4,) acts fully from the end of the first
-    step on. Returns the number of samples, or 0 if the accelerations did not converge."""
+def march(truck_state, brake_torques, steps_per_sample, step, truck, workspace, record):
+    """Simulate a stop and fill ``record`` sample by sample. The brake torques (4,) act fully from the end of the
+    first step on. Returns the number of samples, or 0 if the accelerations did not converge."""
     torques = np.zeros((2, 4))
-    torques[1] = torque
-    stop.times[0], stop.states[0], stop.turning[0] = 0.0, truck_state.state, truck_state.turning
-    for n in range(1, stop.times.size):
+    torques[1] = brake_torques
+    record.times[0], record.states[0], record.turning[0] = 0.0, truck_state.state, truck_state.turning
+    for n in range(1, record.times.size):
         used = 0.0
         for _ in range(steps_per_sample):
             speed = math.hypot(truck_state.state[3], truck_state.state[4])
@@ -311,25 +309,25 @@ def march(truck_state, torque, steps_per_sample, step, truck, workspace, stop):
                 time_moved = advance_truck(truck_state, torques, step, truck, workspace)
             else:
                 time_moved = advance_in_substeps(parts, truck_state, torques, step, truck, workspace)
-            torques[0] = torque
+            torques[0] = brake_torques
             used += time_moved
-            if time_moved < step.time:
+            if time_moved < step.duration:
                 break
-        stop.times[n], stop.states[n], stop.turning[n] = (
-            stop.times[n - 1] + used,
+        record.times[n], record.states[n], record.turning[n] = (
+            record.times[n - 1] + used,
             truck_state.state,
             truck_state.turning,
         )
-        stop.reports[n] = truck_state.report
-        if time_moved < step.time:
+        record.reports[n] = truck_state.report
+        if time_moved < step.duration:
             return n + 1 if time_moved >= 0.0 else 0
-    return stop.times.size
+    return record.times.size
 
 
-def run(vehicle: Any, speed: float, steer: float, most_samples: int) -> Callable[[], BrakingPath]:
+def run(vehicle: Any, speed: float, steer: float, sample_limit: int) -> Callable[[], BrakingPath]:
     """Returns a function that simulates a stop with the hand-written code, from a speed (m/s) with steered front wheels
     (rad) and the parameters of a vehicle without effects (``models.systems.braking.march.BrakedVehicle``). The path has
-    at most ``most_samples`` samples, the start included."""
+    at most ``sample_limit`` samples, the start included."""
     plane, pressure, step = vehicle.plane, vehicle.chambers.supply, vehicle.sample / vehicle.substeps
     truck = Truck(
         plane.place[:, 0].copy(),
@@ -348,7 +346,7 @@ def run(vehicle: Any, speed: float, steer: float, most_samples: int) -> Callable
     def run_stop() -> BrakingPath:
         truck_state = TruckState(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORT_SIZE, 4)))
         truck_state.state[3] = speed
-        stop = Stop(*(np.empty((most_samples, *shape)) for shape in ((), (6,), (4,), (REPORT_SIZE, 4))))
+        stop = Stop(*(np.empty((sample_limit, *shape)) for shape in ((), (6,), (4,), (REPORT_SIZE, 4))))
         n = march(truck_state, torque, vehicle.substeps, grid, truck, step_workspace(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
         return BrakingPath(
@@ -387,24 +385,24 @@ def bare_stops(speed: float) -> tuple[Job, Job]:
     return run_twinrig, run(vehicle, speed, STEER_ANGLE, len(run_twinrig().times))
 
 
-def tyre_forces(path: BrakingPath) -> np.ndarray:
+def tyre_forces(stop_path: BrakingPath) -> np.ndarray:
     """Longitudinal and lateral tyre forces (N), shape (2, number of samples - 1, number of wheels), in wheel axes."""
-    return np.stack((path.reports.force_x, path.reports.force_y))
+    return np.stack((stop_path.reports.force_x, stop_path.reports.force_y))
 
 
-def largest_difference(stop: BrakingPath, by_hand: BrakingPath) -> float:
+def largest_difference(twinrig: BrakingPath, by_hand: BrakingPath) -> float:
     """Largest difference between two stops among states (m, rad, m/s, rad/s), wheel speeds (rad/s), and tyre forces,
     pressures and torques. Forces, pressures and torques are divided by their largest values in the hand-written
     stop."""
     shares = [
         np.abs(values - other_values).max() / np.abs(other_values).max()
         for values, other_values in (
-            (tyre_forces(stop), tyre_forces(by_hand)),
-            (stop.pressures, by_hand.pressures),
-            (stop.torques, by_hand.torques),
+            (tyre_forces(twinrig), tyre_forces(by_hand)),
+            (twinrig.pressures, by_hand.pressures),
+            (twinrig.torques, by_hand.torques),
         )
     ]
-    states, turning = np.abs(stop.states - by_hand.states).max(), np.abs(stop.turning - by_hand.turning).max()
+    states, turning = np.abs(twinrig.states - by_hand.states).max(), np.abs(twinrig.turning - by_hand.turning).max()
     return float(max(states, turning, *shares))
 
 

@@ -28,16 +28,19 @@ CALLS_PER_JOB = 200
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def creep_forces(radius, friction_limit, creepage_along, creepage_across, half_lengths, load_shares, traction_bound):
+def creep_forces(
+    radius, friction_limit, creepage_along, creepage_across, strip_half_lengths, strip_load_shares, traction_bound
+):
     """Creep forces fx, fy (N) on a circular contact area of a radius (m).
 
     friction_limit : coefficient of friction times load (N); creepage_along, creepage_across : creepages divided by
-    their flexibilities (N/m^3); half_lengths, load_shares (n,) : half length of each strip divided by the radius, share
-    of the load that it bears; traction_bound (cells,) : largest traction of a cell divided by the strip's largest
+    their flexibilities (N/m^3); strip_half_lengths, strip_load_shares (n,) : half length of each strip divided by the
+    radius, share of the load that it bears; traction_bound (cells,) : largest traction of a cell divided by the strip's
+    largest
     """
-    cells, count, fx, fy = traction_bound.size, half_lengths.size, 0.0, 0.0
+    cells, count, fx, fy = traction_bound.size, strip_half_lengths.size, 0.0, 0.0
     for k in range(count):
-        half, share = half_lengths[k], load_shares[k]
+        half, share = strip_half_lengths[k], strip_load_shares[k]
         middle = friction_limit * share / half * cells * count / (4.0 * radius * radius)
         step = 2.0 * radius * half / cells / middle
         u, v, x, y, sum_x, sum_y = step * creepage_along, step * creepage_across, 0.0, 0.0, 0.0, 0.0

@@ -35,17 +35,20 @@ CONTACT_NUMBERS = size_of(CONTACT)
 
 
 @lean
-def add_car_forces(table, t, q, v, forces_out):
+def add_car_forces(parameter_table, t, q, v, forces_out):
     """Add the generalised forces of the hand-written car to ``forces_out`` (23,). All arguments but the time t are
     pointers to doubles: the parameter table, coordinates q, rates v and forces.
     """
     head, q, v, forces_out = (
-        array(table, (GENERAL_NUMBERS,)),
+        array(parameter_table, (GENERAL_NUMBERS,)),
         array(q, (COORDINATE_COUNT,)),
         array(v, (COORDINATE_COUNT,)),
         array(forces_out, (COORDINATE_COUNT,)),
     )
-    wheels, mounts = beyond(table, GENERAL_NUMBERS), beyond(table, GENERAL_NUMBERS + 4 * WHEEL_NUMBERS)
+    wheels, mounts = (
+        beyond(parameter_table, GENERAL_NUMBERS),
+        beyond(parameter_table, GENERAL_NUMBERS + 4 * WHEEL_NUMBERS),
+    )
     cells = beyond(mounts, 3 * MOUNT_NUMBERS + 2 * SEAT_NUMBERS)
     c_yaw, s_yaw, c_roll, s_roll = math.cos(q[2]), math.sin(q[2]), math.cos(q[4]), math.sin(q[4])
     c_pitch, s_pitch = math.cos(q[5]), math.sin(q[5])
@@ -104,62 +107,75 @@ def add_car_forces(table, t, q, v, forces_out):
 
 
 @lean
-def _wheel_forces(wheel, frame, speeds, q, v, i, wheel_records):
-    """Compute spring forces, load and creepages of wheel i. Returns the moment of the springs on the chassis about S.
+def _wheel_forces(wheel_parameters, chassis_frame, chassis_velocities, q, v, wheel_index, wheel_records):
+    """Compute spring forces, load and creepages of a wheel. Returns the moment of the springs on the chassis about S.
 
-    speeds : forward and lateral speed of S, and its distance ahead of the origin. wheel_records : arrays that receive
-    positions, forces and contact inputs of all wheels.
+    chassis_velocities : forward and lateral speed of S, and its distance ahead of the origin. wheel_records : arrays
+    that receive positions, forces and contact inputs of all wheels.
     """
-    (x, y, z, turning), (speed_forward, speed_leftward, s_x), k = frame, speeds, 9 + 3 * i
+    (x, y, z, turning), (speed_forward, speed_leftward, s_x), k = chassis_frame, chassis_velocities, 9 + 3 * wheel_index
     wheel_position, push, contact = (
-        row(wheel_records[0], 3, i),
-        row(wheel_records[1], 3, i),
-        row(wheel_records[2], CONTACT_NUMBERS, i),
+        row(wheel_records[0], 3, wheel_index),
+        row(wheel_records[1], 3, wheel_index),
+        row(wheel_records[2], CONTACT_NUMBERS, wheel_index),
     )
-    arm = plus(plus(times(x, wheel[0]), times(y, wheel[1])), times(z, wheel[2]))
+    arm = plus(plus(times(x, wheel_parameters[0]), times(y, wheel_parameters[1])), times(z, wheel_parameters[2]))
     displacement, sliding = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
     rate = plus(sliding, cross(turning, displacement))
     strut = (
-        wheel[7]
-        + wheel[5] * (wheel[3] * displacement[0] + wheel[4] * displacement[2])
-        + wheel[6] * (wheel[3] * rate[0] + wheel[4] * rate[2])
+        wheel_parameters[7]
+        + wheel_parameters[5] * (wheel_parameters[3] * displacement[0] + wheel_parameters[4] * displacement[2])
+        + wheel_parameters[6] * (wheel_parameters[3] * rate[0] + wheel_parameters[4] * rate[2])
     )
     bush = (
-        wheel[10]
-        + wheel[8] * (wheel[4] * displacement[0] - wheel[3] * displacement[2])
-        + wheel[9] * (wheel[4] * rate[0] - wheel[3] * rate[2])
+        wheel_parameters[10]
+        + wheel_parameters[8] * (wheel_parameters[4] * displacement[0] - wheel_parameters[3] * displacement[2])
+        + wheel_parameters[9] * (wheel_parameters[4] * rate[0] - wheel_parameters[3] * rate[2])
     )
-    force_along, force_up = -strut * wheel[3] - bush * wheel[4], bush * wheel[3] - strut * wheel[4]
+    force_along, force_up = (
+        -strut * wheel_parameters[3] - bush * wheel_parameters[4],
+        bush * wheel_parameters[3] - strut * wheel_parameters[4],
+    )
     wheel_position[0], wheel_position[1], wheel_position[2] = plus(arm, displacement)
     u, radius = plus(sliding, cross(turning, three(wheel_position, 0))), q[3] + wheel_position[2]
-    load, tread = max(wheel[11] - wheel[12] * (radius - wheel[13]), 0.0), radius * v[k + 2]
+    load, tread = (
+        max(wheel_parameters[11] - wheel_parameters[12] * (radius - wheel_parameters[13]), 0.0),
+        radius * v[k + 2],
+    )
     push[0], push[1], push[2] = force_along, 0.0, force_up + load
-    contact[0], contact[1], contact[2], contact[3] = math.sqrt(wheel[14] * load / wheel[12]), wheel[15], load, wheel[17]
+    contact[0], contact[1], contact[2], contact[3] = (
+        math.sqrt(wheel_parameters[14] * load / wheel_parameters[12]),
+        wheel_parameters[15],
+        load,
+        wheel_parameters[17],
+    )
     contact[4] = (u[0] + speed_forward - v[2] * wheel_position[1] - radius * (turning[1] + v[k + 2])) / tread
     contact[5] = (u[1] + speed_leftward + v[2] * (s_x + wheel_position[0]) + radius * turning[0]) / tread
     contact[6] = (turning[2] + v[2]) / tread
-    contact[7] = contact[8] = contact[9] = wheel[16]
+    contact[7] = contact[8] = contact[9] = wheel_parameters[16]
     return cross((force_along, 0.0, force_up), arm)
 
 
 @lean
-def _add_bar_forces(bar, i, wheel_records, q, forces_out):
-    """Add the forces of an anti-roll bar on the chassis' roll and on the wheels i and i + 1. ``bar``: stiffness, moment
-    at rest, 1 / track."""
-    (stiffness, moment_at_rest, inverse_track), (wheel_positions, pushes, _) = bar, wheel_records
+def _add_bar_forces(bar_parameters, left_wheel_index, wheel_records, q, forces_out):
+    """Add the forces of an anti-roll bar on the chassis' roll and on a left wheel and the right wheel after it.
+    ``bar_parameters``: stiffness, moment at rest, 1 / track."""
+    (stiffness, moment_at_rest, inverse_track), (wheel_positions, pushes, _) = bar_parameters, wheel_records
     twist = moment_at_rest + stiffness * (
-        q[4] - (row(wheel_positions, 3, i)[2] - row(wheel_positions, 3, i + 1)[2]) * inverse_track
+        q[4]
+        - (row(wheel_positions, 3, left_wheel_index)[2] - row(wheel_positions, 3, left_wheel_index + 1)[2])
+        * inverse_track
     )
     forces_out[4] -= twist
-    row(pushes, 3, i)[2] += twist * inverse_track
-    row(pushes, 3, i + 1)[2] -= twist * inverse_track
+    row(pushes, 3, left_wheel_index)[2] += twist * inverse_track
+    row(pushes, 3, left_wheel_index + 1)[2] -= twist * inverse_track
 
 
 @lean
-def _add_engine_forces(mounts, car_head, frame, q, v, forces_out):
+def _add_engine_forces(mount_parameters, car_parameters, chassis_frame, q, v, forces_out):
     """Add the forces of the engine mounts on the engine's three coordinates. Returns their moment on the chassis about
     S."""
-    x, y, z, turning = frame
+    x, y, z, turning = chassis_frame
     c_roll, s_roll, c_pitch, s_pitch = math.cos(q[7]), math.sin(q[7]), math.cos(q[8]), math.sin(q[8])
     lateral_axis = plus(times(y, c_roll), times(z, s_roll))
     vertical_axis = plus(times(z, c_roll), times(y, -s_roll))
@@ -167,12 +183,12 @@ def _add_engine_forces(mounts, car_head, frame, q, v, forces_out):
         plus(times(x, c_pitch), times(vertical_axis, -s_pitch)),
         plus(times(x, s_pitch), times(vertical_axis, c_pitch)),
     )
-    joint = plus(times(x, car_head[4]), times(z, car_head[5] + q[6]))
+    joint = plus(times(x, car_parameters[4]), times(z, car_parameters[5] + q[6]))
     turning_wheel = plus(plus(turning, times(x, v[7])), times(lateral_axis, v[8]))
     passing, total, twist = plus(cross(turning, joint), times(z, v[6])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     moment = 0.0, 0.0, 0.0
     for i in range(3):
-        m = row(mounts, MOUNT_NUMBERS, i)
+        m = row(mount_parameters, MOUNT_NUMBERS, i)
         mount_point = plus(plus(times(x, m[0]), times(y, m[1])), times(z, m[2]))
         arm = plus(plus(times(forward_axis, m[3]), times(lateral_axis, m[4])), times(high, m[5]))
         gap = plus(mount_point, times(plus(joint, arm), -1.0))
@@ -191,13 +207,13 @@ def _add_engine_forces(mounts, car_head, frame, q, v, forces_out):
 
 
 @lean
-def _add_seat_forces(seats, frame, q, v, forces_out):
+def _add_seat_forces(seat_parameters, chassis_frame, q, v, forces_out):
     """Add the spring and damper forces of both seats on the seats' coordinates. Returns their moment on the chassis
     about S."""
-    _, _, z, turning = frame
+    _, _, z, turning = chassis_frame
     moment = 0.0, 0.0, 0.0
     for i in range(2):
-        s, k = row(seats, SEAT_NUMBERS, i), 21 + i
+        s, k = row(seat_parameters, SEAT_NUMBERS, i), 21 + i
         displacement = times(z, q[k])
         force = s[5] - s[3] * displacement[2] - s[4] * (v[k] * z[2] + cross(turning, displacement)[2])
         forces_out[k] += force * z[2]
@@ -205,15 +221,15 @@ def _add_seat_forces(seats, frame, q, v, forces_out):
     return moment
 
 
-def parameter_table(handling: Handling) -> np.ndarray:
+def parameter_table(handling_car: Handling) -> np.ndarray:
     """The car's parameters as one array: general ones, then parameters of the wheels, the engine mounts, the seats and
     the grid of the contact patch."""
-    car, contact_net, preload_of = handling.vehicle, net(CELLS), handling.held.parts
+    car, contact_net, preload_of = handling_car.vehicle, net(CELLS), handling_car.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
     bars = [number for bar in car.bars for number in (bar.stiffness, preload_of[bar.name], 1.0 / bar.track)]
     head = [
         s[0],
-        handling.given.drags[0].coefficient / 2.0,
+        handling_car.given.drags[0].coefficient / 2.0,
         car.body("body").position[2],
         0.0,
         joint[0] - s[0],
@@ -223,15 +239,15 @@ def parameter_table(handling: Handling) -> np.ndarray:
         contact_net.middle,
     ]
 
-    def stiffness_damping_preload(name: str) -> list[float]:
-        return [springs[name].stiffness, springs[name].damping, preload_of[name]]
+    def stiffness_damping_preload(spring_name: str) -> list[float]:
+        return [springs[spring_name].stiffness, springs[spring_name].damping, preload_of[spring_name]]
 
     wheels = []
     for tyre, corner in zip(car.tyres, CORNER_NAMES, strict=True):
-        strut, load, width = springs[corner].axis, handling.held.tyres[tyre.name], handling.tyres.half_width
+        strut, load, width = springs[corner].axis, handling_car.held.tyres[tyre.name], handling_car.tyres.half_width
         sunk = load / tyre.stiffness
         radius = tyre.point[2] + sunk
-        side = next(force.stiffness for force in handling.given.side_forces if force.name == tyre.name)
+        side = next(force.stiffness for force in handling_car.given.side_forces if force.name == tyre.name)
         wheels += [
             *np.subtract(tyre.point, s),
             strut[0],
@@ -244,7 +260,7 @@ def parameter_table(handling: Handling) -> np.ndarray:
             radius,
             width,
             cornering_stiffness_factor(CELLS) * radius * sunk * width / side,
-            handling.tyres.friction,
+            handling_car.tyres.friction,
         ]
     mounts = [
         np.r_[
@@ -263,10 +279,10 @@ def parameter_table(handling: Handling) -> np.ndarray:
     )
 
 
-def model_of(handling: Handling, step: float) -> mujoco.MjModel:
+def model_of(handling_car: Handling, time_step: float) -> mujoco.MjModel:
     """The car's model in MuJoCo, with the parameter table in its numeric data. Inertias are set after the XML is
     compiled."""
-    car, table = handling.vehicle, parameter_table(handling)
+    car, table = handling_car.vehicle, parameter_table(handling_car)
     chassis = car.body("body")
     bodies = "".join(
         BODY_TEXT.format(
@@ -280,8 +296,8 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
     inertias, axes = principal_inertias(chassis)
     built = mujoco.MjModel.from_xml_string(
         MJCF.format(
-            step=repr(step),
-            gravity=_text(handling.gravity),
+            step=repr(time_step),
+            gravity=_text(handling_car.gravity),
             size=table.size,
             bodies=bodies,
             pos=_text(chassis.position),
@@ -294,7 +310,7 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
     built.body_inertia[1] = inertias
     for name, kinds in BODIES_ON_CHASSIS.items():
         spin = (
-            [0.0, handling.tyres.spin_inertia, 0.0]
+            [0.0, handling_car.tyres.spin_inertia, 0.0]
             if kinds == WHEELED_FREEDOMS
             else np.diagonal(car.body(name).inertia)
         )
@@ -304,10 +320,12 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
     return built
 
 
-def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, step_count: int) -> Callable[[], np.ndarray]:
+def run(
+    handling_car: Handling, q: np.ndarray, v: np.ndarray, time_step: float, step_count: int
+) -> Callable[[], np.ndarray]:
     """Returns a function that simulates the car from coordinates q and rates v (23,) in MuJoCo; it returns states
     (step_count + 1, 46)."""
-    built = model_of(handling, step)
+    built = model_of(handling_car, time_step)
     data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(add_car_forces)
 
     def run_car() -> np.ndarray:

@@ -49,9 +49,9 @@ class Car:
         )
 
 
-def exudyn_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
-    """Returns a function that simulates the car in Exudyn by the classical Runge-Kutta method; ``road`` (2 step_count +
-    1, 4): heights (m) under the wheels at half steps."""
+def exudyn_run(car: Car, road_heights: np.ndarray, time_step: float, step_count: int) -> Run:
+    """Returns a function that simulates the car in Exudyn by the classical Runge-Kutta method; ``road_heights`` (2
+    step_count + 1, 4): heights (m) under the wheels at half steps."""
     import exudyn as exu
     import exudyn.itemInterface as typed_items
 
@@ -103,7 +103,7 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
             items.CartesianSpringDamper(markerNumbers=ends, stiffness=[0, 0, stiffness], damping=[0, 0, damping])
         )
         nodes.append(node)
-    forces, per_time = (car.tyre * road).tolist(), 2.0 / step
+    forces, per_time = (car.tyre * road_heights).tolist(), 2.0 / time_step
     mbs.AddObject(
         items.ObjectGenericODE2(
             nodeNumbers=nodes[1:],
@@ -112,13 +112,13 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
             forceUserFunction=lambda mbs, t, item, q, v: forces[round(t * per_time)],
         )
     )
-    march = exudyn_march(container, mbs, nodes, step, step_count)
+    march = exudyn_march(container, mbs, nodes, time_step, step_count)
     return lambda: np.hstack([states[:, 1:] for states in march()])
 
 
-def mujoco_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
-    """Returns a function that simulates the car in MuJoCo by the classical Runge-Kutta method; ``road`` (2 step_count +
-    1, 4): heights (m) under the wheels at half steps."""
+def mujoco_run(car: Car, road_heights: np.ndarray, time_step: float, step_count: int) -> Run:
+    """Returns a function that simulates the car in MuJoCo by the classical Runge-Kutta method; ``road_heights`` (2
+    step_count + 1, 4): heights (m) under the wheels at half steps."""
     import mujoco
     from mujoco import rollout
 
@@ -131,11 +131,11 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
         name: "".join(corner_template.format(**corner, mass=car.wheel, tyre=car.tyre) for corner in corners)
         for name, corner_template in CORNERS.items()
     }
-    centre, size = _text(np.array(car.centre)), 2 + road.size
-    vehicle_xml = VEHICLE_XML.format(step=step, centre=centre, mass=car.mass, size=size, **parts)
+    centre, size = _text(np.array(car.centre)), 2 + road_heights.size
+    vehicle_xml = VEHICLE_XML.format(step=time_step, centre=centre, mass=car.mass, size=size, **parts)
     model = mujoco.MjModel.from_xml_string(vehicle_xml)
     model.body_inertia[1] = car.inertia  # no distribution of mass has these, and the compiler says so
-    model.numeric_data[:] = [2.0 / step, car.tyre, *road.ravel()]
+    model.numeric_data[:] = [2.0 / time_step, car.tyre, *road_heights.ravel()]
     mujoco.mj_setConst(model, mujoco.MjData(model))
     data, start, law = mujoco.MjData(model), np.zeros((1, 15)), _road_law()
 
@@ -176,51 +176,58 @@ STATE_COUNT, BODY_NUMBERS, CORNER_NUMBERS = 14, 4, 5
 
 
 @lean
-def rates(x, road, car, state_rate):
-    """Compute the time derivatives (14,) of a linear car's state on road heights (4,) (m). ``car``: masses of body and
-    wheel, roll and pitch inertia, then x, y, stiffness, damping and tyre stiffness of every corner."""
+def rates(car_state, road_heights, car_parameters, state_rate):
+    """Compute the time derivatives (14,) of a linear car's state on road heights (4,) (m). ``car_parameters``: masses
+    of body and wheel, roll and pitch inertia, then x, y, stiffness, damping and tyre stiffness of every corner."""
     lift = roll = pitch = 0.0
     for i in range(4):
         k = BODY_NUMBERS + CORNER_NUMBERS * i
         distance_ahead, distance_aside, stiffness, damping, tyre = (
-            car[k],
-            car[k + 1],
-            car[k + 2],
-            car[k + 3],
-            car[k + 4],
+            car_parameters[k],
+            car_parameters[k + 1],
+            car_parameters[k + 2],
+            car_parameters[k + 3],
+            car_parameters[k + 4],
         )
         body_height, fast = (
-            x[0] + distance_aside * x[1] - distance_ahead * x[2],
-            x[7] + distance_aside * x[8] - distance_ahead * x[9],
+            car_state[0] + distance_aside * car_state[1] - distance_ahead * car_state[2],
+            car_state[7] + distance_aside * car_state[8] - distance_ahead * car_state[9],
         )
-        force = stiffness * (x[3 + i] - body_height) + damping * (x[10 + i] - fast)
+        force = stiffness * (car_state[3 + i] - body_height) + damping * (car_state[10 + i] - fast)
         lift, roll, pitch = lift + force, roll + distance_aside * force, pitch - distance_ahead * force
-        state_rate[3 + i], state_rate[10 + i] = x[10 + i], (tyre * (road[i] - x[3 + i]) - force) / car[1]
+        state_rate[3 + i], state_rate[10 + i] = (
+            car_state[10 + i],
+            (tyre * (road_heights[i] - car_state[3 + i]) - force) / car_parameters[1],
+        )
     for i in range(3):
-        state_rate[i] = x[7 + i]
-    state_rate[7], state_rate[8], state_rate[9] = lift / car[0], roll / car[2], pitch / car[3]
+        state_rate[i] = car_state[7 + i]
+    state_rate[7], state_rate[8], state_rate[9] = (
+        lift / car_parameters[0],
+        roll / car_parameters[2],
+        pitch / car_parameters[3],
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def march(states, roads, step, car):
-    """Simulate each copy of the car by the classical Runge-Kutta method and overwrite ``states`` (14, copies) with the
-    final states. roads (2 step_count + 1, 4, copies): heights (m) at half steps."""
+def march(copy_states, road_heights, step, car_parameters):
+    """Simulate each copy of the car by the classical Runge-Kutta method and overwrite ``copy_states`` (14, copies) with
+    the final states. road_heights (2 step_count + 1, 4, copies): heights (m) at half steps."""
     rate, total, stage_state = np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT)
-    for copy in range(states.shape[1]):
-        x, road = states[:, copy].copy(), roads[:, :, copy].copy()
+    for copy in range(copy_states.shape[1]):
+        x, road = copy_states[:, copy].copy(), road_heights[:, :, copy].copy()
         for i in range(len(road) // 2):
-            rates(x, road[2 * i], car, rate)
+            rates(x, road[2 * i], car_parameters, rate)
             for k in range(STATE_COUNT):
                 total[k], stage_state[k] = rate[k], x[k] + 0.5 * step * rate[k]
             for stage in range(2):
-                rates(stage_state, road[2 * i + 1], car, rate)
+                rates(stage_state, road[2 * i + 1], car_parameters, rate)
                 for k in range(STATE_COUNT):
                     total[k] += 2.0 * rate[k]
                     stage_state[k] = x[k] + (0.5 * step if stage == 0 else step) * rate[k]
-            rates(stage_state, road[2 * i + 2], car, rate)
+            rates(stage_state, road[2 * i + 2], car_parameters, rate)
             for k in range(STATE_COUNT):
                 x[k] += step / 6.0 * (total[k] + rate[k])
-        states[:, copy] = x
+        copy_states[:, copy] = x
 
 
 def parameter_array(car: Car) -> np.ndarray:
@@ -229,8 +236,8 @@ def parameter_array(car: Car) -> np.ndarray:
     return np.concatenate([[car.mass, car.wheel, car.inertia[0], car.inertia[1]], corners.ravel()])
 
 
-def _text(point: Any) -> str:
-    return " ".join(repr(float(value)) for value in point[:3])
+def _text(point_coordinates: Any) -> str:
+    return " ".join(repr(float(value)) for value in point_coordinates[:3])
 
 
 CORNERS = {

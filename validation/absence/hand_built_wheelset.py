@@ -23,15 +23,15 @@ REPORT_LENGTH = size_of(REPORT)
 
 
 @lean
-def rates(state, speed, parameters, fills_report, state_rate, report):
+def rates(wheelset_state, speed, parameters, fills_report, state_rate, contact_report):
     """Compute the time derivatives (10,) of a wheelset's state: y, z, roll, yaw, spin angle, and their rates. If
-    ``fills_report``, the two contacts are written to report (2, 18). parameters: mass, inertia about the axle, inertia
-    across the axle, weight on each side, radius, half gauge, conicity, rail head radius, contact modulus, shear
+    ``fills_report``, the two contacts are written to contact_report (2, 18). parameters: mass, inertia about the axle,
+    inertia across the axle, weight on each side, radius, half gauge, conicity, rail head radius, contact modulus, shear
     modulus, Poisson's ratio.
     """
     mass, spin_inertia, cross_inertia, carried, radius, gauge, conicity, head, modulus, shear, poisson = parameters
     cone = Cone(radius, gauge, conicity, head)
-    y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
+    y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = wheelset_state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
     turn_rate = spin - yaw_rate * sr
     wx, wy, wz = cy * roll_rate - sy * cr * turn_rate, sy * roll_rate + cy * cr * turn_rate, yaw_rate + sr * turn_rate
@@ -80,7 +80,7 @@ def rates(state, speed, parameters, fills_report, state_rate, report):
                 0.0,
             )
             for k in range(REPORT_LENGTH):
-                report[0 if side == RIGHT else 1, k] = line[k]
+                contact_report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
     m2, m3 = cr * level + sr * mz, cr * mz - sr * level
     state_rate[0], state_rate[1], state_rate[2], state_rate[3], state_rate[4] = (
@@ -96,27 +96,27 @@ def rates(state, speed, parameters, fills_report, state_rate, report):
 
 
 @njit(cache=True, error_model="numpy")
-def march(state, speed, step, parameters, path, contact_reports):
-    """Simulate from a state (10,) by the classical Runge-Kutta method; fills path (step_count + 1, 10) and
+def march(wheelset_state, speed, step, parameters, state_path, contact_reports):
+    """Simulate from a state (10,) by the classical Runge-Kutta method; fills state_path (step_count + 1, 10) and
     contact_reports (step_count + 1, 2, 18)."""
     total, rate, stage_state = np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT)
-    path[0] = state
-    for i in range(len(path)):
+    state_path[0] = wheelset_state
+    for i in range(len(state_path)):
         for stage in range(4):
             for k in range(STATE_COUNT):
                 stage_state[k] = (
-                    path[i, k] + (step if stage == 3 else 0.5 * step) * rate[k] if stage > 0 else path[i, k]
+                    state_path[i, k] + (step if stage == 3 else 0.5 * step) * rate[k] if stage > 0 else state_path[i, k]
                 )
             rates(stage_state, speed, parameters, stage == 0, rate, contact_reports[i])
             for k in range(STATE_COUNT):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
-            if i == len(path) - 1:
+            if i == len(state_path) - 1:
                 return
         for k in range(STATE_COUNT):
-            path[i + 1, k] = path[i, k] + step / 6.0 * total[k]
+            state_path[i + 1, k] = state_path[i, k] + step / 6.0 * total[k]
 
 
-def run(wheelset: Any, state: np.ndarray, speed: float, step: float, step_count: int) -> Callable[[], Any]:
+def run(wheelset: Any, wheelset_state: np.ndarray, speed: float, step: float, step_count: int) -> Callable[[], Any]:
     """Returns a function that simulates a free wheelset (``models.rail.wheelset``). The function returns states
     (step_count + 1, 10) and contact reports (step_count + 1, 2)."""
     w = wheelset
@@ -124,7 +124,7 @@ def run(wheelset: Any, state: np.ndarray, speed: float, step: float, step_count:
 
     def run_wheelset() -> tuple[np.ndarray, np.ndarray]:
         path, reports = np.empty((step_count + 1, STATE_COUNT)), np.empty((step_count + 1, 2, REPORT_LENGTH))
-        march(state, speed, step, p, path, reports)
+        march(wheelset_state, speed, step, p, path, reports)
         return path, reports.view(REPORT)[..., 0]
 
     return run_wheelset

@@ -37,7 +37,7 @@ HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-def write(folder: Path) -> None:
+def write(scene_folder: Path) -> None:
     """Write a file of hub forces, whose vertical components rise from the static load, and a file of angles that stay
     zero."""
     rising = np.linspace(0.0, 1.0, round(STEP_COUNT * STEP / SAMPLE_PERIOD) + 1) ** 2
@@ -46,9 +46,9 @@ def write(folder: Path) -> None:
         for hub in HUBS
         for name, units in COLUMNS_OF_HUB.items()
     }
-    write_time_series(folder / "forces.csv", forces, SAMPLE_PERIOD)
+    write_time_series(scene_folder / "forces.csv", forces, SAMPLE_PERIOD)
     angles = {name: (next(iter(units)), 0.0 * rising) for name, units in COLUMNS_OF_ANGLES.items()}
-    write_time_series(folder / "angles.csv", angles, SAMPLE_PERIOD)
+    write_time_series(scene_folder / "angles.csv", angles, SAMPLE_PERIOD)
 
 
 def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:

@@ -22,12 +22,12 @@ STEP, SHORT_RUN_STEPS = 5e-4, 40
 """Step of the wheelset's runs (s); number of steps of the shorter of two runs whose allocated arrays are compared."""
 
 
-def allocated_arrays(job: Callable[[], Any]) -> int:
+def allocated_arrays(compiled_run: Callable[[], Any]) -> int:
     """Number of arrays that compiled code allocates while a function runs, as counted by numba."""
     _nrt_python.memsys_enable_stats()
     try:
         arrays_before = rtsys.get_allocation_stats().alloc
-        job()
+        compiled_run()
         return int(rtsys.get_allocation_stats().alloc - arrays_before)
     finally:
         _nrt_python.memsys_disable_stats()
@@ -64,24 +64,24 @@ def ratio_of_wheelsets(step_count: int, round_count: int) -> tuple[float, tuple[
 
 
 def added_arrays(
-    job_of_steps: Callable[[int], Callable[[], Any]],
-    short_steps: int = SHORT_RUN_STEPS,
-    long_steps: int = 10 * SHORT_RUN_STEPS,
+    make_run_of_steps: Callable[[int], Callable[[], Any]],
+    shorter_step_count: int = SHORT_RUN_STEPS,
+    longer_step_count: int = 10 * SHORT_RUN_STEPS,
 ) -> int:
-    """How many more arrays a run of ``long_steps`` steps allocates than a run of ``short_steps`` steps.
-    ``job_of_steps(step_count)`` returns the function that runs.
+    """How many more arrays a run of ``longer_step_count`` steps allocates than a run of ``shorter_step_count`` steps.
+    ``make_run_of_steps(step_count)`` returns the function that runs.
     """
-    jobs = [job_of_steps(steps) for steps in (short_steps, long_steps)]
+    jobs = [make_run_of_steps(steps) for steps in (shorter_step_count, longer_step_count)]
     for warm in jobs:
         warm()
     arrays_of_short, arrays_of_long = map(allocated_arrays, jobs)
     return arrays_of_long - arrays_of_short
 
 
-def arrays_added_by_wheelset(job_index: int) -> int:
-    """How many more arrays a longer run of the wheelset without effects allocates; job_index 0: twinrig, 1:
+def arrays_added_by_wheelset(run_index: int) -> int:
+    """How many more arrays a longer run of the wheelset without effects allocates; run_index 0: twinrig, 1:
     hand-written code."""
-    return added_arrays(lambda steps: bare_wheelsets(steps)[job_index])
+    return added_arrays(lambda steps: bare_wheelsets(steps)[run_index])
 
 
 def arrays_added_by_ride() -> int:

@@ -58,12 +58,12 @@ HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-def write(folder: Path) -> None:
+def write(scene_folder: Path) -> None:
     """Write a recording with hub forces that carry the vehicle's weight and angles of a vehicle that sways."""
     swing = np.sin(np.linspace(0.0, 3.0, SAMPLE_COUNT))
     forces = dict.fromkeys(HUBS, ("N", 4000.0 + 100.0 * swing))
     angles = {name: (next(iter(units)), 1e-3 * swing) for name, units in COLUMNS_OF_ANGLES.items()}
-    write_time_series(folder / "recording.csv", forces | angles, SAMPLE_PERIOD)
+    write_time_series(scene_folder / "recording.csv", forces | angles, SAMPLE_PERIOD)
 
 
 def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
@@ -71,8 +71,8 @@ def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], 
     channels as bytes."""
     tables, build = list[np.ndarray](), section_run.build
 
-    def watched(*settings: Any) -> Any:
-        tables.append((model := build(*settings)).numbers)
+    def watched(*estimator_settings: Any) -> Any:
+        tables.append((model := build(*estimator_settings)).numbers)
         return model
 
     with mock.patch.object(section_run, "build", watched):

@@ -39,14 +39,14 @@ print(json.dumps({
 the states computed, as JSON."""
 
 
-def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[str, Any]:
+def probe(scene_table: Mapping[str, Any], scene_folder: str = ".", **process_options: Any) -> dict[str, Any]:
     """Modules imported, kernels compiled and states (hexadecimal bytes) after a scene was run in a fresh process."""
-    command = [sys.executable, "-c", PROBE_SCRIPT, json.dumps(table), folder]
-    completed_process = subprocess.run(command, capture_output=True, text=True, check=True, **options)
+    command = [sys.executable, "-c", PROBE_SCRIPT, json.dumps(scene_table), scene_folder]
+    completed_process = subprocess.run(command, capture_output=True, text=True, check=True, **process_options)
     return json.loads(completed_process.stdout.splitlines()[-1])
 
 
-def belongs_to_effects(module: str) -> bool:
+def belongs_to_effects(module_name: str) -> bool:
     """Whether a module belongs to an effect: a bare scene must import no such module."""
     owners = (
         "models.systems.pitch_plane.effects.",
@@ -61,7 +61,7 @@ def belongs_to_effects(module: str) -> bool:
         "models.engines.mujoco_layout",
         "pyopencrg",
     )
-    return module.startswith(owners)
+    return module_name.startswith(owners)
 
 
 @dataclass
@@ -85,20 +85,20 @@ def installed_callbacks() -> int:
     return sum(getattr(mujoco, f"get_mjcb_{name}")() is not None for name in CALLBACK_NAMES)
 
 
-def counted_march(engine: str, model: Model) -> MarchCounts:
+def counted_march(engine: str, engine_model: Model) -> MarchCounts:
     """Run a model once and return the Python frames, memory and callbacks that its engine used while it integrated over
     time. Checks of the path and the making of results are not counted."""
     march_counts = MarchCounts()
     with _probes_around_march(engine, march_counts):
-        model.run()
+        engine_model.run()
     return march_counts
 
 
-def march_with_least_memory(engine: str, make_model: Callable[[], Model], run_count: int = 3) -> MarchCounts:
+def march_with_least_memory(engine: str, make_engine_model: Callable[[], Model], run_count: int = 3) -> MarchCounts:
     """Counts of the run with the least memory among several runs. Memory that the time loop itself allocates occurs in
     every run, so that the least includes it."""
     return min(
-        (counted_march(engine, make_model()) for _ in range(run_count)),
+        (counted_march(engine, make_engine_model()) for _ in range(run_count)),
         key=lambda march_counts: march_counts.peak_bytes,
     )
 
@@ -125,33 +125,33 @@ def _probes_around_march(engine: str, march_counts: MarchCounts) -> Iterator[Non
         yield
 
 
-def _with_probes(function: Callable[..., Any], march_counts: MarchCounts) -> Callable[..., Any]:
+def _with_probes(march_function: Callable[..., Any], march_counts: MarchCounts) -> Callable[..., Any]:
     """Returns the function with counting added: each call adds its Python frames, memory and callbacks to
     ``march_counts``."""
 
-    def call(*args: Any, **options: Any) -> Any:
+    def call(*march_arguments: Any, **march_options: Any) -> Any:
         march_counts.callbacks = max(march_counts.callbacks, installed_callbacks())
         tracemalloc.start()
         sys.setprofile(lambda frame, event, argument: _count_frame(march_counts, event))
         try:
-            result = function(*args, **options)
+            result = march_function(*march_arguments, **march_options)
         finally:
             sys.setprofile(None)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
-        march_counts.peak_bytes += peak - _returned_bytes(result, [*args, *options.values()])
+        march_counts.peak_bytes += peak - _returned_bytes(result, [*march_arguments, *march_options.values()])
         return result
 
     return call
 
 
-def _count_frame(march_counts: MarchCounts, event: str) -> None:
-    march_counts.frames += event == "call"
+def _count_frame(march_counts: MarchCounts, trace_event: str) -> None:
+    march_counts.frames += trace_event == "call"
 
 
-def _returned_bytes(result: Any, filled_arrays: Sequence[Any]) -> int:
+def _returned_bytes(march_result: Any, filled_arrays: Sequence[Any]) -> int:
     """Bytes of the arrays that an engine's run returned, without arrays that it received as arguments and filled."""
-    parts = result if isinstance(result, tuple) else (result,)
+    parts = march_result if isinstance(march_result, tuple) else (march_result,)
     arrays = [value for value in parts if isinstance(value, np.ndarray)]
     filled = [array for array in filled_arrays if isinstance(array, np.ndarray)]
     return sum(
@@ -159,12 +159,12 @@ def _returned_bytes(result: Any, filled_arrays: Sequence[Any]) -> int:
     )
 
 
-def user_functions(model: Any) -> int:
+def user_functions(exudyn_model: Any) -> int:
     """Number of Python user functions in an Exudyn model, counted over all items of its system and the system itself.
 
     The argument is the model and not the system, as a system is silently empty once its container is deleted.
     """
-    return _user_functions(model.built.mbs)
+    return _user_functions(exudyn_model.built.mbs)
 
 
 def _user_functions(mbs: Any) -> int:
@@ -207,21 +207,21 @@ def registered_callbacks(engine: str) -> Iterator[list[int]]:
         yield counts
 
 
-def _counting_setter(setter: Callable[..., Any], callback_counts: list[int]) -> Callable[..., Any]:
+def _counting_setter(set_callback: Callable[..., Any], callback_counts: list[int]) -> Callable[..., Any]:
     def call(callback: Any) -> None:
-        setter(callback)
+        set_callback(callback)
         callback_counts.append(installed_callbacks())
 
     return call
 
 
-def _counting_march(solve: Callable[..., Any], function_counts: list[int]) -> Callable[..., Any]:
+def _counting_march(solve_march: Callable[..., Any], function_counts: list[int]) -> Callable[..., Any]:
     systems_seen = dict[int, Any]()
 
-    def call(mbs: Any, *args: Any, **options: Any) -> Any:
+    def call(mbs: Any, *march_arguments: Any, **march_options: Any) -> Any:
         if id(mbs) not in systems_seen:  # which keeps it, so that no other one has its number
             systems_seen[id(mbs)] = mbs
             function_counts.append(_user_functions(mbs))
-        return solve(mbs, *args, **options)
+        return solve_march(mbs, *march_arguments, **march_options)
 
     return call

@@ -70,13 +70,13 @@ HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-def write(folder: Path) -> None:
+def write(scene_folder: Path) -> None:
     """Write road files of two tracks, a kilometre long, made of waves whose amplitudes grow with their lengths."""
     s = 0.5 * np.arange(2001)
     bends = 2.0 * np.pi / np.geomspace(1.5, 100.0, 60)
     turns = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, (2, 60))
     tracks = [(np.cos(np.outer(s, bends) + turn) / bends).sum(axis=1) * 1e-3 for turn in turns]
-    write_table(folder / "road.csv", {"s": ("m", s), "left": ("m", tracks[0]), "right": ("m", tracks[1])})
+    write_table(scene_folder / "road.csv", {"s": ("m", s), "left": ("m", tracks[0]), "right": ("m", tracks[1])})
 
 
 def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
@@ -133,11 +133,13 @@ def imported_modules(engine: str) -> list[str]:
     ]
 
 
-def state_count(weightings: dict[str, str]) -> int:
+def state_count(weighting_of_output: dict[str, str]) -> int:
     """Number of states of the linear system of the vehicle R19-ride with its road filters and the weighting filters
     (output -> weighting)."""
     vehicle = _linear_vehicle("r19_ride")
-    return len(system_with_weightings(vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), weightings).A)
+    return len(
+        system_with_weightings(vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), weighting_of_output).A
+    )
 
 
 def count_of_linearisations(vehicle_name: str) -> int:
@@ -149,10 +151,10 @@ def count_of_linearisations(vehicle_name: str) -> int:
     return watched_linearise.call_count
 
 
-def count_of_noisy_outputs(damping: float) -> int:
+def count_of_noisy_outputs(tyre_damping: float) -> int:
     """Number of the half car's outputs that white noise enters directly, with this tyre damping (N s/m)."""
     half_car = load_vehicle("half_car")
-    damped = replace(half_car, tyres=tuple(replace(tyre, damping=damping) for tyre in half_car.tyres))
+    damped = replace(half_car, tyres=tuple(replace(tyre, damping=tyre_damping) for tyre in half_car.tyres))
     vehicle = of_scene.linear_vehicle(damped)(SPEEDS[0])
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0])
     return sum(any(d[i].any() for d in system.D) for i in range(len(system.C)))
@@ -171,18 +173,18 @@ def curve_and_callback_counts(vehicle_name: str) -> dict[str, tuple[int, int]]:
 
 
 @cache
-def _linear_vehicle(name: str) -> LinearVehicle:
-    return of_scene.linear_vehicle(load_vehicle(name))(SPEEDS[0])
+def _linear_vehicle(vehicle_name: str) -> LinearVehicle:
+    return of_scene.linear_vehicle(load_vehicle(vehicle_name))(SPEEDS[0])
 
 
-def rows(quick: bool = False) -> list[Row]:
+def rows(is_quick: bool = False) -> list[Row]:
     """Report rows: modules, states, linearisations, callbacks and noise inputs of rides without effects, each next to a
-    positive control. If ``quick``, without the modules, which need a fresh process."""
+    positive control. If ``is_quick``, without the modules, which need a fresh process."""
     names = ("quarter_car", "quarter_car_nonlinear")
     bare, curved = (curve_and_callback_counts(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
     quantity = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
-    counted = () if quick else (len(imported_modules("reference")),)
+    counted = () if is_quick else (len(imported_modules("reference")),)
     return [
         *(Observed("absent.ride.imports", SYSTEM, quantity, count, "").at_most(0, why, "none") for count in counted),
         behaviour_row(

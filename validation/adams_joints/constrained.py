@@ -25,8 +25,8 @@ class ConstrainedBody:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self.arm = mechanism.body.position - mechanism.centre
-        self.joint_axes = mechanism.ground.axes.T
+        self.arm = mechanism.body_marker.position - mechanism.centre
+        self.joint_axes = mechanism.ground_marker.axes.T
 
     def start(self) -> np.ndarray:
         """State (14,) at the start. Raises InputError where the joint does not allow the start velocity."""
@@ -38,9 +38,9 @@ class ConstrainedBody:
             raise InputError("", "PART, V and W", speed.tolist(), "is no velocity that the joint allows at the start")
         return state
 
-    def rates(self, state: np.ndarray) -> np.ndarray:
+    def rates(self, body_state: np.ndarray) -> np.ndarray:
         """Time derivatives (14,) of a state."""
-        quaternion, turning = state[QUATERNION], state[ANGULAR_VELOCITY]
+        quaternion, turning = body_state[QUATERNION], body_state[ANGULAR_VELOCITY]
         x, y, z, w = quaternion
         product = np.array(  # of the angular velocity and the quaternion
             [
@@ -50,20 +50,20 @@ class ConstrainedBody:
                 -turning @ quaternion[:3],
             ]
         )
-        accelerations, _ = self.accelerations_and_reaction(state)
+        accelerations, _ = self.accelerations_and_reaction(body_state)
         axis_rate = self.joint_axes[2] @ turning
-        return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [axis_rate]])
+        return np.concatenate([body_state[VELOCITY], 0.5 * product, accelerations, [axis_rate]])
 
-    def accelerations_and_reaction(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def accelerations_and_reaction(self, body_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular accelerations (6,) of the body, and the joint's force and moment (6,) on the body about
         its centre."""
-        m, rotation = self.mechanism, _rotation_matrix(state[QUATERNION])
+        m, rotation = self.mechanism, _rotation_matrix(body_state[QUATERNION])
         inertia = rotation @ m.inertia @ rotation.T
-        turning = state[ANGULAR_VELOCITY]
-        applied = self.springs(state)
+        turning = body_state[ANGULAR_VELOCITY]
+        applied = self.springs(body_state)
         applied[:3] += m.mass * m.gravity
         applied[3:] -= _vector_product(turning, inertia @ turning)
-        rows, wanted = self._constraints(state)
+        rows, wanted = self._constraints(body_state)
         mass = np.zeros((6, 6))
         mass[:3, :3], mass[3:, 3:] = m.mass * np.eye(3), inertia
         count = len(rows)
@@ -71,29 +71,29 @@ class ConstrainedBody:
         answer = np.linalg.solve(saddle_matrix, np.concatenate([applied, wanted]))
         return answer[:6], rows.T @ answer[6:]
 
-    def springs(self, state: np.ndarray) -> np.ndarray:
+    def springs(self, body_state: np.ndarray) -> np.ndarray:
         """Force and moment (6,) of all springs on the body about its centre."""
-        wrench, rotation = np.zeros(6), _rotation_matrix(state[QUATERNION])
+        wrench, rotation = np.zeros(6), _rotation_matrix(body_state[QUATERNION])
         for spring in self.mechanism.springs:
             if spring.is_rotational:
-                law = spring.stiffness * (state[ANGLE] - spring.free_length)
-                law += spring.damping * (self.joint_axes[2] @ state[ANGULAR_VELOCITY])
+                law = spring.stiffness * (body_state[ANGLE] - spring.free_length)
+                law += spring.damping * (self.joint_axes[2] @ body_state[ANGULAR_VELOCITY])
                 wrench[3:] -= law * self.joint_axes[2]
                 continue
             arm = rotation @ (spring.body_point - self.mechanism.centre)
-            offset = state[POSITION] + arm - spring.ground_point
+            offset = body_state[POSITION] + arm - spring.ground_point
             length = np.linalg.norm(offset)
             if length > 0.0:
                 direction = offset / length
-                speed = direction @ (state[VELOCITY] + _vector_product(state[ANGULAR_VELOCITY], arm))
+                speed = direction @ (body_state[VELOCITY] + _vector_product(body_state[ANGULAR_VELOCITY], arm))
                 force = -(spring.stiffness * (length - spring.free_length) + spring.damping * speed) * direction
                 wrench += np.concatenate([force, _vector_product(arm, force)])
         return wrench
 
-    def _constraints(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _constraints(self, body_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix (c, 6) of the joint's constraints on the accelerations, and its right-hand side (c,)."""
-        kind, turning = self.mechanism.kind, state[ANGULAR_VELOCITY]
-        rotation = _rotation_matrix(state[QUATERNION])
+        kind, turning = self.mechanism.joint_kind, body_state[ANGULAR_VELOCITY]
+        rotation = _rotation_matrix(body_state[QUATERNION])
         arm = rotation @ self.arm
         point = np.hstack([np.eye(3), -_skew_matrix(arm)])
         bent = -_vector_product(turning, _vector_product(turning, arm))
@@ -108,55 +108,63 @@ class ConstrainedBody:
         if kind == "spherical":
             return point, bent
         if kind == "universal":
-            on_body = rotation @ self.mechanism.body.axes[:, 2]
+            on_body = rotation @ self.mechanism.body_marker.axes[:, 2]
             row = _vector_product(on_body, axes[2]) @ turn
             swing = -axes[2] @ _vector_product(turning, _vector_product(turning, on_body))
             return np.vstack([point, row]), np.append(bent, swing)
         if kind == "distance":
-            offset = state[POSITION] + arm - self.mechanism.ground.position
-            speed = state[VELOCITY] + _vector_product(turning, arm)
+            offset = body_state[POSITION] + arm - self.mechanism.ground_marker.position
+            speed = body_state[VELOCITY] + _vector_product(turning, arm)
             return (offset @ point)[None], np.array([offset @ bent - speed @ speed])
         return np.empty((0, 6)), np.empty(0)
 
-    def state_at_row(self, motion: BodyMotion, row: int) -> np.ndarray:
+    def state_at_row(self, recorded_motion: BodyMotion, row_index: int) -> np.ndarray:
         """State (14,) of the body at a row of a recorded motion, with the angle about the joint's axis set to zero."""
-        quaternion = Rotation.from_matrix(motion.rotation[row]).as_quat()
+        quaternion = Rotation.from_matrix(recorded_motion.rotation[row_index]).as_quat()
         return np.concatenate(
-            [motion.position[row], quaternion, motion.velocity[row], motion.angular_velocity[row], [0.0]]
+            [
+                recorded_motion.position[row_index],
+                quaternion,
+                recorded_motion.velocity[row_index],
+                recorded_motion.angular_velocity[row_index],
+                [0.0],
+            ]
         )
 
-    def state_after(self, state: np.ndarray, step_count: int, step: float) -> np.ndarray:
-        """State (14,) after ``step_count`` Runge-Kutta steps of length ``step`` (s)."""
+    def state_after(self, start_state: np.ndarray, step_count: int, time_step: float) -> np.ndarray:
+        """State (14,) after ``step_count`` Runge-Kutta steps of length ``time_step`` (s)."""
         for _ in range(step_count):
-            state = self._after_step(state, step)
-        return state
+            start_state = self._after_step(start_state, time_step)
+        return start_state
 
-    def run(self, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
+    def run(self, duration: float, time_step: float, steps_per_row: int) -> tuple[BodyMotion, Reaction]:
         """Motion of the body and reaction of the joint by the classical Runge-Kutta method, recorded at every
-        ``stride``-th step (s)."""
+        ``steps_per_row``-th step (s)."""
         state, states_kept = self.start(), list[np.ndarray]()
-        for k in range(round(duration / step) + 1):
-            if k % stride == 0:
+        for k in range(round(duration / time_step) + 1):
+            if k % steps_per_row == 0:
                 states_kept.append(state)
-            state = self._after_step(state, step)
-        return self._motion_and_reaction(np.array(states_kept), step * stride)
+            state = self._after_step(state, time_step)
+        return self._motion_and_reaction(np.array(states_kept), time_step * steps_per_row)
 
-    def _after_step(self, state: np.ndarray, step: float) -> np.ndarray:
-        next_state = runge_kutta_step(lambda _, stage_state: self.rates(stage_state), 0.0, state, step)
+    def _after_step(self, body_state: np.ndarray, time_step: float) -> np.ndarray:
+        next_state = runge_kutta_step(lambda _, stage_state: self.rates(stage_state), 0.0, body_state, time_step)
         next_state[QUATERNION] /= np.linalg.norm(next_state[QUATERNION])
         return next_state
 
-    def _motion_and_reaction(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
-        solved = [self.accelerations_and_reaction(state) for state in states]
+    def _motion_and_reaction(self, body_states: np.ndarray, row_period: float) -> tuple[BodyMotion, Reaction]:
+        solved = [self.accelerations_and_reaction(state) for state in body_states]
         accelerations = np.array([solution[0] for solution in solved])
-        wrenches = np.array([wrench + self.springs(state) for (_, wrench), state in zip(solved, states, strict=True)])
+        wrenches = np.array(
+            [wrench + self.springs(state) for (_, wrench), state in zip(solved, body_states, strict=True)]
+        )
         motion = BodyMotion(
-            spacing * np.arange(len(states)),
-            states[:, POSITION],
-            states[:, VELOCITY],
+            row_period * np.arange(len(body_states)),
+            body_states[:, POSITION],
+            body_states[:, VELOCITY],
             accelerations[:, :3],
-            np.array([_rotation_matrix(state[QUATERNION]) for state in states]),
-            states[:, ANGULAR_VELOCITY],
+            np.array([_rotation_matrix(state[QUATERNION]) for state in body_states]),
+            body_states[:, ANGULAR_VELOCITY],
             accelerations[:, 3:],
         )
         return motion, reaction_about_marker(self.mechanism, motion, wrenches[:, :3], wrenches[:, 3:])

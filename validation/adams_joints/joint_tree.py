@@ -42,8 +42,8 @@ class JointTree:
         """Vehicle description of the mechanism: its joints as massless bodies, then the body at its centre."""
         m = self.mechanism
         ground, end = (
-            _vector_of(self.to_vehicle_axes(m.ground.position)),
-            _vector_of(self.to_vehicle_axes(m.body.position)),
+            _vector_of(self.to_vehicle_axes(m.ground_marker.position)),
+            _vector_of(self.to_vehicle_axes(m.body_marker.position)),
         )
         joint_bodies = {
             "revolute": [Body("joint", 0.0, end, ("rz",))],
@@ -56,7 +56,7 @@ class JointTree:
                 Body("joint", 0.0, end, ("rx", "ry", "rz"), parent="rod"),
             ],
             "free": [Body("joint", 0.0, _vector_of(self.to_vehicle_axes(m.centre)), FREEDOMS)],
-        }[m.kind]
+        }[m.joint_kind]
         inertia = self.axes.T @ m.inertia @ self.axes
         rows = tuple(_vector_of(row) for row in 0.5 * (inertia + inertia.T))
         body = Body(
@@ -83,7 +83,7 @@ class JointTree:
         gravity = self.to_vehicle_axes(self.mechanism.gravity)
         return Driven(vehicle, gravity, spring_table(vehicle, springs), spring_forces, set_spring_forces)
 
-    def motion(self, motion_times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
+    def motion(self, times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
         """Motion of the body in the axes of the ground, from coordinates q, rates v and accelerations a (m, n) of the
         joints."""
         position, velocity, acceleration, rotation, turning, angular_acceleration = _motion_of_last_body(
@@ -91,7 +91,7 @@ class JointTree:
         )
         to_ground = self.axes.T
         return BodyMotion(
-            motion_times,
+            times,
             position @ to_ground,
             velocity @ to_ground,
             acceleration @ to_ground,
@@ -113,24 +113,24 @@ class JointTree:
             raise InputError("", "PART, V and W", wanted.tolist(), "is no velocity that the joint allows at the start")
         return rates
 
-    def run(self, engine: str, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
-        """Motion and reaction of the mechanism in an engine, at every ``stride``-th step (s). The reaction follows from
-        the engine's accelerations by Newton's and Euler's equations."""
-        model = free_model(engine, self.vehicle_with_springs(), Settings("RK44", step, duration))
+    def run(self, engine: str, duration: float, time_step: float, steps_per_row: int) -> tuple[BodyMotion, Reaction]:
+        """Motion and reaction of the mechanism in an engine, at every ``steps_per_row``-th step (s). The reaction
+        follows from the engine's accelerations by Newton's and Euler's equations."""
+        model = free_model(engine, self.vehicle_with_springs(), Settings("RK44", time_step, duration))
         rates = self.start_rates()
-        states = model.march(0.0 * rates, rates, round(duration / step), step)[::stride]
+        states = model.march(0.0 * rates, rates, round(duration / time_step), time_step)[::steps_per_row]
         q, v = np.split(states, 2, axis=1)
-        motion_times = step * stride * np.arange(len(q))
+        motion_times = time_step * steps_per_row * np.arange(len(q))
         a = np.array([model.acceleration(t, *row) for t, *row in zip(motion_times.tolist(), q, v, strict=True)])
         motion = self.motion(motion_times, q, v, a)
         return motion, reaction_by_momentum(self.mechanism, motion)
 
 
-def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
+def joint_tree(mechanism: Mechanism, body_path: BodyMotion) -> JointTree:
     """The joint chain whose hinges stay farthest from a singularity along a path. Raises Refused where every chain
     comes too near to one."""
     trees = [JointTree(mechanism, axes) for axes in _candidate_axes(mechanism)]
-    hinge_cosines = [_least_hinge_cosine(tree, path) for tree in trees]
+    hinge_cosines = [_least_hinge_cosine(tree, body_path) for tree in trees]
     best = int(np.argmax(hinge_cosines))
     if hinge_cosines[best] < LEAST_COSINE:
         raise Refused("joint tree", "the body turns so far that two hinges of its ball fall into one in every layout")
@@ -139,34 +139,36 @@ def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
 
 def _candidate_axes(mechanism: Mechanism) -> list[np.ndarray]:
     """Candidate axes (3, 3) for the chain of joints, as columns."""
-    if mechanism.kind in ("revolute", "prismatic", "cylindrical"):
-        return [mechanism.ground.axes]
-    if mechanism.kind == "universal":
-        x, y = mechanism.ground.axes[:, 2], mechanism.body.axes[:, 2]
+    if mechanism.joint_kind in ("revolute", "prismatic", "cylindrical"):
+        return [mechanism.ground_marker.axes]
+    if mechanism.joint_kind == "universal":
+        x, y = mechanism.ground_marker.axes[:, 2], mechanism.body_marker.axes[:, 2]
         return [np.column_stack([x, y, np.cross(x, y)])]
-    arm = (mechanism.body.position if mechanism.kind == "distance" else mechanism.centre) - mechanism.ground.position
+    arm = (
+        mechanism.body_marker.position if mechanism.joint_kind == "distance" else mechanism.centre
+    ) - mechanism.ground_marker.position
     arm_direction = arm / np.linalg.norm(arm) if np.linalg.norm(arm) > 0.0 else np.array([0.0, 0.0, 1.0])
     side = np.cross(arm_direction, mechanism.gravity)
     if np.linalg.norm(side) < 1e-6 * (1.0 + np.linalg.norm(mechanism.gravity)):
         side = np.cross(arm_direction, np.eye(3)[np.argmin(np.abs(arm_direction))])
     x = side / np.linalg.norm(side)
     base = np.column_stack([x, np.cross(arm_direction, x), arm_direction])
-    if mechanism.kind == "distance":
+    if mechanism.joint_kind == "distance":
         return [base, np.column_stack([base[:, 1], -base[:, 0], base[:, 2]])]
     return [np.roll(base, shift, axis=1) for shift in range(3)]
 
 
-def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
+def _least_hinge_cosine(chain_of_joints: JointTree, body_path: BodyMotion) -> float:
     """Least cosine of the second hinge's angle of a ball joint or rod along a path: 0 at the hinges' singularity, 1
     where the mechanism has no such hinge."""
-    if tree.mechanism.kind not in ("spherical", "free", "distance"):
+    if chain_of_joints.mechanism.joint_kind not in ("spherical", "free", "distance"):
         return 1.0
-    rotation = tree.axes.T @ path.rotation @ tree.axes
-    if tree.mechanism.kind != "distance":
+    rotation = chain_of_joints.axes.T @ body_path.rotation @ chain_of_joints.axes
+    if chain_of_joints.mechanism.joint_kind != "distance":
         return float(np.sqrt(1.0 - np.minimum(rotation[:, 0, 2] ** 2, 1.0)).min())
-    m = tree.mechanism
-    end = path.position + path.rotation @ (m.body.position - m.centre)
-    d = (end - m.ground.position) @ tree.axes / m.length
+    m = chain_of_joints.mechanism
+    end = body_path.position + body_path.rotation @ (m.body_marker.position - m.centre)
+    d = (end - m.ground_marker.position) @ chain_of_joints.axes / m.rod_length
     of_rod = np.sqrt(np.maximum(1.0 - d[:, 0] ** 2, 0.0))
     tilt = np.arctan2(-d[:, 1], d[:, 2])
     first = np.column_stack([of_rod, d[:, 0] * np.sin(tilt), -d[:, 0] * np.cos(tilt)])  # the rod's own x axis
@@ -201,16 +203,16 @@ def _motion_of_last_body(
     return x + reach, speed + np.cross(w, reach), gain, rotation, w, alpha
 
 
-def _rotations_about(axis: int, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (m, 3, 3) about the coordinate axis number ``axis`` by angles (m,) in rad."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turns = np.tile(np.eye(3), (len(angle), 1, 1))
-    turns[:, i, i] = turns[:, j, j] = np.cos(angle)
-    turns[:, j, i] = np.sin(angle)
+def _rotations_about(axis_number: int, angles: np.ndarray) -> np.ndarray:
+    """Rotation matrices (m, 3, 3) about the coordinate axis number ``axis_number`` by angles (m,) in rad."""
+    i, j = (axis_number + 1) % 3, (axis_number + 2) % 3
+    turns = np.tile(np.eye(3), (len(angles), 1, 1))
+    turns[:, i, i] = turns[:, j, j] = np.cos(angles)
+    turns[:, j, i] = np.sin(angles)
     turns[:, i, j] = -turns[:, j, i]
     return turns
 
 
-def _vector_of(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
+def _vector_of(components: np.ndarray) -> Vector:
+    x, y, z = (float(value) for value in components)
     return x, y, z

@@ -64,9 +64,9 @@ class Mechanism:
     """A rigid body on a joint. mass (kg), centre (3,) m, inertia (3, 3) kg m^2, axes (3, 3) of the marker at the
     centre; gravity (3,) m/s^2.
 
-    kind, ground, body : the joint and its markers on ground and body; length (m): of a distance joint. velocity (3,)
-    m/s and angular_velocity (3,) rad/s at the start. on_body : whether the joint's first marker, at which the file
-    states reactions, lies on the body.
+    joint_kind, ground_marker, body_marker : the joint and its markers on ground and body; rod_length (m): of a distance
+    joint. velocity (3,) m/s and angular_velocity (3,) rad/s at the start. is_first_marker_on_body : whether the joint's
+    first marker, at which the file states reactions, lies on the body.
     """
 
     mass: float
@@ -74,19 +74,19 @@ class Mechanism:
     inertia: np.ndarray
     axes: np.ndarray
     gravity: np.ndarray
-    kind: Kind
-    ground: Marker
-    body: Marker
-    length: float
+    joint_kind: Kind
+    ground_marker: Marker
+    body_marker: Marker
+    rod_length: float
     springs: tuple[Spring, ...]
     velocity: np.ndarray
     angular_velocity: np.ndarray
-    on_body: bool = False
+    is_first_marker_on_body: bool = False
 
-    def with_spring(self, **values: float) -> "Mechanism":
+    def with_spring(self, **spring_parameters: float) -> "Mechanism":
         """A copy of the mechanism with parameters of its only spring replaced."""
         (spring,) = self.springs
-        return replace(self, springs=(replace(spring, **values),))  # type: ignore[arg-type]
+        return replace(self, springs=(replace(spring, **spring_parameters),))  # type: ignore[arg-type]
 
     def displaced(self, displacement: np.ndarray) -> "Mechanism":
         """A copy of the mechanism with the body displaced (m) at the start, together with its joint point and spring
@@ -94,38 +94,38 @@ class Mechanism:
         return replace(
             self,
             centre=self.centre + displacement,
-            body=replace(self.body, position=self.body.position + displacement),
+            body_marker=replace(self.body_marker, position=self.body_marker.position + displacement),
             springs=tuple(replace(spring, body_point=spring.body_point + displacement) for spring in self.springs),
         )
 
 
-def read_mechanism(path: str | Path) -> Mechanism:
+def read_mechanism(model_path: str | Path) -> Mechanism:
     """Read the mechanism of a model file. Raises InputError with statement and line for what is not supported or not
     assembled."""
-    return _MechanismReader(str(path), read_statements(path)).mechanism()
+    return _MechanismReader(str(model_path), read_statements(model_path)).mechanism()
 
 
 class _MechanismReader:
     """Reader that makes a mechanism from the statements of a model file."""
 
-    def __init__(self, file: str, statements: list[Statement]) -> None:
-        self.file, self.statements = file, statements
+    def __init__(self, file_name: str, statements: list[Statement]) -> None:
+        self.file, self.statements = file_name, statements
         parts = {part_statement.number: part_statement for part_statement in self.statements_named("PART")}
         grounds = [part_statement for part_statement in parts.values() if part_statement.has("GROUND")]
         bodies = [part_statement for part_statement in parts.values() if not part_statement.has("GROUND")]
         if len(grounds) != 1 or len(bodies) != 1:
             part_counts = [len(grounds), len(bodies)]
             raise InputError(
-                file, "PART", part_counts, "must be one GROUND and one body: other counts are not supported"
+                file_name, "PART", part_counts, "must be one GROUND and one body: other counts are not supported"
             )
-        self.ground, self.part = grounds[0], bodies[0]
+        self.ground_marker, self.part = grounds[0], bodies[0]
         self.markers = {
             part_statement.number: self._marker(part_statement, parts)
             for part_statement in self.statements_named("MARKER")
         }
 
-    def statements_named(self, *names: str) -> list[Statement]:
-        return [statement for statement in self.statements if statement.name in names]
+    def statements_named(self, *statement_names: str) -> list[Statement]:
+        return [statement for statement in self.statements if statement.name in statement_names]
 
     def _marker(self, statement: Statement, parts_by_number: dict[int, Statement]) -> Marker:
         marker_part = parts_by_number.get(statement.reference("PART"))
@@ -141,15 +141,15 @@ class _MechanismReader:
         return self.markers[marker_number]
 
     def ground_and_body_markers(
-        self, statement: Statement, first_number: int, second_number: int
+        self, statement: Statement, first_marker_number: int, second_marker_number: int
     ) -> tuple[Marker, Marker]:
         """Two markers given by their numbers, sorted: first the marker on the ground, then the marker on the body."""
-        marker_pair = self.marker(statement, first_number), self.marker(statement, second_number)
-        if {marker.part for marker in marker_pair} != {self.ground.number, self.part.number}:
+        marker_pair = self.marker(statement, first_marker_number), self.marker(statement, second_marker_number)
+        if {marker.part for marker in marker_pair} != {self.ground_marker.number, self.part.number}:
             raise statement.refuse(
-                "", [first_number, second_number], "must be a marker of the ground and one of the body"
+                "", [first_marker_number, second_marker_number], "must be a marker of the ground and one of the body"
             )
-        return marker_pair if marker_pair[0].part == self.ground.number else marker_pair[::-1]
+        return marker_pair if marker_pair[0].part == self.ground_marker.number else marker_pair[::-1]
 
     def mechanism(self) -> Mechanism:
         body_part = self.part
@@ -169,22 +169,22 @@ class _MechanismReader:
             inertia=centre.axes @ inertia_at_marker @ centre.axes.T,
             axes=centre.axes,
             gravity=np.array(gravity),
-            kind=kind,
-            ground=ground,
-            body=body,
-            length=length,
+            joint_kind=kind,
+            ground_marker=ground,
+            body_marker=body,
+            rod_length=length,
             springs=tuple(
                 self._spring(spring_statement, kind, ground)
                 for spring_statement in self.statements_named("SFORCE", "SPRINGDAMPER")
             ),
             velocity=np.array([body_part.numbers(f"V{axis}", (0.0,))[0] for axis in "XYZ"]),
-            on_body=any(
+            is_first_marker_on_body=any(
                 self.marker(j, j.reference("I")).part == body_part.number for j in self.statements_named("JOINT")
             ),
             angular_velocity=centre.axes @ [body_part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
         )
 
-    def _joint(self, centre: Marker) -> tuple[Kind, tuple[Marker, Marker], float]:
+    def _joint(self, centre_marker: Marker) -> tuple[Kind, tuple[Marker, Marker], float]:
         joints = self.statements_named("JOINT", "GCON")
         if len(joints) > 1:
             raise joints[1].refuse("", None, "is the second joint of one body: not supported")
@@ -193,8 +193,8 @@ class _MechanismReader:
                 self.ground_and_body_markers(s, s.reference("I"), s.reference("J"))
                 for s in self.statements_named("SFORCE", "SPRINGDAMPER")
             ]
-            origin = Marker(self.ground.number, np.zeros(3), np.eye(3))
-            return "free", (springs[0][0] if springs else origin, centre), 0.0
+            origin = Marker(self.ground_marker.number, np.zeros(3), np.eye(3))
+            return "free", (springs[0][0] if springs else origin, centre_marker), 0.0
         (joint,) = joints
         if joint.name == "GCON":
             return self._distance_joint(joint)
@@ -204,25 +204,27 @@ class _MechanismReader:
         ends = self.ground_and_body_markers(joint, joint.reference("I"), joint.reference("J"))
         first = self.marker(joint, joint.reference("I"))
         if kind == "universal":
-            ends = _crossed_markers(*ends, first.part == self.ground.number)
+            ends = _crossed_markers(*ends, first.part == self.ground_marker.number)
         _check_assembled(joint, kind, *ends)
         return kind, ends, 0.0
 
-    def _distance_joint(self, joint: Statement) -> tuple[Kind, tuple[Marker, Marker], float]:
-        text = re.sub(r"\s", "", joint.text("FUNCTION")).upper()
+    def _distance_joint(self, joint_statement: Statement) -> tuple[Kind, tuple[Marker, Marker], float]:
+        text = re.sub(r"\s", "", joint_statement.text("FUNCTION")).upper()
         match = re.fullmatch(r"DM\((\d+),(\d+)\)-" + NUMBER_PATTERN, text)
         if match is None:
-            raise joint.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
-        ends, length = self.ground_and_body_markers(joint, int(match[1]), int(match[2])), float(match[3])
+            raise joint_statement.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
+        ends, length = self.ground_and_body_markers(joint_statement, int(match[1]), int(match[2])), float(match[3])
         distance = float(np.linalg.norm(ends[1].position - ends[0].position))
         if abs(distance - length) > ASSEMBLY_TOLERANCE or length <= 0.0:
-            raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {distance:g} m")
+            raise joint_statement.refuse(
+                ", FUNCTION", length, f"must be above 0 and the distance at the start, {distance:g} m"
+            )
         return "distance", ends, distance
 
-    def _spring(self, statement: Statement, joint_kind: Kind, joint: Marker) -> Spring:
+    def _spring(self, statement: Statement, joint_kind: Kind, joint_marker: Marker) -> Spring:
         ground, body = self.ground_and_body_markers(statement, statement.reference("I"), statement.reference("J"))
         turns = statement.has("ROTATIONAL") or statement.has("ROTATION")
-        if turns and not (joint_kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
+        if turns and not (joint_kind == "revolute" and _are_parallel(ground.axes[:, 2], joint_marker.axes[:, 2])):
             raise statement.refuse("", None, "turns about an axis that no revolute joint has: not supported")
         law = (
             self._springdamper_parameters(statement, turns)
@@ -232,7 +234,7 @@ class _MechanismReader:
         angle = 0.0
         if turns:  # of the body beside the ground about the joint's axis, at the start
             x, y = (ground.axes[:, k] @ body.axes[:, 0] for k in range(2))
-            sense = math.copysign(1.0, ground.axes[:, 2] @ joint.axes[:, 2])
+            sense = math.copysign(1.0, ground.axes[:, 2] @ joint_marker.axes[:, 2])
             angle = math.atan2(y, x) * sense
         stiffness, damping, free_length = law
         return Spring(
@@ -272,13 +274,13 @@ class _MechanismReader:
         )  # az is the angle of the ground beside the body
 
 
-def _evaluated_expression(statement: Statement, text: str) -> Callable[[float, float], float]:
+def _evaluated_expression(statement: Statement, expression_text: str) -> Callable[[float, float], float]:
     """The force expression as a function of travel and rate; it may contain numbers, RTOD and DTOR."""
     names = {"rtod": 180.0 / math.pi, "dtor": math.pi / 180.0, "pi": math.pi}
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        tree = ast.parse(expression_text.strip(), mode="eval")
     except SyntaxError:
-        raise statement.refuse(", FUNCTION", text, "cannot be read") from None
+        raise statement.refuse(", FUNCTION", expression_text, "cannot be read") from None
     allowed = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)
     for node in ast.walk(tree):
         strange = isinstance(node, ast.Name) and node.id not in (*names, "travel", "rate")
@@ -294,28 +296,32 @@ def _turned_axes(angles: np.ndarray) -> np.ndarray:
     return Rotation.from_euler("ZXZ", angles).as_matrix()
 
 
-def _are_parallel(a: np.ndarray, b: np.ndarray) -> bool:
-    return bool(np.linalg.norm(np.cross(a, b)) < ASSEMBLY_TOLERANCE)
+def _are_parallel(first_vector: np.ndarray, second_vector: np.ndarray) -> bool:
+    return bool(np.linalg.norm(np.cross(first_vector, second_vector)) < ASSEMBLY_TOLERANCE)
 
 
-def _crossed_markers(ground: Marker, body: Marker, ground_first: bool) -> tuple[Marker, Marker]:
+def _crossed_markers(ground_marker: Marker, body_marker: Marker, is_ground_first: bool) -> tuple[Marker, Marker]:
     """Both markers of a universal joint, turned so that their z axes are the arms of the cross: the x axis of the I
     marker, and the y axis of the J marker."""
-    of_ground, of_body = (0, 1) if ground_first else (1, 0)
-    return replace(ground, axes=np.roll(ground.axes, 2 - of_ground, 1)), replace(
-        body, axes=np.roll(body.axes, 2 - of_body, 1)
+    of_ground, of_body = (0, 1) if is_ground_first else (1, 0)
+    return replace(ground_marker, axes=np.roll(ground_marker.axes, 2 - of_ground, 1)), replace(
+        body_marker, axes=np.roll(body_marker.axes, 2 - of_body, 1)
     )
 
 
-def _check_assembled(joint: Statement, joint_kind: Kind, ground: Marker, body: Marker) -> None:
+def _check_assembled(joint_statement: Statement, joint_kind: Kind, ground_marker: Marker, body_marker: Marker) -> None:
     """Raise InputError where the joint's markers do not fit together at the start."""
-    offset, z = body.position - ground.position, ground.axes[:, 2]
+    offset, z = body_marker.position - ground_marker.position, ground_marker.axes[:, 2]
     if joint_kind in ("prismatic", "cylindrical"):
         offset = offset - z * (z @ offset)
     if np.linalg.norm(offset) > ASSEMBLY_TOLERANCE:
-        raise joint.refuse("", offset.round(9).tolist(), "m lie between its markers at the start: it must be assembled")
+        raise joint_statement.refuse(
+            "", offset.round(9).tolist(), "m lie between its markers at the start: it must be assembled"
+        )
     if joint_kind == "universal":
-        if abs(z @ body.axes[:, 2]) > ASSEMBLY_TOLERANCE:
-            raise joint.refuse("", None, "has arms that are not square to each other at the start")
-    elif joint_kind != "spherical" and not (_are_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
-        raise joint.refuse("", None, "has z axes that are not parallel at the start")
+        if abs(z @ body_marker.axes[:, 2]) > ASSEMBLY_TOLERANCE:
+            raise joint_statement.refuse("", None, "has arms that are not square to each other at the start")
+    elif joint_kind != "spherical" and not (
+        _are_parallel(z, body_marker.axes[:, 2]) and z @ body_marker.axes[:, 2] > 0.0
+    ):
+        raise joint_statement.refuse("", None, "has z axes that are not parallel at the start")

@@ -43,53 +43,59 @@ class Statement:
     number: int
     values: dict[str, list[str]]
 
-    def refuse(self, key_text: str, wrong_value: object, allowed: str) -> InputError:
+    def refuse(self, key_text: str, wrong_value: object, allowed_text: str) -> InputError:
         """Returns an InputError that names file, line and statement, the wrong value and what is allowed."""
-        return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{key_text}", wrong_value, allowed)
+        return InputError(
+            self.file, f"line {self.line}: {self.name}/{self.number}{key_text}", wrong_value, allowed_text
+        )
 
-    def has(self, key: str) -> bool:
+    def has(self, statement_key: str) -> bool:
         """Whether the statement has this key or flag."""
-        return key in self.values
+        return statement_key in self.values
 
-    def reference(self, key: str) -> int:
+    def reference(self, statement_key: str) -> int:
         """Number of the marker or part that a key refers to. Raises InputError where it is missing."""
-        text = self.values.get(key, [""])[0]
+        text = self.values.get(statement_key, [""])[0]
         if not text.isdigit():
-            raise self.refuse(f", {key}", text or None, "must be the number of a statement")
+            raise self.refuse(f", {statement_key}", text or None, "must be the number of a statement")
         return int(text)
 
-    def numbers(self, key: str, default: tuple[float, ...]) -> np.ndarray:
+    def numbers(self, statement_key: str, default_values: tuple[float, ...]) -> np.ndarray:
         """Numerical values of a key, angles in rad. Values that the file omits are taken from the default, whose length
         is the number of values."""
-        values_given = [self._number(key, text) for text in self.values.get(key, [])]
-        if len(values_given) > len(default):
-            raise self.refuse(f", {key}", len(values_given), f"values found, at most {len(default)} have a meaning")
-        return np.array([*values_given, *default[len(values_given) :]])
+        values_given = [self._number(statement_key, text) for text in self.values.get(statement_key, [])]
+        if len(values_given) > len(default_values):
+            raise self.refuse(
+                f", {statement_key}", len(values_given), f"values found, at most {len(default_values)} have a meaning"
+            )
+        return np.array([*values_given, *default_values[len(values_given) :]])
 
-    def _number(self, key: str, text: str) -> float:
-        degrees = text.upper().endswith("D") and not text.upper().endswith("ED")
+    def _number(self, statement_key: str, number_text: str) -> float:
+        degrees = number_text.upper().endswith("D") and not number_text.upper().endswith("ED")
         try:
-            value = float(text[:-1]) if degrees else float(text)
+            value = float(number_text[:-1]) if degrees else float(number_text)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise self.refuse(f", {key}", text, "must be a finite number, or an angle as 90D")
+            raise self.refuse(f", {statement_key}", number_text, "must be a finite number, or an angle as 90D")
         return math.radians(value) if degrees else value
 
-    def text(self, key: str) -> str:
+    def text(self, statement_key: str) -> str:
         """Text of the expression that a key has, its lines joined."""
-        return " ".join(self.values.get(key, []))
+        return " ".join(self.values.get(statement_key, []))
 
 
-def read_statements(path: str | Path) -> list[Statement]:
+def read_statements(model_path: str | Path) -> list[Statement]:
     """All statements of an Adams model file that affect the motion. Raises InputError with name and line for
     unsupported statements."""
     try:
-        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = Path(model_path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
-        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+        raise InputError(model_path, "", None, f"the file cannot be read: {error.strerror}") from None
     statements = [
-        _parsed_statement(str(path), number, text) for number, text in _statement_texts(lines) if not _is_skipped(text)
+        _parsed_statement(str(model_path), number, text)
+        for number, text in _statement_texts(lines)
+        if not _is_skipped(text)
     ]
     for statement in (units_statement for units_statement in statements if units_statement.name == "UNITS"):
         for key, (value, *_) in statement.values.items():
@@ -98,10 +104,10 @@ def read_statements(path: str | Path) -> list[Statement]:
     return statements
 
 
-def _statement_texts(lines: list[str]) -> list[tuple[int, str]]:
+def _statement_texts(file_lines: list[str]) -> list[tuple[int, str]]:
     """For every statement of a file: number of its first line, and its text with continuation lines joined."""
     joined: list[tuple[int, str]] = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(file_lines, 1):
         text = line.partition("!")[0].strip()
         if text.startswith(",") and joined:
             joined[-1] = joined[-1][0], f"{joined[-1][1]} {text}"
@@ -110,16 +116,19 @@ def _statement_texts(lines: list[str]) -> list[tuple[int, str]]:
     return joined
 
 
-def _is_skipped(text: str) -> bool:
-    return re.split(r"[\s/,]", text.upper(), maxsplit=1)[0] in IGNORED_STATEMENTS
+def _is_skipped(statement_text: str) -> bool:
+    return re.split(r"[\s/,]", statement_text.upper(), maxsplit=1)[0] in IGNORED_STATEMENTS
 
 
-def _parsed_statement(file: str, line_number: int, text: str) -> Statement:
-    head = _STATEMENT_PATTERN.fullmatch(text)
+def _parsed_statement(file_name: str, line_number: int, statement_text: str) -> Statement:
+    head = _STATEMENT_PATTERN.fullmatch(statement_text)
     name = head.group(1).upper() if head else ""
     if head is None or name not in KEYS_OF_STATEMENT:
         raise InputError(
-            file, f"line {line_number}", text[:40], f"is not supported; read are {', '.join(KEYS_OF_STATEMENT)}"
+            file_name,
+            f"line {line_number}",
+            statement_text[:40],
+            f"is not supported; read are {', '.join(KEYS_OF_STATEMENT)}",
         )
     values: dict[str, list[str]] = {}
     key = ""
@@ -134,16 +143,16 @@ def _parsed_statement(file: str, line_number: int, text: str) -> Statement:
             values[key].append(assignment.strip())
         elif assignment.strip():
             values[assignment.strip().upper()] = []
-    statement = Statement(file, line_number, name, int(head.group(2) or 0), values)
+    statement = Statement(file_name, line_number, name, int(head.group(2) or 0), values)
     for unknown in (each for each in values if each not in KEYS_OF_STATEMENT[name]):
         raise statement.refuse(f", {unknown}", None, f"is not supported; read are {', '.join(KEYS_OF_STATEMENT[name])}")
     return statement
 
 
-def _between_commas(text: str) -> list[str]:
+def _between_commas(statement_text: str) -> list[str]:
     """Parts of a text between commas outside of brackets."""
     parts, depth = [""], 0
-    for sign in text:
+    for sign in statement_text:
         depth += (sign == "(") - (sign == ")")
         if sign == "," and depth == 0:
             parts.append("")

@@ -30,23 +30,27 @@ class Reaction:
     moment: np.ndarray
 
 
-def reaction_by_momentum(mechanism: Mechanism, motion: BodyMotion) -> Reaction:
+def reaction_by_momentum(mechanism: Mechanism, body_motion: BodyMotion) -> Reaction:
     """Reaction of joint and springs from the body's accelerations and weight, by Newton's and Euler's equations."""
-    inertia = motion.rotation @ mechanism.inertia @ np.transpose(motion.rotation, (0, 2, 1))
-    force = mechanism.mass * (motion.acceleration - mechanism.gravity)
-    momentum = np.einsum("mij,mj->mi", inertia, motion.angular_velocity)
-    moment = np.einsum("mij,mj->mi", inertia, motion.angular_acceleration) + np.cross(motion.angular_velocity, momentum)
-    return reaction_about_marker(mechanism, motion, force, moment)
+    inertia = body_motion.rotation @ mechanism.inertia @ np.transpose(body_motion.rotation, (0, 2, 1))
+    force = mechanism.mass * (body_motion.acceleration - mechanism.gravity)
+    momentum = np.einsum("mij,mj->mi", inertia, body_motion.angular_velocity)
+    moment = np.einsum("mij,mj->mi", inertia, body_motion.angular_acceleration) + np.cross(
+        body_motion.angular_velocity, momentum
+    )
+    return reaction_about_marker(mechanism, body_motion, force, moment)
 
 
-def reaction_about_marker(mechanism: Mechanism, motion: BodyMotion, force: np.ndarray, moment: np.ndarray) -> Reaction:
+def reaction_about_marker(
+    mechanism: Mechanism, body_motion: BodyMotion, force: np.ndarray, moment: np.ndarray
+) -> Reaction:
     """Reaction about the joint's marker, from the force and moment (m, 3) that act on the body about its centre."""
-    if mechanism.on_body:
-        arm = np.einsum("mij,j->mi", motion.rotation, mechanism.centre - mechanism.body.position)
+    if mechanism.is_first_marker_on_body:
+        arm = np.einsum("mij,j->mi", body_motion.rotation, mechanism.centre - mechanism.body_marker.position)
         return Reaction(force, moment + np.cross(arm, force))
-    return Reaction(-force, -moment - np.cross(motion.position - mechanism.ground.position, force))
+    return Reaction(-force, -moment - np.cross(body_motion.position - mechanism.ground_marker.position, force))
 
 
-def marker_axes(mechanism: Mechanism, motion: BodyMotion) -> np.ndarray:
+def marker_axes(mechanism: Mechanism, body_motion: BodyMotion) -> np.ndarray:
     """Axes (m, 3, 3) of the marker at the body's centre over time, as columns, in the axes of the ground."""
-    return motion.rotation @ mechanism.axes
+    return body_motion.rotation @ mechanism.axes

@@ -18,17 +18,17 @@ COLUMN_GROUPS = {"Pos": 3, "Quat": 4, "Vel": 3, "Avel": 3, "Acc": 3, "Aacc": 3, 
 
 @dataclass(frozen=True, eq=False)
 class OutputFile:
-    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in COLUMN_GROUPS; digits: number
-    of significant digits in the file."""
+    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in COLUMN_GROUPS; digit_count:
+    number of significant digits in the file."""
 
     times: np.ndarray
     columns: dict[str, np.ndarray]
-    digits: int
+    digit_count: int
 
     def rounding_error(self, column_group: str) -> np.ndarray:
         """Largest rounding error (m, 3 or 4) of the numbers of a column group: half of their last digit."""
         size = np.maximum(np.abs(self.columns[column_group]), 1e-30)
-        return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digits + 1)
+        return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digit_count + 1)
 
     def motion(self, mechanism: Mechanism) -> BodyMotion:
         """Motion of the body as stated in the file."""
@@ -61,32 +61,32 @@ class OutputFile:
         return reaction_by_momentum(mechanism, self.motion(mechanism))
 
 
-def read_output(path: str | Path) -> OutputFile:
+def read_output(output_path: str | Path) -> OutputFile:
     """Read an output file, plain or compressed (.gz). Raises InputError that names the wrong column or line."""
-    path = Path(path)
+    output_path = Path(output_path)
     try:
-        with (gzip.open if path.suffix == ".gz" else open)(path, "rt", encoding="utf-8") as file:
+        with (gzip.open if output_path.suffix == ".gz" else open)(output_path, "rt", encoding="utf-8") as file:
             names, *rows = csv.reader(file)
     except (OSError, ValueError) as error:
-        raise InputError(path, "", None, f"the file cannot be read: {error}") from None
+        raise InputError(output_path, "", None, f"the file cannot be read: {error}") from None
     groups = {group: [f"{group}{k + 1}" for k in range(count)] for group, count in COLUMN_GROUPS.items()}
     missing = [name for column_names in (["time"], *groups.values()) for name in column_names if name not in names]
     if missing:
-        raise InputError(path, "header", missing[0], "is missing")
+        raise InputError(output_path, "header", missing[0], "is missing")
     try:
         table = np.array(rows, float)
     except ValueError as error:
-        raise InputError(path, "rows", None, f"must hold a number in every column: {error}") from None
+        raise InputError(output_path, "rows", None, f"must hold a number in every column: {error}") from None
     digits = max(_significant_digits(cell) for row in rows for cell in row)
     columns = {group: table[:, [names.index(name) for name in column_names]] for group, column_names in groups.items()}
     return OutputFile(table[:, names.index("time")], columns, digits)
 
 
-def _significant_digits(cell: str) -> int:
+def _significant_digits(number_text: str) -> int:
     """Number of significant digits in the text of a number."""
-    return len(cell.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
+    return len(number_text.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
 
 
-def starts_with_mechanism(mechanism: Mechanism, output: OutputFile) -> bool:
+def starts_with_mechanism(mechanism: Mechanism, output_file: OutputFile) -> bool:
     """Whether the body's position in the first row of the output file equals the start position of the mechanism."""
-    return bool(np.abs(output.columns["Pos"][0] - mechanism.centre).max() <= 1e-5)
+    return bool(np.abs(output_file.columns["Pos"][0] - mechanism.centre).max() <= 1e-5)

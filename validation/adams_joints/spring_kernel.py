@@ -46,14 +46,14 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
 
 
 @compiled
-def spring_forces(table, t, q, v, force_sum):
+def spring_forces(parameter_table, t, q, v, force_sum):
     """Add the springs' generalised forces (N, N m) to ``force_sum`` (n,), at joint coordinates q and rates v (n,)."""
-    head = array(table, (HEAD_NUMBERS,))
+    head = array(parameter_table, (HEAD_NUMBERS,))
     n, count = int(head[0]), int(head[1])
     if count == 0:
         return
-    chain = array(beyond(table, HEAD_NUMBERS), (n, PER_JOINT))
-    springs = array(beyond(table, HEAD_NUMBERS + n * PER_JOINT), (count, NUMBERS_PER_SPRING))
+    chain = array(beyond(parameter_table, HEAD_NUMBERS), (n, PER_JOINT))
+    springs = array(beyond(parameter_table, HEAD_NUMBERS + n * PER_JOINT), (count, NUMBERS_PER_SPRING))
     joint_positions, rate, force_view = array(q, (n,)), array(v, (n,)), array(force_sum, (n,))
     m = array(doubles((n + 1) * PER_MOTION), (n + 1, PER_MOTION))
     move(chain, joint_positions, rate, m)
@@ -76,9 +76,9 @@ def spring_forces(table, t, q, v, force_sum):
 
 
 @compiled
-def set_spring_forces(block, t, n):
+def set_spring_forces(block_address, t, coordinate_count):
     """Set the generalised forces of the springs in a block of doubles at an address: forces, coordinates and rates
     (n,), then the parameter table."""
-    f = at(block)
-    array(f, (n,))[:] = 0.0
-    spring_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
+    f = at(block_address)
+    array(f, (coordinate_count,))[:] = 0.0
+    spring_forces(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)

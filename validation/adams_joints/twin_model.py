@@ -44,13 +44,13 @@ def as_mjcf(mechanism: Mechanism) -> str:
     )
 
 
-def _numbers_text(values: np.ndarray) -> str:
-    return " ".join(repr(float(number)) for number in values)
+def _numbers_text(numbers: np.ndarray) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
 
 
-def _joints(m: Mechanism, torsion_springs: list[Spring]) -> str:
+def _joints(mechanism: Mechanism, torsion_springs: list[Spring]) -> str:
     """MJCF text of the body's joints, in the order in which they act. Raises Refused where MJCF has no such joint."""
-    first, second = m.ground.axes[:, 2], m.body.axes[:, 2]
+    first, second = mechanism.ground_marker.axes[:, 2], mechanism.body_marker.axes[:, 2]
     kinds = {
         "revolute": [(HINGE, first)],
         "prismatic": [(SLIDE, first)],
@@ -59,58 +59,59 @@ def _joints(m: Mechanism, torsion_springs: list[Spring]) -> str:
         "universal": [(HINGE, first), (HINGE, second)],
         "free": [("free", first)],
     }
-    if m.kind not in kinds:
-        raise Refused(m.kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
+    if mechanism.joint_kind not in kinds:
+        raise Refused(mechanism.joint_kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
     law = "".join(
         f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.free_length!r}"' for s in torsion_springs
     )
-    anchor = m.body.position - m.centre
+    anchor = mechanism.body_marker.position - mechanism.centre
     return "".join(
         f'<joint name="{kind} {i}" type="{kind}"/>'
         if kind == "free"
         else f'<joint name="{kind} {i}" type="{kind}" axis="{_numbers_text(axis)}" pos="{_numbers_text(anchor)}"{law}/>'
-        for i, (kind, axis) in enumerate(kinds[m.kind])
+        for i, (kind, axis) in enumerate(kinds[mechanism.joint_kind])
     )
 
 
-def _tendon_text(i: int, spring: Spring) -> str:
+def _tendon_text(spring_number: int, spring: Spring) -> str:
     law = f'stiffness="{spring.stiffness!r}" damping="{spring.damping!r}" springlength="{spring.free_length!r}"'
-    return f'<spatial name="spring {i}" {law}><site site="foot {i}"/><site site="tip {i}"/></spatial>'
+    sites = f'<site site="foot {spring_number}"/><site site="tip {spring_number}"/>'
+    return f'<spatial name="spring {spring_number}" {law}>{sites}</spatial>'
 
 
 def build_differences(
-    mechanism: Mechanism, folder: Path, step_count: int, step: float
+    mechanism: Mechanism, work_folder: Path, step_count: int, time_step: float
 ) -> tuple[float, dict[str, np.ndarray]]:
     """Largest relative difference of accelerations between the models that twinrig builds and the MJCF file. Then, by
     engine, paths (step_count + 1, 3) of the body's centre: by the MJCF file in MuJoCo and by twinrig's model in Exudyn,
-    with steps of ``step`` (s) from the start.
+    with steps of ``time_step`` (s) from the start.
     """
-    path = folder / "joint.xml"
+    path = work_folder / "joint.xml"
     path.write_text(as_mjcf(mechanism), encoding="utf-8")
     twin = read(path).twin
     worst = max(row.acceleration for row in certificate(twin, STATE_COUNT))
     start = np.zeros(twin.size), _start_rates(mechanism, twin)
-    n, built = twin.size, free_model("exudyn", twin.driven).march(*start, step_count, step)
+    n, built = twin.size, free_model("exudyn", twin.driven).march(*start, step_count, time_step)
     in_engine = [twin.coordinates.to_mujoco(row[:n], row[n:]).qpos for row in built]
-    in_file = file_path(twin, start, (step_count, step))[:, : twin.model.nq]
+    in_file = file_path(twin, start, (step_count, time_step))[:, : twin.model.nq]
     return worst, {"mujoco": _body_centres(twin, in_file), "exudyn": _body_centres(twin, np.array(in_engine))}
 
 
-def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
+def _start_rates(mechanism: Mechanism, mjcf_twin: TwinModel) -> np.ndarray:
     """Joint rates (n,) at the start that give the body its initial velocity and angular velocity."""
-    data, size = mujoco.MjData(twin.model), twin.size
-    mujoco.mj_forward(twin.model, data)
+    data, size = mujoco.MjData(mjcf_twin.model), mjcf_twin.size
+    mujoco.mj_forward(mjcf_twin.model, data)
     centre_jacobian, rotation_jacobian = np.empty((2, 3, size))
-    mujoco.mj_jacBodyCom(twin.model, data, centre_jacobian, rotation_jacobian, 1)
+    mujoco.mj_jacBodyCom(mjcf_twin.model, data, centre_jacobian, rotation_jacobian, 1)
     wanted = np.concatenate((mechanism.velocity, mechanism.angular_velocity))
     rates: np.ndarray = np.linalg.lstsq(np.vstack((centre_jacobian, rotation_jacobian)), wanted, rcond=None)[0]
     return rates
 
 
-def _body_centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
+def _body_centres(mjcf_twin: TwinModel, coordinates: np.ndarray) -> np.ndarray:
     """Positions (m, 3) of the body's centre at MuJoCo's coordinates (m, nq)."""
-    data, centres = mujoco.MjData(twin.model), np.empty((len(positions), 3))
-    for centre, data.qpos[:] in zip(centres, positions, strict=True):
-        mujoco.mj_kinematics(twin.model, data)
+    data, centres = mujoco.MjData(mjcf_twin.model), np.empty((len(coordinates), 3))
+    for centre, data.qpos[:] in zip(centres, coordinates, strict=True):
+        mujoco.mj_kinematics(mjcf_twin.model, data)
         centre[:] = data.xipos[1]
     return centres

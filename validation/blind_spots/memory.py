@@ -28,15 +28,15 @@ def audit_instructions() -> dict[str, str]:
     return told
 
 
-def shared_rows(path: Path | None) -> list[ctypes.Array[ctypes.c_double]]:
+def shared_rows(memory_path: Path | None) -> list[ctypes.Array[ctypes.c_double]]:
     """Three rows of doubles, with an entry for each function: its fault, whether it ran, whether it gave numbers. They
     lie in a file that processes share, or in private memory without a path; a new file contains zeros."""
-    if path is None:
+    if memory_path is None:
         memory = mmap.mmap(-1, MEMORY_SIZE)
     else:
-        path.touch()
-        os.truncate(path, MEMORY_SIZE)
-        with path.open("r+b") as file:
+        memory_path.touch()
+        os.truncate(memory_path, MEMORY_SIZE)
+        with memory_path.open("r+b") as file:
             memory = mmap.mmap(file.fileno(), MEMORY_SIZE)
     return [FunctionRow.from_buffer(memory, row * ctypes.sizeof(FunctionRow)) for row in range(3)]
 
@@ -49,14 +49,14 @@ number."""
 ADDRESS = ctypes.addressof(FAULTS)
 
 
-def nonzero_functions(row: ctypes.Array[ctypes.c_double]) -> list[int]:
+def nonzero_functions(memory_row: ctypes.Array[ctypes.c_double]) -> list[int]:
     """Numbers of the functions whose entry in a row is not zero."""
-    return [number for number, mark in enumerate(row) if mark]
+    return [number for number, mark in enumerate(memory_row) if mark]
 
 
-def clear(row: ctypes.Array[ctypes.c_double]) -> None:
+def clear(memory_row: ctypes.Array[ctypes.c_double]) -> None:
     """Set a row to zero for all functions: the faults, or the marks of functions that ran."""
-    ctypes.memset(row, 0, ctypes.sizeof(FunctionRow))
+    ctypes.memset(memory_row, 0, ctypes.sizeof(FunctionRow))
 
 
 def clear_marks() -> None:

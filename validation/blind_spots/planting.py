@@ -26,9 +26,9 @@ class Planter:
     functions : ``module:name`` of each function; its position in this list is its number.
     """
 
-    def __init__(self, functions: list[str]) -> None:
+    def __init__(self, function_names: list[str]) -> None:
         self.modules: dict[str, dict[str, int]] = {}
-        for number, function in enumerate(functions):
+        for number, function in enumerate(function_names):
             module, _, name = function.partition(":")
             self.modules.setdefault(module, {})[name] = number
 
@@ -44,8 +44,8 @@ class Planter:
 
 
 class _RewritingLoader(SourceFileLoader):
-    def __init__(self, fullname: str, path: str, function_numbers: dict[str, int]) -> None:
-        super().__init__(fullname, path)
+    def __init__(self, module_name: str, source_path: str, function_numbers: dict[str, int]) -> None:
+        super().__init__(module_name, source_path)
         self.names = function_numbers
 
     def get_code(self, fullname: str) -> Any:

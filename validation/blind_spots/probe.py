@@ -58,8 +58,12 @@ class JobLog:
     """Log of a job: writes to a file how each case or test ended, which functions it ran, and its processor time
     without compilation."""
 
-    def __init__(self, job: dict[str, Any]) -> None:
-        self.out, self.failing_already, self.budgets = Path(job["out"]), set(job["sound"]), job["budgets"]
+    def __init__(self, job_table: dict[str, Any]) -> None:
+        self.out, self.failing_already, self.budgets = (
+            Path(job_table["out"]),
+            set(job_table["sound"]),
+            job_table["budgets"],
+        )
         self.refused, self.is_noticed, self.start = False, False, 0.0
         self.compilation_timer = CompilationTimer()
         event.register("numba:compiler_lock", self.compilation_timer)
@@ -78,59 +82,62 @@ class JobLog:
         self.start, self.refused = self.clock(), False
         memory.clear_marks()
 
-    def end(self, line: dict[str, Any], failed: list[tuple[str, str]]) -> None:
-        """Write the log line of a case or test that has ended. failed: ids and grounds of its failed rows or tests."""
-        self.is_noticed |= any(id not in self.failing_already and is_independent(id, grounds) for id, grounds in failed)
-        line |= {
+    def end(self, log_line: dict[str, Any], failed_checks: list[tuple[str, str]]) -> None:
+        """Write the log line of a case or test that has ended. failed_checks: ids and grounds of its failed rows or
+        tests."""
+        self.is_noticed |= any(
+            id not in self.failing_already and is_independent(id, grounds) for id, grounds in failed_checks
+        )
+        log_line |= {
             "ran": memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN),
             "numbers": memory.nonzero_functions(memory.FUNCTIONS_WITH_NUMBERS),
         }
-        line |= {"seconds": self.clock() - self.start, "refused": self.refused}
+        log_line |= {"seconds": self.clock() - self.start, "refused": self.refused}
         with self.out.open("a") as file:
-            file.write(json.dumps(line) + "\n")
+            file.write(json.dumps(log_line) + "\n")
 
 
-def run_case(name: str, log: JobLog) -> None:
+def run_case(case_name: str, job_log: JobLog) -> None:
     """Run the quick rows of a validation case and log them; a case that raises an error counts as a failed row."""
     from validation.common.rows import rows_on_grounds
 
-    log.begin()
+    job_log.begin()
     try:
-        case = import_module(f"validation.cases.{name}")
+        case = import_module(f"validation.cases.{case_name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            rows, _ = rows_on_grounds(name, lambda: case.measure(True, Path(folder)))
+            rows, _ = rows_on_grounds(case_name, lambda: case.measure(True, Path(folder)))
         lines: list[dict[str, str]] = [
             {"id": row.id, "status": row.status, "independence": row.independence} for row in rows
         ]
     except Exception as error:
-        lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
-        log.refused |= is_numba_error(error)
+        lines = [{"id": f"{case_name}.broken", "status": "failed", "independence": "none"}]
+        job_log.refused |= is_numba_error(error)
     failed = [(line["id"], line["independence"]) for line in lines if line["status"] == "failed"]
-    log.end({"case": name, "rows": lines}, failed)
+    job_log.end({"case": case_name, "rows": lines}, failed)
 
 
-def run_scene(scene: str, engine: str, log: JobLog) -> None:
+def run_scene(scene_path: str, engine: str, job_log: JobLog) -> None:
     """Run a scene in an engine and log the functions that it called; a refused or failed run is not logged."""
     from models.systems import run
 
-    read = prepared_scene(scene)
-    log.begin()
+    read = prepared_scene(scene_path)
+    job_log.begin()
     with suppress(Exception):
         run(read, engine)
-        log.end({"run": [scene, engine]}, [])
+        job_log.end({"run": [scene_path, engine]}, [])
 
 
-def is_numba_error(error: BaseException) -> bool:
+def is_numba_error(exception: BaseException) -> bool:
     """Whether an error is numba's refusal to compile a function. The rewriting then caused the failure, and no check
     has noticed the fault."""
-    return type(error).__module__.startswith("numba.")
+    return type(exception).__module__.startswith("numba.")
 
 
 class TestLogger:
     """Plug-in for pytest that writes to a job's log how each test ended."""
 
-    def __init__(self, log: JobLog) -> None:
-        self.log, self.failed = log, False
+    def __init__(self, job_log: JobLog) -> None:
+        self.log, self.failed = job_log, False
         self.session: pytest.Session | None = None
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
@@ -164,49 +171,49 @@ class TestLogger:
             item.user_properties.append(("grounds", marker.args[0]))
 
 
-def run_job(job: dict[str, Any]) -> None:
+def run_job(job_table: dict[str, Any]) -> None:
     """Plant the faults of a job, then run its scenes, its tests, and its cases as long as its budget lasts."""
-    signal.setitimer(signal.ITIMER_PROF, job["patience"])
-    for number, fault in job["faults"].items():
+    signal.setitimer(signal.ITIMER_PROF, job_table["patience"])
+    for number, fault in job_table["faults"].items():
         memory.FAULTS[int(number)] = fault
-    log = JobLog(job)
-    for scene, engine in job["runs"]:
+    log = JobLog(job_table)
+    for scene, engine in job_table["runs"]:
         run_scene(scene, engine, log)
-    if job["tests"]:
-        pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[TestLogger(log)])
-    for name in job["cases"]:
+    if job_table["tests"]:
+        pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job_table["tests"]], plugins=[TestLogger(log)])
+    for name in job_table["cases"]:
         if not log.budget_is_used():
             run_case(name, log)
 
 
-def modules_of_tests(tests: list[str]) -> list[str]:
+def modules_of_tests(test_files: list[str]) -> list[str]:
     """Modules of the project that test files import; the tests are given as pytest's arguments."""
-    files = dict.fromkeys(test.partition("::")[0] for test in tests)
+    files = dict.fromkeys(test.partition("::")[0] for test in test_files)
     return list(
         dict.fromkeys(name for file in files for name in IMPORT_PATTERN.findall((ROOT / file).read_text("utf-8")))
     )
 
 
-def modules_of_runs(runs: list[Run]) -> list[str]:
+def modules_of_runs(scene_runs: list[Run]) -> list[str]:
     """Modules to import before scenes are run: those of all systems and engines; none if the job runs no scene."""
     return (
         sorted(name for name in all_modules() if name.startswith(("models.systems.", "models.engines.")))
-        if runs
+        if scene_runs
         else []
     )
 
 
-def run_in_fork(job: dict[str, Any]) -> str:
+def run_in_fork(job_table: dict[str, Any]) -> str:
     """Run a job in a forked process. Returns how the process ended: "whole", "out of time" or "crashed"."""
     memory.clear(memory.FAULTS)
-    named = [f"validation.cases.{name}" for name in job["cases"]]
-    for module in [*named, *modules_of_tests(job["tests"]), *modules_of_runs(job["runs"])]:
+    named = [f"validation.cases.{name}" for name in job_table["cases"]]
+    for module in [*named, *modules_of_tests(job_table["tests"]), *modules_of_runs(job_table["runs"])]:
         with suppress(Exception):  # a module that breaks as it is imported breaks again where its case or test is run
             import_module(module)
     child = os.fork()
     if child == 0:
         with suppress(BaseException):
-            run_job(job)
+            run_job(job_table)
             os._exit(0)
         os._exit(1)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

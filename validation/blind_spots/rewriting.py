@@ -31,52 +31,54 @@ class NoSuchFunction(Exception):
 
 
 @cache
-def source_text(module: str) -> str:
+def source_text(module_name: str) -> str:
     """Source text of a module of the project."""
-    path = ROOT.joinpath(*module.split("."))
+    path = ROOT.joinpath(*module_name.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     return file.read_text(encoding="utf-8")
 
 
 @cache
-def module_tree(module: str) -> ast.Module:
+def module_tree(module_name: str) -> ast.Module:
     """Syntax tree of a module of the project."""
-    return ast.parse(source_text(module))
+    return ast.parse(source_text(module_name))
 
 
-def function_definition(parsed: ast.AST, name: str) -> Function:
+def function_definition(syntax_tree: ast.AST, function_name: str) -> Function:
     """Syntax tree of the function with a qualified name. Raises NoSuchFunction where there is none."""
-    scope: ast.AST = parsed
-    for part in name.replace(".<locals>", "").split("."):
+    scope: ast.AST = syntax_tree
+    for part in function_name.replace(".<locals>", "").split("."):
         inner = [
             each for each in _nodes_of_block(scope) if isinstance(each, Function | ast.ClassDef) and each.name == part
         ]
         if not inner:
-            raise NoSuchFunction(name)
+            raise NoSuchFunction(function_name)
         scope = inner[-1]
     if not isinstance(scope, Function):
-        raise NoSuchFunction(name)
+        raise NoSuchFunction(function_name)
     return scope
 
 
-def _nodes_of_block(node: ast.AST) -> Iterator[ast.AST]:
+def _nodes_of_block(block_node: ast.AST) -> Iterator[ast.AST]:
     """Syntax nodes of a function's block, without nodes inside nested functions and classes."""
-    for child in ast.iter_child_nodes(node):
+    for child in ast.iter_child_nodes(block_node):
         yield child
         if not isinstance(child, Function | ast.ClassDef | ast.Lambda):
             yield from _nodes_of_block(child)
 
 
-def argument_names(function: Function) -> list[str]:
+def argument_names(function_node: Function) -> list[str]:
     """Names of a function's arguments, without ``self`` and ``cls``."""
-    given = [each.arg for each in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+    given = [
+        each.arg for each in (*function_node.args.posonlyargs, *function_node.args.args, *function_node.args.kwonlyargs)
+    ]
     return [name for name in given if name not in ("self", "cls")]
 
 
-def argument_of_names(function: Function) -> dict[str, str]:
+def argument_of_names(function_node: Function) -> dict[str, str]:
     """Name in a function -> name of the argument that it refers to or is a view of."""
-    argument_of = {name: name for name in argument_names(function)}
-    for node in _nodes_of_block(function):
+    argument_of = {name: name for name in argument_names(function_node)}
+    for node in _nodes_of_block(function_node):
         if isinstance(node, ast.Assign):
             for target, value in _assigned_pairs(node):
                 root = root_argument(value, argument_of)
@@ -85,79 +87,93 @@ def argument_of_names(function: Function) -> dict[str, str]:
     return argument_of
 
 
-def _assigned_pairs(node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
-    for target in node.targets:
-        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
-            yield from zip(target.elts, node.value.elts, strict=False)
+def _assigned_pairs(assignment: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
+    for target in assignment.targets:
+        if isinstance(target, ast.Tuple) and isinstance(assignment.value, ast.Tuple):
+            yield from zip(target.elts, assignment.value.elts, strict=False)
         else:
-            yield target, node.value
+            yield target, assignment.value
 
 
-def root_argument(node: ast.expr, argument_of: dict[str, str]) -> str:
+def root_argument(expression: ast.expr, argument_of_name: dict[str, str]) -> str:
     """Name of the argument that an expression is an element, attribute or view of; "" for none."""
-    while isinstance(node, ast.Subscript | ast.Attribute | ast.Call):
-        if isinstance(node, ast.Call):
-            inner = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    while isinstance(expression, ast.Subscript | ast.Attribute | ast.Call):
+        if isinstance(expression, ast.Call):
+            inner = (
+                expression.func.attr
+                if isinstance(expression.func, ast.Attribute)
+                else getattr(expression.func, "id", "")
+            )
             if inner not in VIEW_FUNCTIONS:
                 return ""
-            node = node.args[0] if isinstance(node.func, ast.Name) and node.args else node.func
+            expression = (
+                expression.args[0] if isinstance(expression.func, ast.Name) and expression.args else expression.func
+            )
         else:
-            node = node.value
-    return argument_of.get(node.id, "") if isinstance(node, ast.Name) else ""
+            expression = expression.value
+    return argument_of_name.get(expression.id, "") if isinstance(expression, ast.Name) else ""
 
 
-def _written_arguments(node: ast.AST, argument_of: dict[str, str]) -> set[str]:
+def _written_arguments(assignment: ast.AST, argument_of_name: dict[str, str]) -> set[str]:
     """Names of the arguments that an assignment statement writes into."""
-    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AugAssign) else []
+    targets = (
+        assignment.targets
+        if isinstance(assignment, ast.Assign)
+        else [assignment.target]
+        if isinstance(assignment, ast.AugAssign)
+        else []
+    )
     parts = [part for target in targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
-    return {root_argument(part, argument_of) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)} - {
-        ""
-    }
+    return {
+        root_argument(part, argument_of_name) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)
+    } - {""}
 
 
-def _defining_module(module: str, name: str) -> tuple[str, str] | None:
+def _defining_module(module_name: str, used_name: str) -> tuple[str, str] | None:
     """Module and original name of a name that a module uses; its import from ``models`` is followed."""
-    for node in ast.walk(module_tree(module)):
+    for node in ast.walk(module_tree(module_name)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("models"):
             for each in node.names:
-                if (each.asname or each.name) == name:
+                if (each.asname or each.name) == used_name:
                     return node.module, each.name
-    return module, name
+    return module_name, used_name
 
 
 @cache
-def original_definition(module: str, name: str) -> Function | None:
+def original_definition(module_name: str, function_name: str) -> Function | None:
     """Syntax tree of a function in the unchanged source; None if there is no such function."""
     try:
-        return function_definition(module_tree(module), name)
+        return function_definition(module_tree(module_name), function_name)
     except (NoSuchFunction, OSError):
         return None
 
 
 @cache
-def arguments_written_by_callees(module: str, name: str) -> frozenset[str]:
+def arguments_written_by_callees(module_name: str, function_name: str) -> frozenset[str]:
     """Names of a function's arguments that it passes to other functions which write into them. In a recursion, a
     function already being examined counts as writing nothing."""
-    function = original_definition(module, name)
-    if function is None or (module, name) in _functions_in_progress:
+    function = original_definition(module_name, function_name)
+    if function is None or (module_name, function_name) in _functions_in_progress:
         return frozenset()
-    _functions_in_progress.add((module, name))
+    _functions_in_progress.add((module_name, function_name))
     argument_of, touched = argument_of_names(function), set[str]()
     for node in _nodes_of_block(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            touched |= arguments_written_by_call((module, name), node, argument_of)
-    _functions_in_progress.remove((module, name))
+            touched |= arguments_written_by_call((module_name, function_name), node, argument_of)
+    _functions_in_progress.remove((module_name, function_name))
     return frozenset(touched)
 
 
 _functions_in_progress: set[tuple[str, str]] = set()
 
 
-def arguments_written_by_call(caller: tuple[str, str], call: ast.Call, argument_of: dict[str, str]) -> set[str]:
-    """Names of the caller's arguments that a call passes to a function which writes into them. caller: module and name
-    of the calling function."""
-    definition = _defining_module(caller[0], getattr(call.func, "id", ""))
-    if definition is None or definition == caller:
+def arguments_written_by_call(
+    calling_function: tuple[str, str], call_node: ast.Call, argument_of_name: dict[str, str]
+) -> set[str]:
+    """Names of the caller's arguments that a call passes to a function which writes into them. calling_function: module
+    and name of the calling function."""
+    definition = _defining_module(calling_function[0], getattr(call_node.func, "id", ""))
+    if definition is None or definition == calling_function:
         return set()
     callee = original_definition(*definition)
     if callee is None:
@@ -166,23 +182,25 @@ def arguments_written_by_call(caller: tuple[str, str], call: ast.Call, argument_
     touched = set().union(
         *(_written_arguments(node, inner) for node in _nodes_of_block(callee))
     ) | arguments_written_by_callees(*definition)
-    pairs = zip(call.args, argument_names(callee), strict=False)
-    return {root_argument(given, argument_of) for given, parameter in pairs if parameter in touched} - {""}
+    pairs = zip(call_node.args, argument_names(callee), strict=False)
+    return {root_argument(given, argument_of_name) for given, parameter in pairs if parameter in touched} - {""}
 
 
-def arrays_over_pointers(function: Function, argument_of: dict[str, str], roots: set[str]) -> dict[str, list[ast.Call]]:
+def arrays_over_pointers(
+    function_node: Function, argument_of_name: dict[str, str], root_names: set[str]
+) -> dict[str, list[ast.Call]]:
     """Pointer argument of a function -> calls ``array(pointer, shape)`` that create arrays over it. Only calls count
     whose names are arguments or occur in assignments at the function's top level."""
-    outermost = {*argument_names(function)}
-    for statement in function.body:
+    outermost = {*argument_names(function_node)}
+    for statement in function_node.body:
         if isinstance(statement, ast.Assign):
             outermost |= {each.id for each in ast.walk(statement) if isinstance(each, ast.Name)}
     arrays = dict[str, list[ast.Call]]()
-    for node in _nodes_of_block(function):
+    for node in _nodes_of_block(function_node):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "array":
             pointer, names = node.args[0], {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
-            root = argument_of.get(pointer.id, "") if isinstance(pointer, ast.Name) else ""
-            if root in roots and names <= outermost | {"array"}:
+            root = argument_of_name.get(pointer.id, "") if isinstance(pointer, ast.Name) else ""
+            if root in root_names and names <= outermost | {"array"}:
                 arrays.setdefault(root, []).append(node)
     return {root: list({ast.unparse(each): each for each in calls}.values()) for root, calls in arrays.items()}
 
@@ -191,22 +209,28 @@ class _FaultRewriter(ast.NodeTransformer):
     """Rewriter of a function whose results are to be multiplied by the fault's factor. caller: the function's module
     and name; scaled_arguments: arguments that are multiplied when the function ends; number: of the function."""
 
-    def __init__(self, caller: tuple[str, str], function: Function, scaled_arguments: list[str], number: int) -> None:
+    def __init__(
+        self,
+        module_and_function: tuple[str, str],
+        function_node: Function,
+        scaled_arguments: list[str],
+        function_number: int,
+    ) -> None:
         self.caller, self.argument_of, self.scaled_arguments, self.number = (
-            caller,
-            argument_of_names(function),
+            module_and_function,
+            argument_of_names(function_node),
             scaled_arguments,
-            number,
+            function_number,
         )
         self.arrays = {
             root: [copy.deepcopy(each) for each in calls]
-            for root, calls in arrays_over_pointers(function, self.argument_of, {*scaled_arguments}).items()
+            for root, calls in arrays_over_pointers(function_node, self.argument_of, {*scaled_arguments}).items()
         }
 
-    def body(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+    def body(self, body_statements: list[ast.stmt]) -> list[ast.stmt]:
         """Rewritten statements of the function's body."""
         made: list[ast.stmt] = []
-        for statement in statements:
+        for statement in body_statements:
             new = self.visit(statement)
             made += new if isinstance(new, list) else [new]
         return made if isinstance(made[-1], ast.Return) else [*made, *self._endings()]
@@ -247,22 +271,22 @@ class _FaultRewriter(ast.NodeTransformer):
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AugAssign:
         return self._put(node)
 
-    def _put(self, node: Any) -> Any:
+    def _put(self, assignment: Any) -> Any:
         """Rewrite an assignment into an argument so that the assigned value carries the fault. If the whole argument is
         multiplied at the end, the value is only changed where the argument is not an array."""
-        into = sorted(_written_arguments(node, self.argument_of))
+        into = sorted(_written_arguments(assignment, self.argument_of))
         if into and not set(into) & set(self.scaled_arguments):
-            node.value = self._spoiled(node.value)
+            assignment.value = self._spoiled(assignment.value)
         elif into:
             whole = next(name for name in into if name in self.scaled_arguments)
-            node.value = self._into(node.value, whole)
-        return node
+            assignment.value = self._into(assignment.value, whole)
+        return assignment
 
-    def _spoiled(self, value: ast.expr) -> ast.Call:
-        return self._call(SPOILED, value)
+    def _spoiled(self, value_node: ast.expr) -> ast.Call:
+        return self._call(SPOILED, value_node)
 
-    def _into(self, value: ast.expr, argument: str) -> ast.Call:
-        return self._call(PUT, value, ast.Name(argument, ast.Load()))
+    def _into(self, value_node: ast.expr, argument_name: str) -> ast.Call:
+        return self._call(PUT, value_node, ast.Name(argument_name, ast.Load()))
 
     def _endings(self) -> list[ast.stmt]:
         """Statements for the function's end that multiply whole array arguments by the fault's factor."""
@@ -271,28 +295,28 @@ class _FaultRewriter(ast.NodeTransformer):
         ]
         return [ast.Expr(self._call(SCALED, whole)) for whole in wholes]
 
-    def _call(self, name: str, *arguments: ast.expr) -> ast.Call:
-        return ast.Call(ast.Name(name, ast.Load()), [*arguments, ast.Constant(self.number)], [])
+    def _call(self, helper_name: str, *argument_nodes: ast.expr) -> ast.Call:
+        return ast.Call(ast.Name(helper_name, ast.Load()), [*argument_nodes, ast.Constant(self.number)], [])
 
 
-def rewritten_module(source: str, module: str, function_numbers: dict[str, int]) -> ast.Module:
+def rewritten_module(source_code: str, module_name: str, function_numbers: dict[str, int]) -> ast.Module:
     """Syntax tree of a module with some of its functions rewritten. function_numbers: name -> number of the function.
     Raises NoSuchFunction where a name is not defined."""
-    parsed = ast.parse(source)
+    parsed = ast.parse(source_code)
     for name, number in function_numbers.items():
         function = function_definition(parsed, name)
-        scaled_arguments = sorted(arguments_written_by_callees(module, name))
-        function.body = _FaultRewriter((module, name), function, scaled_arguments, number).body(function.body)
+        scaled_arguments = sorted(arguments_written_by_callees(module_name, name))
+        function.body = _FaultRewriter((module_name, name), function, scaled_arguments, number).body(function.body)
     helpers: list[ast.stmt] = [ast.ImportFrom("validation.blind_spots.spoiling", [*map(_as_helper, HELPERS)], 0)]
-    if COMPILER_PATTERN.search(source):
+    if COMPILER_PATTERN.search(source_code):
         helpers += [ast.Import([ast.alias("validation.blind_spots.compiled_spoiling", "_compiled_by_audit")])]
     first = sum(1 for _ in takewhile(_is_module_head, parsed.body))
     parsed.body[first:first] = helpers
     return ast.fix_missing_locations(parsed)
 
 
-def _as_helper(name: str) -> ast.alias:
-    return ast.alias(name, HELPERS[name])
+def _as_helper(helper_name: str) -> ast.alias:
+    return ast.alias(helper_name, HELPERS[helper_name])
 
 
 def _is_module_head(statement: ast.stmt) -> bool:
@@ -301,9 +325,11 @@ def _is_module_head(statement: ast.stmt) -> bool:
     return is_docstring or (isinstance(statement, ast.ImportFrom) and statement.module == "__future__")
 
 
-def can_be_spoiled(module: str, name: str) -> bool:
+def can_be_spoiled(module_name: str, function_name: str) -> bool:
     """Whether a function returns or writes a value in which a fault can be planted."""
-    function = function_definition(rewritten_module(source_text(module), module, {name: 0}), name)
+    function = function_definition(
+        rewritten_module(source_text(module_name), module_name, {function_name: 0}), function_name
+    )
     named = {
         node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }

@@ -36,24 +36,24 @@ def all_modules() -> frozenset[str]:
 
 
 @cache
-def imported_modules(module: str) -> frozenset[str]:
+def imported_modules(module_name: str) -> frozenset[str]:
     """Names of the modules of ``models`` and of the engines that a module imports, anywhere in its source."""
     names = set[str]()
-    for whole, package, inside, line in IMPORT_PATTERN.findall(source_text(module)):
+    for whole, package, inside, line in IMPORT_PATTERN.findall(source_text(module_name)):
         parts = (part.split()[0] for part in (inside or line).split(",") if part.strip())
         names |= {whole.split()[0]} if whole else {package, *(f"{package}.{part}" for part in parts)}
     return frozenset((names & all_modules()) | ({name.partition(".")[0] for name in names} & set(ENGINES)))
 
 
-def modules_of_side(start_modules: Iterable[str], excluded: frozenset[str] = frozenset()) -> set[str]:
+def modules_of_side(start_modules: Iterable[str], excluded_modules: frozenset[str] = frozenset()) -> set[str]:
     """The start modules and all modules that they import, directly or indirectly, without imports through excluded
     modules."""
-    reached, left = set[str](), [name for name in start_modules if name not in excluded]
+    reached, left = set[str](), [name for name in start_modules if name not in excluded_modules]
     while left:
         name = left.pop()
         if name not in reached:
             reached.add(name)
-            left += [each for each in imported_modules(name) if each not in ENGINES and each not in excluded]
+            left += [each for each in imported_modules(name) if each not in ENGINES and each not in excluded_modules]
     return reached
 
 
@@ -68,23 +68,25 @@ def shared_modules() -> tuple[str, ...]:
     return tuple(sorted(all_modules() - engines - alone - {"models"}))
 
 
-def function_definitions(module: str) -> Iterator[tuple[str, Function]]:
+def function_definitions(module_name: str) -> Iterator[tuple[str, Function]]:
     """Qualified name and syntax tree of each function of a module."""
 
-    def inside(node: ast.AST, prefix: str) -> Iterator[tuple[str, Function]]:
-        for child in (*getattr(node, "body", ()), *getattr(node, "orelse", ())):
+    def inside(syntax_node: ast.AST, name_prefix: str) -> Iterator[tuple[str, Function]]:
+        for child in (*getattr(syntax_node, "body", ()), *getattr(syntax_node, "orelse", ())):
             if isinstance(child, Function):
-                yield prefix + child.name, child
-                yield from inside(child, f"{prefix}{child.name}.<locals>.")
+                yield name_prefix + child.name, child
+                yield from inside(child, f"{name_prefix}{child.name}.<locals>.")
             elif isinstance(child, ast.stmt):
-                yield from inside(child, f"{prefix}{child.name}." if isinstance(child, ast.ClassDef) else prefix)
+                yield from inside(
+                    child, f"{name_prefix}{child.name}." if isinstance(child, ast.ClassDef) else name_prefix
+                )
 
-    return inside(module_tree(module), "")
+    return inside(module_tree(module_name), "")
 
 
-def is_compiled(function: Function) -> bool:
+def is_compiled(function_node: Function) -> bool:
     """Whether numba compiles a function, by its decorators."""
-    names = (ast.unparse(each).partition("(")[0].rpartition(".")[2] for each in function.decorator_list)
+    names = (ast.unparse(each).partition("(")[0].rpartition(".")[2] for each in function_node.decorator_list)
     return any(name in COMPILING_DECORATORS for name in names)
 
 

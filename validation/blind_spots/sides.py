@@ -35,18 +35,18 @@ def runs_to_trace() -> list[Run]:
     return [(name, engine) for name, several in engines.items() if len(several) > 1 for engine in several]
 
 
-def engines_of(scene: Path) -> tuple[str, ...]:
+def engines_of(scene_path: Path) -> tuple[str, ...]:
     """Names of the engines that can run a scene file, the engines on request included."""
-    system = SYSTEMS[tomllib.loads(scene.read_text(encoding="utf-8")).get("system", DEFAULT_SYSTEM)]
+    system = SYSTEMS[tomllib.loads(scene_path.read_text(encoding="utf-8")).get("system", DEFAULT_SYSTEM)]
     return (*system.engines, *system.on_request)
 
 
-def prepared_scene(scene: str) -> Any:
+def prepared_scene(scene_path: str) -> Any:
     """Reads and checks a scene of ``scene_files``."""
-    path = scene_files()[scene]
+    path = scene_files()[scene_path]
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     table.pop("engines_asked", None)  # the key of a recorded job
-    return of_table(table, scene, path.parent)
+    return of_table(table, scene_path, path.parent)
 
 
 def engines_of_functions(run_traces: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:

@@ -80,28 +80,28 @@ class Line:
         return Line(**{**asdict(made), **texts})
 
 
-def read_table(path: Path = TABLE_FILE) -> list[Line]:
+def read_table(table_path: Path = TABLE_FILE) -> list[Line]:
     """Lines of an audit's table (CSV); none where there is no file."""
-    if not path.is_file():
+    if not table_path.is_file():
         return []
-    with path.open(newline="", encoding="utf-8") as file:
+    with table_path.open(newline="", encoding="utf-8") as file:
         return [
             Line(**{**each, "calling": int(each["calling"]), "left": int(each["left"])})  # type: ignore[arg-type]
             for each in csv.DictReader(file)
         ]
 
 
-def write_table(lines: Iterable[Line], path: Path) -> None:
+def write_table(audit_lines: Iterable[Line], table_path: Path) -> None:
     """Write an audit's table (CSV), sorted by the names of the functions."""
-    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(table_path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Line)], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(asdict(line) for line in sorted(lines, key=lambda line: line.function))
+        writer.writerows(asdict(line) for line in sorted(audit_lines, key=lambda line: line.function))
 
 
-def is_independent(id: str, grounds: str) -> bool:
+def is_independent(check_id: str, stated_grounds: str) -> bool:
     """Whether a row or test with an id and grounds counts as an independent check."""
-    return grounds in INDEPENDENT_GROUNDS and not id.startswith(CHECKS_OF_CHECKS)
+    return stated_grounds in INDEPENDENT_GROUNDS and not check_id.startswith(CHECKS_OF_CHECKS)
 
 
 @cache
@@ -112,12 +112,16 @@ def harmless_functions() -> dict[str, tuple[str, str]]:
         return {each["function"]: (each["why"], each["proof"]) for each in csv.DictReader(file)}
 
 
-def kind_of(function: str, engines: Mapping[str, tuple[str, ...]]) -> str:
+def kind_of(function_name: str, engines_of_function: Mapping[str, tuple[str, ...]]) -> str:
     """Kind of a function, in the words of ``Line.kind``: "compiled", or "Python" with the engines that share it."""
-    return "compiled" if function in compiled_functions() else " ".join(["Python", *engines.get(function, ())])
+    return (
+        "compiled"
+        if function_name in compiled_functions()
+        else " ".join(["Python", *engines_of_function.get(function_name, ())])
+    )
 
 
-def merged_lines(saved_lines: Iterable[Line], new_lines: Iterable[Line], functions: Iterable[str]) -> list[Line]:
+def merged_lines(saved_lines: Iterable[Line], new_lines: Iterable[Line], function_names: Iterable[str]) -> list[Line]:
     """Table lines of a new audit, joined with the saved lines of all other functions that still exist.
 
     A function that the new audit did not examine retains its saved line.
@@ -125,18 +129,18 @@ def merged_lines(saved_lines: Iterable[Line], new_lines: Iterable[Line], functio
     new_lines = sorted(new_lines, key=lambda line: line.ended != NOT_AUDITED)
     count = sum(line.ended == NOT_AUDITED for line in new_lines)
     lines = {line.function: line for line in (*new_lines[:count], *saved_lines, *new_lines[count:])}
-    return [lines[name] for name in functions if name in lines]
+    return [lines[name] for name in function_names if name in lines]
 
 
-def uncovered_functions(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
+def uncovered_functions(audit_lines: Iterable[Line], function_names: Iterable[str]) -> dict[str, list[str]]:
     """Reason -> functions whose fault no independent check notices.
 
-    functions : all functions that are shared now; functions without a line count as "not audited".
+    function_names : all functions that are shared now; functions without a line count as "not audited".
     """
-    known = {line.function: line for line in lines}
+    known = {line.function: line for line in audit_lines}
     gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": []}
     gaps |= {"run by nothing": [], "not spoiled": [], NOT_AUDITED: [], **{why: [] for why in WHY_HARMLESS}}
-    for name in functions:
+    for name in function_names:
         line = known.get(name)
         if name in harmless_functions():
             gaps[harmless_functions()[name][0]].append(name)

@@ -14,11 +14,11 @@ from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
 
 def on_road(
-    plane: PlaneVehicle, tables: Tables, road: RoadSurfaces = UNIFORM_ROAD, slope: float = 10.0
+    plane_vehicle: PlaneVehicle, tyre_tables: Tables, road: RoadSurfaces = UNIFORM_ROAD, cornering_slope: float = 10.0
 ) -> VehicleOnRoad:
-    """A plane vehicle on a road, all of its wheels with the same tyre. slope: cornering slope of its friction
+    """A plane_vehicle vehicle on a road, all of its wheels with the same tyre. cornering_slope: cornering cornering_slope of its friction
     (1/rad)."""
-    return VehicleOnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
+    return VehicleOnRoad(plane_vehicle, np.zeros(plane_vehicle.wheels, dtype=int), cornering_slope, tyre_tables, road)
 
 
 class RollingTruck:
@@ -34,14 +34,14 @@ class RollingTruck:
         speed: float,
         *,
         steer: float = 0.0,
-        step_function: Callable[..., tuple[int, float]] = advance,
+        advance_step: Callable[..., tuple[int, float]] = advance,
     ) -> None:
         self.plane, self.time = vehicle.plane, 0.0
         state = np.zeros((2, 2 + vehicle.plane.masses.size))
         state[1, 0] = speed
         self.motion = motion_of(state, speed / self.plane.radius)
         steered = np.where(self.plane.place[:, 0] > 0.0, steer, 0.0)
-        self._go, self._others = step_function, (steered, vehicle)
+        self._go, self._others = advance_step, (steered, vehicle)
 
     @property
     def state(self) -> np.ndarray:
@@ -63,25 +63,25 @@ class RollingTruck:
         """Speed of the first unit's centre of mass (m/s)."""
         return float(np.hypot(*self.state[1, :2]))
 
-    def on(self, torques: np.ndarray, step: float) -> tuple[int, float]:
+    def on(self, brake_torques: np.ndarray, time_step: float) -> tuple[int, float]:
         """Advance by n time steps (s) with brake torques (n + 1, number of wheels) in N m at their ends. Returns the
         status of the last step and the simulated time (s).
 
-        torques (number of wheels,) : constant during a single step.
+        brake_torques (number of wheels,) : constant during a single step.
         """
-        ends = torques if torques.ndim > 1 else np.tile(torques, (2, 1))
-        status, used = self._go(self.motion, ends, step, *self._others)
+        ends = brake_torques if brake_torques.ndim > 1 else np.tile(brake_torques, (2, 1))
+        status, used = self._go(self.motion, ends, time_step, *self._others)
         self.time += used
         return status, used
 
     def braked(
-        self, torques: np.ndarray, step: float = 5.5e-3, end_speed: float = 0.0, duration: float = 200.0
+        self, brake_torques: np.ndarray, time_step: float = 5.5e-3, end_speed: float = 0.0, duration: float = 200.0
     ) -> "RollingTruck":
         """Advance with constant brake torques (N m) until the vehicle stands, or until it reaches a speed (m/s) or a
         time (s); returns the vehicle. Raises RunFailed."""
         status = FINE
         while status == FINE and self.speed > end_speed and self.time < duration - 1e-9:
-            status, _ = self.on(torques, step)
+            status, _ = self.on(brake_torques, time_step)
         if status not in (FINE, AT_REST):
             raise RunFailed("braking", "the truck does not come to its end", self.time)
         return self
@@ -93,35 +93,38 @@ LOCKING_TORQUE = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def truck_on_tables(tables: Tables | None = None, plane: PlaneVehicle = PAPER_PLANE) -> VehicleOnRoad:
+def truck_on_tables(tyre_tables: Tables | None = None, plane_vehicle: PlaneVehicle = PAPER_PLANE) -> VehicleOnRoad:
     """The paper's truck on ice, or on other tyre tables with the cornering slope of ice."""
-    return on_road(plane, tables or stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering)
+    return on_road(plane_vehicle, tyre_tables or stacked_tables([ICE_TABLE]), cornering_slope=ICE_TABLE.cornering)
 
 
-def constant_friction(mu: float) -> Tables:
-    """Tyre tables whose friction coefficient is ``mu`` at every slip above 0.1."""
-    flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
+def constant_friction(friction_coefficient: float) -> Tables:
+    """Tyre tables whose friction coefficient is the given one at every slip above 0.1."""
+    flat = np.broadcast_to(np.array([0.0, friction_coefficient, friction_coefficient]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
-    g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]])
+    g, h = (
+        np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]),
+        np.array([[0.0], [friction_coefficient], [friction_coefficient]]),
+    )
     return stacked_tables([TyreTable(*nodes, flat, g, h)])
 
 
-def transfer_errors(mu: float = 0.4) -> dict[str, float]:
+def transfer_errors(friction_coefficient: float = 0.4) -> dict[str, float]:
     """Relative errors of the axle loads against a closed form, with all wheels, the front or the rear wheels locked.
 
-    Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
-    axles' loads change by m z g h / E.
+    A friction coefficient mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one
+    axle, and the axles' loads change by m z g h / E.
     """
     lift = PAPER_TRUCK.height / PAPER_TRUCK.wheelbase
     light, static = PAPER_PLANE._replace(spin=np.full(4, 1e-9)), PAPER_PLANE.static.reshape(2, 2).sum(1)
     slowing = {
-        "all wheels": mu * GRAVITY,
-        "front wheels": mu * static[0] / (PAPER_TRUCK.mass * (1.0 - mu * lift)),
-        "rear wheels": mu * static[1] / (PAPER_TRUCK.mass * (1.0 + mu * lift)),
+        "all wheels": friction_coefficient * GRAVITY,
+        "front wheels": friction_coefficient * static[0] / (PAPER_TRUCK.mass * (1.0 - friction_coefficient * lift)),
+        "rear wheels": friction_coefficient * static[1] / (PAPER_TRUCK.mass * (1.0 + friction_coefficient * lift)),
     }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
-        slid = RollingTruck(truck_on_tables(constant_friction(mu), light), 10.0).braked(
+        slid = RollingTruck(truck_on_tables(constant_friction(friction_coefficient), light), 10.0).braked(
             np.repeat(torque, 2), duration=0.5
         )
         wanted = static + PAPER_TRUCK.mass * slowing[name] * lift * np.array([1.0, -1.0])

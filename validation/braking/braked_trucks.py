@@ -24,16 +24,16 @@ TRUCK, HIGH_TRUCKS = plane_of_truck(PAPER_TRUCK), plane_of_truck(PAPER_TRUCK.mod
 """The paper's truck, and a truck as high as it is long and twice as high as it is wide."""
 
 
-def energy_gain_case(speeds: tuple[float, float, float], brake_torque: float) -> Error:
+def energy_gain_case(initial_rates: tuple[float, float, float], brake_torque: float) -> Error:
     """Case: the truck slides on ice with initial rates of x, y (m/s) and heading (rad/s) under brake torques (N m).
     Error: largest gain of kinetic energy over 20 ms divided by the initial energy."""
 
     def energy(rates: np.ndarray) -> float:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(implementation: str, work_folder: Path) -> float:
         moved_vehicle = AdvancedVehicle(implementation, TRUCK, ICE, rim_turning=0.0)
-        moved_vehicle.state[1] = speeds
+        moved_vehicle.state[1] = initial_rates
         first, gains = energy(moved_vehicle.state[1]), []
         for _ in range(25):
             energy_before = energy(moved_vehicle.state[1])
@@ -44,7 +44,7 @@ def energy_gain_case(speeds: tuple[float, float, float], brake_torque: float) ->
     return error
 
 
-def asymmetry_on_even_friction(implementation: str, folder: Path) -> float:
+def asymmetry_on_even_friction(implementation: str, work_folder: Path) -> float:
     """Case: the truck brakes straight ahead on even friction. Error: largest of y, heading and their rates (m, rad, per
     s), which should be 0."""
     moved_vehicle = AdvancedVehicle(implementation, TRUCK, DRY)
@@ -52,7 +52,7 @@ def asymmetry_on_even_friction(implementation: str, folder: Path) -> float:
     return float(np.abs(moved_vehicle.state[:, 1:]).max())
 
 
-def mirrored_truck_error(implementation: str, folder: Path) -> float:
+def mirrored_truck_error(implementation: str, work_folder: Path) -> float:
     """Case: the truck brakes and steers left, with less friction on the left. Error: difference (m, rad) from the
     mirror image of the mirrored stop."""
     ends = []
@@ -65,20 +65,20 @@ def mirrored_truck_error(implementation: str, folder: Path) -> float:
     return float(np.abs(ends[0] - ends[1]).max())
 
 
-def lifting_truck_error(implementation: str, folder: Path) -> float:
+def lifting_truck_error(implementation: str, work_folder: Path) -> float:
     """Case: a truck as high as it is long brakes on dry road; the run must fail. Error: infinite if it does not."""
     AdvancedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0).advance_with(np.full((101, 4), 2e4))
     return np.inf
 
 
-def overturning_truck_error(implementation: str, folder: Path) -> float:
+def overturning_truck_error(implementation: str, work_folder: Path) -> float:
     """Case: a truck twice as high as it is wide steers on dry road; the run must fail. Error: infinite if it does
     not."""
     AdvancedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).advance_with(np.zeros((201, 4)))
     return np.inf
 
 
-def jackknifed_train_error(implementation: str, folder: Path) -> float:
+def jackknifed_train_error(implementation: str, work_folder: Path) -> float:
     """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: largest gain of kinetic
     energy in 20 ms divided by the initial energy."""
     plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), with_load_transfer=False)
@@ -99,7 +99,7 @@ def jackknifed_train_error(implementation: str, folder: Path) -> float:
     return float(max(np.diff(levels).max(), 0.0) / levels[0]) if levels[-1] < 0.8 * levels[0] else np.inf
 
 
-def split_friction_error(implementation: str, folder: Path) -> float:
+def split_friction_error(implementation: str, work_folder: Path) -> float:
     """Case: all wheels of the truck are locked for 5 ms, with friction 0 on the left and 0.8 on the right. Error:
     relative difference of the loss of speed from mu g t / 2."""
     tyres, plane = (
@@ -114,14 +114,14 @@ def split_friction_error(implementation: str, folder: Path) -> float:
     return lost if moved_vehicle.state[1, 2] < 0.0 else np.inf
 
 
-def braking_scene(**tables: Any) -> BrakingScene:
+def braking_scene(**scene_tables: Any) -> BrakingScene:
     """Braking scene of the truck from 1.5 m/s on ice without an anti-lock system; keyword arguments add or replace
     tables."""
     plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 1.5}}, "pressure": {}}
-    return build({**plain, **tables})
+    return build({**plain, **scene_tables})
 
 
-def motion_after_rest_on_lagging_tyres(implementation: str, folder: Path) -> float:
+def motion_after_rest_on_lagging_tyres(implementation: str, work_folder: Path) -> float:
     """Case: the truck slides to rest on tyres with relaxation lengths, then keeps its brakes on for 1 s. Error:
     displacement (m) and speed (m/s) after the stop."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
@@ -135,12 +135,12 @@ def motion_after_rest_on_lagging_tyres(implementation: str, folder: Path) -> flo
     return float(displacement) if path.ended_at_rest else np.inf
 
 
-def rest_error_of_scene(**tables: Any) -> Error:
+def rest_error_of_scene(**scene_tables: Any) -> Error:
     """Case: a braking scene in which the vehicle must come to rest. Error: remaining speeds of vehicle and wheels (m/s,
     rad/s)."""
 
-    def error(implementation: str, folder: Path) -> float:
-        path = run(braking_scene(**tables), implementation).detail
+    def error(implementation: str, work_folder: Path) -> float:
+        path = run(braking_scene(**scene_tables), implementation).detail
         return (
             float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.ended_at_rest else np.inf
         )
@@ -158,7 +158,7 @@ J_TURN_AT_LOCKING_LIMIT: dict[str, Any] = {
 """Scene tables of a J-turn on dry road with brake torques at the limit of locking."""
 
 
-def load_sharing_error(implementation: str, folder: Path) -> float:
+def load_sharing_error(implementation: str, work_folder: Path) -> float:
     """Case: four wheel loads of which one is negative are redistributed to the other wheels. Error: change of their sum
     (N) and of their moments (N m) about both horizontal axes."""
     loads = np.array([9e3, 24e3, -4e3, 26e3])
@@ -171,18 +171,18 @@ def load_sharing_error(implementation: str, folder: Path) -> float:
     return float(np.abs(balance() - balance_before).max()) if loads.min() >= 0.0 else np.inf
 
 
-def torque_below_push_out(implementation: str, folder: Path) -> float:
+def torque_below_push_out(implementation: str, work_folder: Path) -> float:
     """Case: a brake just below its push-out pressure. Error: its torque (N m), which should be 0."""
     return float(brake_torque(0, 0.99 * PAPER_FRONT_BRAKE.push_out, 0.0, brakes_of_wheels(PAPER_FRONT_BRAKE)))
 
 
-def impossible_command_case(supply_pressure: float = 8.0, **command: Any) -> Error:
+def impossible_command_case(supply_pressure: float = 8.0, **command_fields: Any) -> Error:
     """Case: a controller returns an impossible command while the supply has a pressure (bar); the command must be
     refused. Error: infinite if it is not."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(implementation: str, work_folder: Path) -> float:
         usable_command(
-            Command(**command),
+            Command(**command_fields),
             Sample(3, 16_500_000, np.ones(4), True, supply_pressure, 10.0),
             maximum_pressure=supply_pressure,
         )

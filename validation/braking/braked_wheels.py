@@ -40,24 +40,24 @@ class AdvancedVehicle(RollingTruck):
     def __init__(
         self,
         implementation: str,
-        plane: PlaneVehicle,
-        *tyres: TyreTable,
+        plane_vehicle: PlaneVehicle,
+        *tyre_table: TyreTable,
         speed: float = SPEED,
         rim_turning: float | None = None,
         road: RoadSurfaces = UNIFORM_ROAD,
         steer: float = 0.0,
     ) -> None:
-        go = advance if implementation == "reference" else EngineChassis(implementation, plane).advance
-        super().__init__(on_road(plane, stacked_tables(tyres), road), speed, steer=steer, step_function=go)
+        go = advance if implementation == "reference" else EngineChassis(implementation, plane_vehicle).advance
+        super().__init__(on_road(plane_vehicle, stacked_tables(tyre_table), road), speed, steer=steer, step_function=go)
         self.implementation = implementation
         if rim_turning is not None:
             self.turning[:] = rim_turning
 
-    def advance_with(self, torques: np.ndarray, step: float = STEP) -> bool:
+    def advance_with(self, brake_torques: np.ndarray, time_step: float = STEP) -> bool:
         """Advance with brake torques (n + 1, number of wheels) in N m at the ends of n steps (s). Returns whether the
         vehicle came to rest. Raises RunFailed."""
         self.motion.accelerations[:] = 0.0
-        status, used = self.on(torques, step)
+        status, used = self.on(brake_torques, time_step)
         if status in FATAL_END_STATUSES:
             raise RunFailed(self.implementation, ending_sentence(status, self.plane, self.motion), used)
         return status == AT_REST and bool(np.isfinite(self.state).all() and np.isfinite(self.turning).all())
@@ -71,25 +71,25 @@ class AdvancedVehicle(RollingTruck):
 def stopping_distance(
     implementation: str,
     brake_torque: float,
-    *tyres: TyreTable,
-    step: float = STEP,
+    *tyre_table: TyreTable,
+    time_step: float = STEP,
     rim_turning: float | None = None,
     road: RoadSurfaces = UNIFORM_ROAD,
 ) -> float:
     """Stopping distance (m) of the quarter vehicle under a constant brake torque (N m); infinite unless all speeds end
     at exactly 0."""
-    wheel = AdvancedVehicle(implementation, QUARTER.plane, *tyres, rim_turning=rim_turning, road=road)
-    least_force = min(brake_torque / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
+    wheel = AdvancedVehicle(implementation, QUARTER.plane, *tyre_table, rim_turning=rim_turning, road=road)
+    least_force = min(brake_torque / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyre_table))
     rests = wheel.advance_with(
-        np.full((int(2.0 * SPEED * QUARTER.mass / least_force / step) + 50, 1), brake_torque), step
+        np.full((int(2.0 * SPEED * QUARTER.mass / least_force / time_step) + 50, 1), brake_torque), time_step
     )
     return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
 
 
-def constant_slip_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
+def constant_slip_stop(tyre_table: TyreTable, slip: float) -> tuple[float, float, float]:
     """Brake torque (N m) at which a slip stays constant, the stopping distance (m) at this slip, and the wheel's
     initial angular velocity (rad/s)."""
-    force = LOAD * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
+    force = LOAD * float(np.interp(slip, tyre_table.slips, tyre_table.mu_x[0, 0]))
     return (
         QUARTER.steady_torque(slip, force),
         QUARTER.mass * SPEED**2 / (2.0 * force),
@@ -97,27 +97,29 @@ def constant_slip_stop(tyre: TyreTable, slip: float) -> tuple[float, float, floa
     )
 
 
-def constant_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
+def constant_slip_case(tyre_table: TyreTable, slip: float, time_step: float = STEP) -> Error:
     """Case: a stop at constant slip. Error: relative difference of the stopping distance from m v^2 / (2 F)."""
-    level, distance, turning = constant_slip_stop(tyre, slip)
+    level, distance, turning = constant_slip_stop(tyre_table, slip)
     return lambda name, folder: abs(
-        stopping_distance(name, level, tyre, step=step, rim_turning=turning) / distance - 1.0
+        stopping_distance(name, level, tyre_table, time_step=time_step, rim_turning=turning) / distance - 1.0
     )
 
 
-def rolling_start_case(tyre: TyreTable, slip: float, step: float) -> Error:
+def rolling_start_case(tyre_table: TyreTable, slip: float, time_step: float) -> Error:
     """Case: a stop that starts with a rolling wheel. Error: relative difference of the stopping distance from the exact
     one."""
-    level, _, _ = constant_slip_stop(tyre, slip)
+    level, _, _ = constant_slip_stop(tyre_table, slip)
     return lambda name, folder: abs(
-        stopping_distance(name, level, tyre, step=step) / exact_distance(QUARTER, tyre, level, SPEED) - 1.0
+        stopping_distance(name, level, tyre_table, time_step=time_step)
+        / exact_distance(QUARTER, tyre_table, level, SPEED)
+        - 1.0
     )
 
 
 PEAKED_FRICTION = piecewise_linear_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
 
 
-def locking_torque_error(implementation: str, folder: Path) -> float:
+def locking_torque_error(implementation: str, work_folder: Path) -> float:
     """Case: a brake torque 0.1 % above the torque of the friction peak, so that the wheel locks. Error: relative
     difference of the stopping distance from the exact one."""
     peak = 1.001 * LOAD * 0.8 * (QUARTER.radius + QUARTER.spin_inertia / (QUARTER.mass * QUARTER.radius))
@@ -127,7 +129,7 @@ def locking_torque_error(implementation: str, folder: Path) -> float:
     )
 
 
-def peak_torque_error(implementation: str, folder: Path) -> float:
+def peak_torque_error(implementation: str, work_folder: Path) -> float:
     """Case: a brake torque exactly at the friction peak. Error: relative amount by which the stopping distance lies
     outside the range from constant peak friction to constant sliding friction."""
     force = LOAD * 0.8
@@ -138,14 +140,14 @@ def peak_torque_error(implementation: str, folder: Path) -> float:
     return max(1.0 - distance / shortest_distance, distance / (shortest_distance * 0.8 / 0.6) - 1.0, 0.0)
 
 
-def locked_wheel_error(implementation: str, folder: Path) -> float:
+def locked_wheel_error(implementation: str, work_folder: Path) -> float:
     """Case: the wheel is locked from the start. Error: relative difference of the stopping distance from v^2 / (2 mu
     g)."""
     distance = stopping_distance(implementation, 2e4, DRY, rim_turning=0.0)
     return abs(distance * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
 
 
-def changing_friction_error(implementation: str, folder: Path) -> float:
+def changing_friction_error(implementation: str, work_folder: Path) -> float:
     """Case: a locked wheel whose friction changes from 0.2 to 0.8 after 10 m. Error: relative difference of the
     stopping distance from its closed form."""
     slick, rough = (piecewise_linear_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
@@ -160,7 +162,7 @@ def changing_friction_error(implementation: str, folder: Path) -> float:
     return abs(distance / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
 
 
-def friction_range_error(implementation: str, folder: Path) -> float:
+def friction_range_error(implementation: str, work_folder: Path) -> float:
     """Case: a wheel locked for 0.2 s, with friction from 1e-6 to 1.5. Error: relative difference of the loss of speed
     from mu g t."""
     errors = []
@@ -173,14 +175,14 @@ def friction_range_error(implementation: str, folder: Path) -> float:
     return float(max(errors))
 
 
-def standing_vehicle_error(implementation: str, folder: Path) -> float:
+def standing_vehicle_error(implementation: str, work_folder: Path) -> float:
     """Case: a standing vehicle with its brakes on. Error: its displacement and speed (m, m/s), which should be 0."""
     wheel = AdvancedVehicle(implementation, QUARTER.plane, DRY, speed=0.0)
     wheel.advance_with(np.full((51, 1), 5e3))
     return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
 
 
-def backwards_spin_error(implementation: str, folder: Path) -> float:
+def backwards_spin_error(implementation: str, work_folder: Path) -> float:
     """Case: an unbraked wheel that spins backwards at the start. Error: relative difference of rim speed and vehicle
     speed after 0.5 s."""
     wheel = AdvancedVehicle(implementation, QUARTER.plane, DRY, rim_turning=-10.0)
@@ -188,7 +190,7 @@ def backwards_spin_error(implementation: str, folder: Path) -> float:
     return wheel.first_wheel_slip
 
 
-def released_brake_error(implementation: str, folder: Path) -> float:
+def released_brake_error(implementation: str, work_folder: Path) -> float:
     """Case: the brake of a locked wheel is released at the end of a step. Error: relative difference of rim speed and
     vehicle speed 0.6 s later."""
     wheel = AdvancedVehicle(implementation, QUARTER.plane, ICE, rim_turning=0.0)
@@ -196,7 +198,7 @@ def released_brake_error(implementation: str, folder: Path) -> float:
     return wheel.first_wheel_slip
 
 
-def surface_line_error(implementation: str, folder: Path) -> float:
+def surface_line_error(implementation: str, work_folder: Path) -> float:
     """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the stopping
     distance (m) from the distance on dry surface alone."""
     distance_on_line = stopping_distance(
@@ -205,12 +207,12 @@ def surface_line_error(implementation: str, folder: Path) -> float:
     return abs(distance_on_line - stopping_distance(implementation, 2e3, DRY))
 
 
-def surface_change_error(implementation: str, folder: Path) -> float:
+def surface_change_error(implementation: str, work_folder: Path) -> float:
     """Case: a lightly braked wheel whose surface changes from dry to wet within a step of 20 ms. Error: relative
     difference of the stopping distance from the distance with unchanged tyre force."""
     level, steady_distance, turning = constant_slip_stop(DRY, 0.004)
     two_surfaces = road_of_stretches([RoadStretch(0.0, 0, 0), RoadStretch(5.03, 1, 1)])
     stop = stopping_distance(
-        implementation, level, DRY, table_of_surface("wet"), step=2e-2, rim_turning=turning, road=two_surfaces
+        implementation, level, DRY, table_of_surface("wet"), time_step=2e-2, rim_turning=turning, road=two_surfaces
     )
     return abs(stop / steady_distance - 1.0)

@@ -33,13 +33,15 @@ class CellSolution:
     """Exact slip over time within cell i of the tyre table. It starts at slip s0 with a brake torque (N m) that changes
     at a constant rate (N m/s)."""
 
-    def __init__(self, wheel: ExactWheel, i: int, s0: float, torque: float, rate: float) -> None:
-        cell_width = wheel.slips[i + 1] - wheel.slips[i]
-        c = (wheel.forces[i + 1] - wheel.forces[i]) / cell_width
-        f0 = wheel.forces[i] - c * wheel.slips[i]
+    def __init__(
+        self, wheel: ExactWheel, cell_index: int, initial_slip: float, initial_torque: float, torque_rate: float
+    ) -> None:
+        cell_width = wheel.slips[cell_index + 1] - wheel.slips[cell_index]
+        c = (wheel.forces[cell_index + 1] - wheel.forces[cell_index]) / cell_width
+        f0 = wheel.forces[cell_index] - c * wheel.slips[cell_index]
         per = wheel.radius / (wheel.inertia * wheel.speed)
-        self.s0, self.v, self.k = s0, wheel.speed, per * wheel.radius * c
-        self.alpha, self.beta = per * (torque - wheel.radius * f0), per * rate
+        self.s0, self.v, self.k = initial_slip, wheel.speed, per * wheel.radius * c
+        self.alpha, self.beta = per * (initial_torque - wheel.radius * f0), per * torque_rate
         self.is_flat = abs(self.k) < 1e-9
         self.b = 0.0 if self.is_flat else self.beta / self.k
         self.a = 0.0 if self.is_flat else (self.alpha - self.b) / self.k
@@ -76,12 +78,12 @@ class CellSolution:
             time = -math.log(share) / self.k if share > 0.0 else math.inf
         return time if time > 0.0 else math.inf
 
-    def leaving_time(self, low: float, high: float, end_time: float) -> tuple[float, int]:
+    def leaving_time(self, lower_slip: float, upper_slip: float, end_time: float) -> tuple[float, int]:
         """First time (s) before ``end_time`` at which the slip leaves its cell, and through which node: -1 lower, 1
         upper. Returns ``end_time`` and 0 if the slip stays within the cell."""
         turn = min(self.time_at_acceleration(0.0), end_time)
         for start, end in ((0.0, turn), (turn, end_time)):
-            for node, side in ((low, -1), (high, 1)):
+            for node, side in ((lower_slip, -1), (upper_slip, 1)):
                 if end > start and side * (self.slip(end) - node) > 0.0:
                     if side * (self.slip(start) - node) >= 0.0:
                         return start, side
@@ -89,37 +91,44 @@ class CellSolution:
         return end_time, 0
 
 
-def _root_between(function: Callable[[float], float], low: float, high: float) -> float:
-    return float(brentq(function, low, high, xtol=1e-16, rtol=1e-14))
+def _root_between(function: Callable[[float], float], lower_bound: float, upper_bound: float) -> float:
+    return float(brentq(function, lower_bound, upper_bound, xtol=1e-16, rtol=1e-14))
 
 
-def advance_phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, acceleration_level: float) -> None:
-    """Advance ``state`` (slip, torque, time, impulse) to the end of a controller phase in which the brake torque
+def advance_phase(
+    wheel: ExactWheel, phase_state: list[float], torque_rate: float, crossing_sign: float, acceleration_level: float
+) -> None:
+    """Advance ``phase_state`` (slip, torque, time, impulse) to the end of a controller phase in which the brake torque
     changes at a constant rate (N m/s). It ends when the rim's acceleration (m/s^2) reaches ``acceleration_level``, from
     below with sign 1, from above with -1."""
-    i = min(int(np.searchsorted(wheel.slips, state[0], side="right")) - 1, wheel.slips.size - 2)
+    i = min(int(np.searchsorted(wheel.slips, phase_state[0], side="right")) - 1, wheel.slips.size - 2)
     for _ in range(100_000):
-        piece = CellSolution(wheel, i, state[0], state[1], rate)
-        if sign * (piece.rim_acceleration(0.0) - acceleration_level) >= 0.0:
+        piece = CellSolution(wheel, i, phase_state[0], phase_state[1], torque_rate)
+        if crossing_sign * (piece.rim_acceleration(0.0) - acceleration_level) >= 0.0:
             return
         met = min(piece.time_at_acceleration(acceleration_level), 0.1)
         time, side = piece.leaving_time(wheel.slips[i], wheel.slips[i + 1], met)
         ended = side == 0 and met < 0.1
-        state[:] = [piece.slip(time), state[1] + rate * time, state[2] + time, state[3] + piece.impulse(time)]
+        phase_state[:] = [
+            piece.slip(time),
+            phase_state[1] + torque_rate * time,
+            phase_state[2] + time,
+            phase_state[3] + piece.impulse(time),
+        ]
         if ended:
             return
         if side != 0:
-            state[0], i = float(wheel.slips[i + (side > 0)]), i + side
+            phase_state[0], i = float(wheel.slips[i + (side > 0)]), i + side
     raise ArithmeticError("a phase that does not end")
 
 
 def exact_cycle(
-    wheel_at_speed: WheelAtConstantSpeed, controller: FivePhase, first_rate: float | None = None
+    wheel_at_speed: WheelAtConstantSpeed, controller: FivePhase, initial_torque_rate: float | None = None
 ) -> tuple[float, float]:
     """Period (s) and mean force (divided by the largest tyre force) of the five-phase limit cycle of a wheel at
-    constant vehicle speed. first_rate: rate of pressure (bar/s) in the first application."""
+    constant vehicle speed. initial_torque_rate: rate of pressure (bar/s) in the first application."""
     rates = [pressure_rate_of_phase(k, controller) for k in range(6)]
-    rates[0] = rates[0] if first_rate is None else first_rate
+    rates[0] = rates[0] if initial_torque_rate is None else initial_torque_rate
     phases = [
         (wheel_at_speed.brake.rising * speed, *phase_end_threshold(k, controller)) for k, speed in enumerate(rates)
     ]
@@ -134,17 +143,17 @@ def exact_cycle(
 
 
 def last_control_cycle(
-    wheel: ExactWheel, phases: list[tuple[float, float, float]], cycle_count: int = 40
+    wheel: ExactWheel, controller_phases: list[tuple[float, float, float]], cycle_count: int = 40
 ) -> tuple[float, float]:
     """Period (s) of the last of several control cycles, and its mean force divided by the largest tyre force.
 
-    phases : rate of torque (N m/s), sign and acceleration level (m/s^2) at the end, for the first application and for
-    phases 1 to 5.
+    controller_phases : rate of torque (N m/s), sign and acceleration level (m/s^2) at the end, for the first
+    application and for phases 1 to 5.
     """
     wheel_state = [0.0, 0.0, 0.0, 0.0]
-    advance_phase(wheel, wheel_state, *phases[0])
+    advance_phase(wheel, wheel_state, *controller_phases[0])
     for _ in range(cycle_count):
         wheel_state[2:] = [0.0, 0.0]
-        for later in phases[1:]:
+        for later in controller_phases[1:]:
             advance_phase(wheel, wheel_state, *later)
     return wheel_state[2], wheel_state[3] / wheel_state[2] / float(wheel.forces.max())

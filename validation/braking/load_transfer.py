@@ -15,9 +15,9 @@ from models.vehicles.free_vehicle import SWAY
 from models.vehicles.spatial import SpatialVehicle
 
 
-def sliding_car(vehicle: SpatialVehicle, mu: float) -> Handling:
+def sliding_car(vehicle: SpatialVehicle, friction_coefficient: float) -> Handling:
     """The vehicle with all wheels locked, which slide with constant friction mu and so brake at mu g."""
-    return Handling(vehicle, Tyres(friction=mu, fixed=tuple(tyre.name for tyre in vehicle.tyres)))
+    return Handling(vehicle, Tyres(friction=friction_coefficient, fixed=tuple(tyre.name for tyre in vehicle.tyres)))
 
 
 def turning_car(vehicle: SpatialVehicle, steer: float) -> Handling:
@@ -25,21 +25,21 @@ def turning_car(vehicle: SpatialVehicle, steer: float) -> Handling:
     return Handling(vehicle, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
 
 
-def load_transfer(drive: SimulatedDrive) -> np.ndarray:
+def load_transfer(manoeuvre: SimulatedDrive) -> np.ndarray:
     """Moments (2,) in N m of the change of the wheel loads from start to end of a drive. The lever arms are the wheels'
     design positions: forward, then to the left."""
-    design = np.array([tyre.point[:2] for tyre in drive.handling.vehicle.tyres])
-    moments: np.ndarray = (drive["load"][-1] - drive["load"][0]) @ design
+    design = np.array([tyre.point[:2] for tyre in manoeuvre.handling.vehicle.tyres])
+    moments: np.ndarray = (manoeuvre["load"][-1] - manoeuvre["load"][0]) @ design
     return moments
 
 
-def expected_moments(drive: SimulatedDrive, accelerations: np.ndarray) -> np.ndarray:
+def expected_moments(manoeuvre: SimulatedDrive, accelerations: np.ndarray) -> np.ndarray:
     """Moments (2,) in N m that ``load_transfer`` should return, by the balance of all bodies at accelerations (2,) in
     m/s^2: forward, then to the left."""
-    handling, vehicle = drive.handling, drive.handling.vehicle
+    handling, vehicle = manoeuvre.handling, manoeuvre.handling.vehicle
     masses, heights = np.array([(body.mass, body.position[2]) for body in vehicle.bodies]).T
     radii = np.array([tyre.point[2] for tyre in vehicle.tyres])
-    roll, pitch = (drive.run.positions[-1, vehicle.coordinates().index((SWAY, turn))] for turn in ("rx", "ry"))
+    roll, pitch = (manoeuvre.run.positions[-1, vehicle.coordinates().index((SWAY, turn))] for turn in ("rx", "ry"))
     spins = sum(
         handling.tyres.spin_inertia / r
         for r, tyre in zip(radii, vehicle.tyres, strict=True)
@@ -49,12 +49,17 @@ def expected_moments(drive: SimulatedDrive, accelerations: np.ndarray) -> np.nda
     return leaning * np.array([pitch, -roll]) - accelerations * (masses @ heights + spins)
 
 
-def braked_error(drive: SimulatedDrive, mu: float) -> float:
+def braked_error(manoeuvre: SimulatedDrive, friction_coefficient: float) -> float:
     """Relative error of the load transfer between front and rear axle while all wheels slide."""
-    return float(load_transfer(drive)[0] / expected_moments(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
+    return float(
+        load_transfer(manoeuvre)[0] / expected_moments(manoeuvre, np.array([-friction_coefficient * GRAVITY, 0.0]))[0]
+        - 1.0
+    )
 
 
-def turning_error(drive: SimulatedDrive) -> float:
+def turning_error(manoeuvre: SimulatedDrive) -> float:
     """Relative error of the load transfer between the left and right wheels in a steady turn."""
-    forward_speed, _, rate = drive.velocity()[-1]
-    return float(load_transfer(drive)[1] / expected_moments(drive, np.array([0.0, forward_speed * rate]))[1] - 1.0)
+    forward_speed, _, rate = manoeuvre.velocity()[-1]
+    return float(
+        load_transfer(manoeuvre)[1] / expected_moments(manoeuvre, np.array([0.0, forward_speed * rate]))[1] - 1.0
+    )

@@ -15,28 +15,44 @@ NAN = float("nan")
 
 
 def answer_frame(
-    sample_number: int, magic: bytes = b"TRA1", frame_mode: bytes = b"V", wheels: int = 4, first: float = 1.0
+    sample_number: int,
+    magic_bytes: bytes = b"TRA1",
+    mode_byte: bytes = b"V",
+    wheel_count: int = 4,
+    first_value: float = 1.0,
 ) -> bytes:
     """Bytes of a controller's answer to a sample, valid by default; other arguments make it invalid."""
     return struct.pack(
-        "<4sIBB6x8d", magic, sample_number, frame_mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0
+        "<4sIBB6x8d",
+        magic_bytes,
+        sample_number,
+        mode_byte[0],
+        wheel_count,
+        first_value,
+        1.0,
+        1.0,
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
     )
 
 
-def misbehave(misbehaviour: str, sample_number: int, link: socket.socket) -> None:
+def misbehave(misbehaviour: str, sample_number: int, connection: socket.socket) -> None:
     """Send the wrong answer named by ``misbehaviour``, then wait until the vehicle's side closes the connection."""
     if misbehaviour == "died":
         os._exit(9)
     if misbehaviour == "late":
         time.sleep(0.8)
-    link.sendall(
+    connection.sendall(
         {
-            "NaN": answer_frame(sample_number, frame_mode=b"P", first=NAN),
-            "infinite": answer_frame(sample_number, frame_mode=b"P", first=float("inf")),
-            "NaN as a valve": answer_frame(sample_number, first=NAN),
-            "negative pressure": answer_frame(sample_number, frame_mode=b"P", first=-1.0),
-            "valve in no state": answer_frame(sample_number, first=0.5),
-            "too few wheels": answer_frame(sample_number, wheels=3),
+            "NaN": answer_frame(sample_number, mode_byte=b"P", first_value=NAN),
+            "infinite": answer_frame(sample_number, mode_byte=b"P", first_value=float("inf")),
+            "NaN as a valve": answer_frame(sample_number, first_value=NAN),
+            "negative pressure": answer_frame(sample_number, mode_byte=b"P", first_value=-1.0),
+            "valve in no state": answer_frame(sample_number, first_value=0.5),
+            "too few wheels": answer_frame(sample_number, wheel_count=3),
             "too many bytes": answer_frame(sample_number) + b"\0",
             "part of a frame": answer_frame(sample_number)[:33],
             "another protocol": b"HTTP/1.1 200 OK\r\n" + 63 * b" ",
@@ -45,7 +61,7 @@ def misbehave(misbehaviour: str, sample_number: int, link: socket.socket) -> Non
             "silence": b"",
         }[misbehaviour]
     )
-    link.recv(1)
+    connection.recv(1)
 
 
 def main(misbehaviour: str, port: str) -> None:

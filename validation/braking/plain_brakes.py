@@ -121,8 +121,8 @@ def torques_by_commands(sample_count: int = 60, seed: int = SEED) -> tuple[np.nd
     return np.array(rows[0]), np.array(rows[1])
 
 
-def _air_row(air: AirState, torques: np.ndarray) -> np.ndarray:
-    return np.concatenate((air.pressure, torques.ravel(), air.supply))
+def _air_row(air_system: AirState, brake_torques: np.ndarray) -> np.ndarray:
+    return np.concatenate((air_system.pressure, brake_torques.ravel(), air_system.supply))
 
 
 def slip_lags(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:

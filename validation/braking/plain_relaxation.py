@@ -17,25 +17,26 @@ FIRST_SPEED, LAST_SPEED, STEER_ANGLE = 11.11, 9.0, 0.03
 
 
 def lag_on(
-    state: np.ndarray,
-    time: float,
-    steer: np.ndarray,
+    truck_state: np.ndarray,
+    time_step: float,
+    steer_angles: np.ndarray,
     wheel_positions: np.ndarray,
-    slope: float,
-    length: np.ndarray,
+    cornering_slope: float,
+    relaxation_lengths: np.ndarray,
     slip_lags: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lagging slip angles after a time step (s), and those used within the step (W,) in rad, by plain code for a state
     (2, 3): x, y, heading, and their rates.
 
-    wheel_positions (W, 2) : of the W wheels (m); steer (W,) : rad; slip_lags (W,) : lagging angles before the step.
+    wheel_positions (W, 2) : of the W wheels (m); steer_angles (W,) : rad; slip_lags (W,) : lagging angles before the
+    step.
     """
-    velocity, turning = state[1, :2], state[1, 2]
-    centres = velocity + turning * (wheel_positions @ rotation(state[0, 2] + 0.5 * np.pi).T)
+    velocity, turning = truck_state[1, :2], truck_state[1, 2]
+    centres = velocity + turning * (wheel_positions @ rotation(truck_state[0, 2] + 0.5 * np.pi).T)
     speeds = np.array(
-        [rotation(state[0, 2] + angle).T @ centre for angle, centre in zip(steer, centres, strict=True)]
+        [rotation(truck_state[0, 2] + angle).T @ centre for angle, centre in zip(steer_angles, centres, strict=True)]
     ).T
-    return plain.advance_slip_tangents(slip_lags, speeds, time, length, slope)
+    return plain.advance_slip_tangents(slip_lags, speeds, time_step, relaxation_lengths, cornering_slope)
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -44,7 +45,7 @@ def rotation(angle: float) -> np.ndarray:
     return np.array([[c, -s], [s, c]])
 
 
-def braked_turn_difference(relaxation_length: float, substeps: int = 4) -> float:
+def braked_turn_difference(relaxation_length: float, substep_count: int = 4) -> float:
     """Distance (m) between the final positions of a braked turn by twinrig's truck model and by independently written
     equations. The truck's tyres have a relaxation length (m)."""
     tyre, torques = table_of_surface("ice"), (300.0, 200.0)
@@ -55,7 +56,7 @@ def braked_turn_difference(relaxation_length: float, substeps: int = 4) -> float
         brakes_of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=TORQUE_PER_BAR, falling=TORQUE_PER_BAR),)),
         BrakeChambers(np.zeros(4), np.zeros(4), 6.0),
         steer=np.array([STEER_ANGLE, STEER_ANGLE, 0.0, 0.0]),
-        substeps=substeps,
+        substeps=substep_count,
         relaxation=np.full(4, relaxation_length),
     ).run(steady_torques(*np.repeat(torques, 2)), FIRST_SPEED, end.time)
     position_at = CubicHermiteSpline(path.times, path.states[:, 0, :2], path.states[:, 1, :2])

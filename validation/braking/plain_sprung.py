@@ -81,7 +81,7 @@ def wheel_count(vehicle: SprungVehicle) -> int:
 
 
 def random_states(
-    coordinate_count: int, state_count: int = STATE_COUNT, wheels: int = 4
+    coordinate_count: int, state_count: int = STATE_COUNT, wheel_count: int = 4
 ) -> tuple[np.ndarray, list[ConstantWheelForces]]:
     """Random coordinates and rates (state_count, 2, coordinate_count) at any heading, and random steer angles, forces
     and moments of their wheels.
@@ -98,7 +98,9 @@ def random_states(
     )
     wheel_forces = [
         ConstantWheelForces(
-            random.normal(0.0, 0.2, wheels), random.normal(0.0, 3e3, (wheels, 2)), random.normal(0.0, 300.0, wheels)
+            random.normal(0.0, 0.2, wheel_count),
+            random.normal(0.0, 3e3, (wheel_count, 2)),
+            random.normal(0.0, 300.0, wheel_count),
         )
         for _ in range(state_count)
     ]
@@ -106,9 +108,9 @@ def random_states(
 
 
 @cache
-def plain_accelerations(vehicle: str, state_count: int = STATE_COUNT) -> np.ndarray:
+def plain_accelerations(vehicle_name: str, state_count: int = STATE_COUNT) -> np.ndarray:
     """Accelerations (state_count, number of coordinates) of a vehicle at the random states, by plain code."""
-    suspension = PlainSuspension(EVERY_VEHICLE[vehicle]())
+    suspension = PlainSuspension(EVERY_VEHICLE[vehicle_name]())
     coordinates_and_rates, wheel_forces = random_states(suspension.size, state_count, len(suspension.tyres))
     return np.array(
         [
@@ -134,19 +136,26 @@ def accelerations(vehicle: SprungVehicle, engine: str, state_count: int = STATE_
     return computed
 
 
-def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
+def relative_difference(compiled_accelerations: np.ndarray, plain_accelerations_of_states: np.ndarray) -> float:
     """Largest difference of the accelerations, divided in each state by its largest acceleration; infinite where an
     acceleration is not a number."""
-    difference = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
+    difference = float(
+        np.max(
+            np.abs(compiled_accelerations - plain_accelerations_of_states).max(axis=1)
+            / np.abs(plain_accelerations_of_states).max(axis=1)
+        )
+    )
     return difference if np.isfinite(difference) else np.inf
 
 
-def braked_vehicle_on_springs(vehicle: SprungVehicle, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
+def braked_vehicle_on_springs(
+    vehicle: SprungVehicle, engine: str, with_valves: bool, with_lags: bool = False
+) -> BrakedVehicle:
     """A braked vehicle on its suspension, steered to the left, with hysteresis in its brakes. Its road is dry on the
-    left and wet on the right for 3 m, then ice. lags: whether its tyres have relaxation lengths."""
+    left and wet on the right for 3 m, then ice. with_lags: whether its tyres have relaxation lengths."""
     front, rear = (
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
-        for level in ((150.0, 50.0) if valves else (3e2, 1e2))
+        for level in ((150.0, 50.0) if with_valves else (3e2, 1e2))
     )
     plane = vehicle.in_plane()
     unit_values, on_front_unit = np.ones(plane.wheels), np.arange(plane.wheels) < 2
@@ -160,40 +169,45 @@ def braked_vehicle_on_springs(vehicle: SprungVehicle, engine: str, valves: bool,
         substeps=2,
         engine=PlainSprungVehicle(vehicle) if engine == "reference" else EngineSprungVehicle(engine, vehicle),
         sprung=vehicle,
-        relaxation=np.where(on_front_unit, RELAXATION_LENGTHS[0], RELAXATION_LENGTHS[-1]) if lags else None,
+        relaxation=np.where(on_front_unit, RELAXATION_LENGTHS[0], RELAXATION_LENGTHS[-1]) if with_lags else None,
     )
 
 
-def controller(valves: bool, wheels: int = 4) -> Controller:
-    """A slip controller that sets valves if ``valves``, else constant brake pressures."""
-    return SlipBangBang(wheels=wheels) if valves else steady_torques(*wheels * (4e4,))
+def controller(with_valves: bool, number_of_wheels: int = 4) -> Controller:
+    """A slip controller that sets valves if ``with_valves``, else constant brake pressures."""
+    return SlipBangBang(wheels=number_of_wheels) if with_valves else steady_torques(*number_of_wheels * (4e4,))
 
 
 def run(
-    vehicle: SprungVehicle, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
+    vehicle: SprungVehicle,
+    engine: str,
+    duration: float,
+    with_valves: bool = True,
+    speed: float = 10.0,
+    with_lags: bool = False,
 ) -> BrakingPath:
     """Simulate a stop of a vehicle on its suspension from a speed (m/s) for a duration (s) in an engine."""
-    return braked_vehicle_on_springs(vehicle, engine, valves, lags).run(
-        controller(valves, wheel_count(vehicle)), speed, duration
+    return braked_vehicle_on_springs(vehicle, engine, with_valves, with_lags).run(
+        controller(with_valves, wheel_count(vehicle)), speed, duration
     )
 
 
 @cache
 def plain_run(
-    vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
+    vehicle_name: str, duration: float, with_valves: bool = True, speed: float = 10.0, with_lags: bool = False
 ) -> BrakingPath:
     """Simulate the stop of ``run`` by plain code."""
-    return run(EVERY_VEHICLE[vehicle](), "reference", duration, valves, speed, lags)
+    return run(EVERY_VEHICLE[vehicle_name](), "reference", duration, with_valves, speed, with_lags)
 
 
-def path_difference(path: BrakingPath, other_path: BrakingPath) -> float:
+def path_difference(first_path: BrakingPath, second_path: BrakingPath) -> float:
     """Largest difference of two paths in positions, rates and rim speeds (m, rad, per s); infinite if they differ in
     length or a value is not a number."""
-    if len(path.times) != len(other_path.times):
+    if len(first_path.times) != len(second_path.times):
         return np.inf
     difference = max(
-        float(np.abs(path.states - other_path.states).max()),
-        0.3 * float(np.abs(path.turning - other_path.turning).max()),
+        float(np.abs(first_path.states - second_path.states).max()),
+        0.3 * float(np.abs(first_path.turning - second_path.turning).max()),
     )
     return difference if np.isfinite(difference) else np.inf
 

@@ -18,23 +18,23 @@ CONTROLLERS = ("none", "none", "slip_bang_bang", "acceleration_phases", "five_ph
 class Draw:
     """Random generator of numbers and choices for scenes."""
 
-    random: np.random.Generator
+    generator: np.random.Generator
 
-    def within(self, low: float, high: float) -> float:
-        """A random number, uniformly distributed between low and high."""
-        return float(self.random.uniform(low, high))
+    def within(self, lower_limit: float, upper_limit: float) -> float:
+        """A random number, uniformly distributed between two limits."""
+        return float(self.generator.uniform(lower_limit, upper_limit))
 
-    def integer(self, low: int, upper_limit: int) -> int:
-        """A random integer from low to upper_limit - 1."""
-        return int(self.random.integers(low, upper_limit))
+    def integer(self, lower_limit: int, upper_limit: int) -> int:
+        """A random integer from lower_limit to upper_limit - 1."""
+        return int(self.generator.integers(lower_limit, upper_limit))
 
     def choice(self, *choices: Any) -> Any:
         """A random element of ``choices``, all equally likely."""
-        return self.random.choice(choices).item()
+        return self.generator.choice(choices).item()
 
-    def chance(self, share: float) -> bool:
-        """True with the probability ``share``."""
-        return bool(self.random.random() < share)
+    def chance(self, probability: float) -> bool:
+        """True with a given probability."""
+        return bool(self.generator.random() < probability)
 
 
 def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
@@ -69,79 +69,83 @@ def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
     return table
 
 
-def procedure(generator: Draw, procedure_kind: str) -> dict[str, Any]:
+def procedure(random_draws: Draw, procedure_kind: str) -> dict[str, Any]:
     """Scene table of a random procedure: kind of stop, speed, and steering or radius."""
-    options: dict[str, Any] = {"kind": procedure_kind, "speed": generator.within(2.0, 25.0)}
+    options: dict[str, Any] = {"kind": procedure_kind, "speed": random_draws.within(2.0, 25.0)}
     if procedure_kind == "split":
-        options["right"] = generator.choice(*SURFACES)
+        options["right"] = random_draws.choice(*SURFACES)
     if procedure_kind == "turn":
         options |= {
-            "radius": generator.choice(-1.0, 1.0) * generator.within(60.0, 200.0),
-            "speed": generator.within(2.0, 7.0),
+            "radius": random_draws.choice(-1.0, 1.0) * random_draws.within(60.0, 200.0),
+            "speed": random_draws.within(2.0, 7.0),
         }
-    if procedure_kind == "j_turn" and generator.chance(0.5):
-        options["steer"] = generator.within(-0.05, 0.05)
+    if procedure_kind == "j_turn" and random_draws.chance(0.5):
+        options["steer"] = random_draws.within(-0.05, 0.05)
     elif procedure_kind == "j_turn":
-        options["steering"] = [[0.0, 0.0], [0.5, generator.within(-0.05, 0.05)], [1.5, generator.within(-0.05, 0.05)]]
+        options["steering"] = [
+            [0.0, 0.0],
+            [0.5, random_draws.within(-0.05, 0.05)],
+            [1.5, random_draws.within(-0.05, 0.05)],
+        ]
     return options
 
 
-def road(generator: Draw) -> dict[str, Any]:
+def road(random_draws: Draw) -> dict[str, Any]:
     """Scene table of a random road with one to three surfaces in succession."""
-    starts = [0.0, 12.0, 25.0][: generator.integer(1, 4)]
-    return {"stretches": [{"x": x, "left": generator.choice(*SURFACES)} for x in starts]}
+    starts = [0.0, 12.0, 25.0][: random_draws.integer(1, 4)]
+    return {"stretches": [{"x": x, "left": random_draws.choice(*SURFACES)} for x in starts]}
 
 
-def brakes(generator: Draw) -> dict[str, Any]:
+def brakes(random_draws: Draw) -> dict[str, Any]:
     """Scene table of random brake characteristics of the axles, with hysteresis, and a random supply pressure."""
-    table: dict[str, Any] = {"supply": generator.within(3.0, 10.0)}
+    table: dict[str, Any] = {"supply": random_draws.within(3.0, 10.0)}
     for axle in ("front", "rear", "trailer"):
-        rising, push_out = generator.within(400.0, 3000.0), generator.within(0.0, 0.8)
+        rising, push_out = random_draws.within(400.0, 3000.0), random_draws.within(0.0, 0.8)
         table[axle] = {
             "gradient": rising,
             "push_out": push_out,
-            "release": push_out * generator.within(0.5, 1.0),
-            "falling": rising * generator.within(1.0, 1.3),
+            "release": push_out * random_draws.within(0.5, 1.0),
+            "falling": rising * random_draws.within(1.0, 1.3),
         }
     return table
 
 
-def axle(generator: Draw, x: float) -> dict[str, float]:
+def axle(random_draws: Draw, axle_position: float) -> dict[str, float]:
     """Scene table of an axle at x (m) with random track, wheel radius and spin inertia."""
     return {
-        "x": x,
-        "track": generator.within(1.7, 2.1),
-        "radius": generator.within(0.35, 0.55),
-        "spin_inertia": generator.within(3.0, 30.0),
+        "x": axle_position,
+        "track": random_draws.within(1.7, 2.1),
+        "radius": random_draws.within(0.35, 0.55),
+        "spin_inertia": random_draws.within(3.0, 30.0),
     }
 
 
-def vehicle(generator: Draw) -> dict[str, Any]:
+def vehicle(random_draws: Draw) -> dict[str, Any]:
     """Scene table of a random truck, light or laden, low enough that a friction of 1 does not overturn it."""
-    mass = generator.within(1500.0, 16000.0)
+    mass = random_draws.within(1500.0, 16000.0)
     return {
         "mass": mass,
-        "yaw_inertia": mass * generator.within(2.0, 5.0),
-        "height": generator.within(0.3, 1.3),
-        "front": axle(generator, generator.within(1.3, 2.2)),
-        "rear": axle(generator, generator.within(-2.4, -1.4)),
+        "yaw_inertia": mass * random_draws.within(2.0, 5.0),
+        "height": random_draws.within(0.3, 1.3),
+        "front": axle(random_draws, random_draws.within(1.3, 2.2)),
+        "rear": axle(random_draws, random_draws.within(-2.4, -1.4)),
     }
 
 
-def trailer(generator: Draw) -> dict[str, Any]:
+def trailer(random_draws: Draw) -> dict[str, Any]:
     """Scene table of a random drawbar trailer."""
-    mass = generator.within(1500.0, 9000.0)
+    mass = random_draws.within(1500.0, 9000.0)
     axles = {
-        "front": axle(generator, generator.within(1.5, 2.4)),
-        "rear": axle(generator, generator.within(-2.4, -1.5)),
+        "front": axle(random_draws, random_draws.within(1.5, 2.4)),
+        "rear": axle(random_draws, random_draws.within(-2.4, -1.5)),
     }
     return {
         "mass": mass,
-        "yaw_inertia": mass * generator.within(2.0, 4.0),
-        "height": generator.within(0.5, 1.1),
-        "drawbar": generator.within(1.5, 3.0),
-        "drawbar_mass": generator.within(300.0, 800.0),
-        "drawbar_inertia": generator.within(150.0, 600.0),
-        "hook": generator.within(-4.0, -2.8),
+        "yaw_inertia": mass * random_draws.within(2.0, 4.0),
+        "height": random_draws.within(0.5, 1.1),
+        "drawbar": random_draws.within(1.5, 3.0),
+        "drawbar_mass": random_draws.within(300.0, 800.0),
+        "drawbar_inertia": random_draws.within(150.0, 600.0),
+        "hook": random_draws.within(-4.0, -2.8),
         **{name: {**axle_table, "roll_share": 0.5} for name, axle_table in axles.items()},
     }

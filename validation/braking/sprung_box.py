@@ -90,25 +90,25 @@ def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
     return pitch, stiffness * pitch / plane.wheelbase
 
 
-def constant_friction(mu: float) -> TyreTable:
+def constant_friction(friction_coefficient: float) -> TyreTable:
     """Tyre table in which a sliding wheel has the same friction in every direction, and a rolling wheel has none."""
     slips, angles = np.array([0.0, 0.01, 1.0]), np.array([0.0, 0.01, np.pi / 2.0])
     share_ahead, share_aside = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.01, 1.0])
-    x = mu * share_ahead[:, None, None] * np.array([0.0, 1.0, 1.0])
-    return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * share_aside[:, None])
+    x = friction_coefficient * share_ahead[:, None, None] * np.array([0.0, 1.0, 1.0])
+    return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), friction_coefficient * share_aside[:, None])
 
 
-def steady_torques(*torques: float) -> ConstantPressures:
+def steady_torques(*brake_torques: float) -> ConstantPressures:
     """Controller that keeps constant brake torques (N m), one for each wheel, in runs of ``braked_vehicle``."""
-    return ConstantPressures(np.array(torques) / TORQUE_PER_BAR)
+    return ConstantPressures(np.array(brake_torques) / TORQUE_PER_BAR)
 
 
 def braked_vehicle(
-    sprung: SprungVehicle,
-    tyre: TyreTable,
+    sprung_vehicle: SprungVehicle,
+    tyre_table: TyreTable,
     engine: str | None = "mujoco",
     steer: float = 0.0,
-    step: float = 5.5e-3,
+    time_step: float = 5.5e-3,
     substeps: int = 1,
     gradient: float = TORQUE_PER_BAR,
 ) -> BrakedVehicle:
@@ -117,27 +117,27 @@ def braked_vehicle(
 
     steer : angle of the front wheels (rad); gradient : brake torque divided by pressure (N m/bar).
     """
-    brake, plane = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), sprung.in_plane()
+    brake, plane = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), sprung_vehicle.in_plane()
     zeros = np.zeros(plane.wheels)
     return braked_vehicle_on_tyres(
         plane,
-        [tyre],
+        [tyre_table],
         brakes_of_wheels(*[brake] * plane.wheels),
         BrakeChambers(zeros + 0.03, zeros + 0.02, SUPPLY),
         steer=np.where(np.arange(plane.wheels) < 2, steer, 0.0),
         substeps=substeps,
-        sample=step,
-        engine=None if engine is None else EngineSprungVehicle(engine, sprung),
-        sprung=None if engine is None else sprung,
+        sample=time_step,
+        engine=None if engine is None else EngineSprungVehicle(engine, sprung_vehicle),
+        sprung=None if engine is None else sprung_vehicle,
     )
 
 
-def remaining_speed(vehicle: BrakedVehicle, path: BrakingPath, duration: float = 2.0) -> float:
+def remaining_speed(vehicle: BrakedVehicle, stop_path: BrakingPath, duration: float = 2.0) -> float:
     """Largest speed (m/s) of the vehicle or of a wheel's rim during a duration (s) after a stop, with unchanged brake
     torques."""
     rates, report = np.zeros(2 + vehicle.plane.masses.size), np.zeros((REPORT_SIZE, vehicle.plane.wheels))
-    motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), rates, report)
-    torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0
+    motion = PlaneMotion(stop_path.states[-1].copy(), stop_path.turning[-1].copy(), rates, report)
+    torques, largest = np.tile(stop_path.torques[-1], (2, 1)), 0.0
     for _ in range(round(duration / vehicle.sample)):
         vehicle.engine.advance(motion, torques, vehicle.sample, vehicle.steer, vehicle.on_road)
         rims = np.abs(motion.turning * vehicle.plane.radius)

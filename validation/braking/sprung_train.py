@@ -37,8 +37,8 @@ class PulledCaravan:
     force (N) by which the caravan pulls at the tow ball."""
 
     deceleration: float
-    load: float
-    pull: float
+    axle_load: float
+    ball_force: float
 
 
 def locked_stop_and_closed_form(speed: float = 1.5) -> tuple[float, float]:
@@ -72,10 +72,10 @@ def caravan_closed_form() -> PulledCaravan:
     return PulledCaravan(slowing, load, (car[0] + rolling) * slowing)
 
 
-def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
+def _mass(vehicle: SpatialVehicle, trailer_name: str | None) -> tuple[float, float, float]:
     """Mass (kg) of the car or of its trailer, and the position (m) of its centre of mass: forward, and above the
     road."""
-    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
+    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == trailer_name]
     masses = np.array([body.mass for body in bodies])
     x, _, z = masses @ np.array([body.position for body in bodies]) / masses.sum()
     return float(masses.sum()), float(x), float(z)
@@ -97,17 +97,17 @@ def caravan_run(plant_fault: Callable[[Handling], None] | None = None, duration:
     return PulledCaravan(slowing, load, _ball_force(vehicle, path, late, slowing))
 
 
-def _ball_force(vehicle: SprungVehicle, path: BrakingPath, late: slice, slowing: float) -> float:
+def _ball_force(vehicle: SprungVehicle, stop_path: BrakingPath, late_samples: slice, deceleration: float) -> float:
     """Longitudinal force (N) at the tow ball from the caravan's balance: tyre drag minus mass times deceleration."""
     mass, _, _ = _mass(vehicle.handling.given, vehicle.handling.given.towed[0])
-    return -float(path.reports.force_x[late, 4:].sum(axis=1).mean()) - mass * slowing
+    return -float(stop_path.reports.force_x[late_samples, 4:].sum(axis=1).mean()) - mass * deceleration
 
 
-def plant_brakes_on_car(car: Handling) -> None:
+def plant_brakes_on_car(handling_car: Handling) -> None:
     """Plant a fault in a vehicle: brake forces of the caravan's wheels act on the car's body instead of the
     caravan's."""
-    for i in range(4, len(car.vehicle.tyres)):
-        car.tyre_numbers(i)[at.CARRYING] = car.tyre_numbers(0)[at.CARRYING]
+    for i in range(4, len(handling_car.vehicle.tyres)):
+        handling_car.tyre_numbers(i)[at.CARRYING] = handling_car.tyre_numbers(0)[at.CARRYING]
 
 
 @cache
@@ -116,8 +116,10 @@ def caravan_errors() -> PulledCaravan:
     return relative_difference(caravan_run(), caravan_closed_form())
 
 
-def relative_difference(run: PulledCaravan, expected: PulledCaravan) -> PulledCaravan:
+def relative_difference(measured_pull: PulledCaravan, expected_pull: PulledCaravan) -> PulledCaravan:
     """Relative difference of each quantity: the run's value divided by the expected value, minus 1."""
     return PulledCaravan(
-        run.deceleration / expected.deceleration - 1.0, run.load / expected.load - 1.0, run.pull / expected.pull - 1.0
+        measured_pull.deceleration / expected_pull.deceleration - 1.0,
+        measured_pull.axle_load / expected_pull.axle_load - 1.0,
+        measured_pull.ball_force / expected_pull.ball_force - 1.0,
     )

@@ -28,25 +28,25 @@ class TurnEnd(NamedTuple):
 
 def braked_turn(
     vehicle: Truck,
-    tyre: TyreTable,
+    tyre_table: TyreTable,
     steer: float,
-    torques: tuple[float, float],
+    brake_torques: tuple[float, float],
     speed: float,
     end_speed: float,
     relaxation_length: float = 0.0,
 ) -> TurnEnd:
     """Final position of a braked turn from steady rolling at ``speed`` down to ``end_speed`` (m/s). The front wheels
-    are steered by an angle (rad); torques: brake torques of the two axles (N m).
+    are steered by an angle (rad); brake_torques: brake torques of the two axles (N m).
 
     relaxation_length : of the tyres (m); 0 for none. With one, speeds must stay above 1 m/s, as the tyres' damper at
     lower speeds is left out. The tyre's friction must not depend on the load. Raises RunFailed if the vehicle does not
     reach ``end_speed`` in 200 s.
     """
-    equations = _TruckEquations(vehicle, tyre, steer, np.repeat(torques, 2), relaxation_length)
+    equations = _TruckEquations(vehicle, tyre_table, steer, np.repeat(brake_torques, 2), relaxation_length)
     lags = np.zeros(4 if relaxation_length else 0)
     start = np.concatenate(([0.0, 0.0, 0.0, speed, 0.0, 0.0], speed / equations.radius, lags))
 
-    def slow(_: float, state: np.ndarray) -> float:
+    def slow(time: float, state: np.ndarray) -> float:
         return float(np.hypot(state[3], state[4]) - end_speed)
 
     slow.terminal = True  # type: ignore[attr-defined]
@@ -65,9 +65,19 @@ class _TruckEquations:
     angles."""
 
     def __init__(
-        self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray, relaxation_length: float = 0.0
+        self,
+        vehicle: Truck,
+        tyre_table: TyreTable,
+        steer: float,
+        brake_torques: np.ndarray,
+        relaxation_length: float = 0.0,
     ) -> None:
-        self.vehicle, self.tyre, self.torques, self.relaxation_length = vehicle, tyre, torques, relaxation_length
+        self.vehicle, self.tyre, self.torques, self.relaxation_length = (
+            vehicle,
+            tyre_table,
+            brake_torques,
+            relaxation_length,
+        )
         axles, sides = (vehicle.front, vehicle.front, vehicle.rear, vehicle.rear), np.array([1.0, -1.0, 1.0, -1.0])
         self.x = np.array([axle.x for axle in axles])
         self.y = sides * [axle.track / 2.0 for axle in axles]
@@ -79,7 +89,7 @@ class _TruckEquations:
         self.by_x = m * h / vehicle.wheelbase / 2.0 * np.array([-1.0, -1.0, 1.0, 1.0])
         self.by_y = -sides * m * h * [axle.roll_share / axle.track for axle in axles]
 
-    def __call__(self, _: float, state: np.ndarray) -> np.ndarray:
+    def __call__(self, time: float, state: np.ndarray) -> np.ndarray:
         psi, u, v, r, turning = state[2], state[3], state[4], state[5], state[6:10]
         vx, vy = u - r * self.y, v + r * self.x
         speed_along, speed_aside = self.c * vx + self.s * vy, self.c * vy - self.s * vx
@@ -109,8 +119,11 @@ class _TruckEquations:
         i, p = _cells_and_shares(tyre.angles, angles)
         k, w = _cells_and_shares(tyre.slips, np.abs(slips))
 
-        def interpolated(table: np.ndarray) -> np.ndarray:
-            low, high = (1 - w) * table[i, k] + w * table[i, k + 1], (1 - w) * table[i + 1, k] + w * table[i + 1, k + 1]
+        def interpolated(friction_values: np.ndarray) -> np.ndarray:
+            low, high = (
+                (1 - w) * friction_values[i, k] + w * friction_values[i, k + 1],
+                (1 - w) * friction_values[i + 1, k] + w * friction_values[i + 1, k + 1],
+            )
             return (1 - p) * low + p * high
 
         h = tyre.h[:, 0]

@@ -78,7 +78,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
         output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
         mechanism, notes = _mechanism_of_output(read_mechanism(model), output)
         rows += [*fitted_constant_rows(family, notes), *joint_family_rows(family, mechanism, output, quick)]
-        if mechanism.kind != "distance":
+        if mechanism.joint_kind != "distance":
             rows += mjcf_rows(family, mechanism, work_folder, 1.0 if quick else DURATION)
         if family in ANGLES_FROM_REVOLUTE:
             rows += _same_pendulum_rows(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
@@ -118,7 +118,7 @@ def _spring_motion(mechanism: Mechanism, output_file: OutputFile) -> tuple[np.nd
     force is read from the file and positive in extension."""
     (spring,), motion = mechanism.springs, output_file.motion(mechanism)
     if spring.is_rotational:
-        axis = mechanism.ground.axes[:, 2]
+        axis = mechanism.ground_marker.axes[:, 2]
         return (
             np.unwrap(np.arctan2(*_sine_and_cosine_of_rotation(motion, axis))),
             motion.angular_velocity @ axis,
@@ -199,7 +199,7 @@ def _reaction_scales(mechanism: Mechanism, reaction: Reaction) -> tuple[float, f
     of mass from the joint, at least 1 m (N m)."""
     weight = mechanism.mass * float(np.linalg.norm(mechanism.gravity))
     force = max(float(np.abs(reaction.force).max()), weight)
-    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.position)), 1.0)
+    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground_marker.position)), 1.0)
 
 
 def _reaction_difference(

@@ -83,10 +83,10 @@ def braked_truck_turn(
     """End of a braked turn of the truck on ice from START_SPEED down to ``end_speed`` (m/s), interpolated linearly
     within the last step."""
     truck = RollingTruck(
-        on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
+        on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), cornering_slope=ICE_TABLE.cornering),
         START_SPEED,
         steer=steer_angle,
-        step_function=step_function,
+        advance_step=advance_step,
     )
     while True:
         passed, position, fast = truck.time, truck.state[0].copy(), truck.speed

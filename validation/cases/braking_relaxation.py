@@ -95,13 +95,13 @@ def relaxation_shift_ratio(engine_name: str) -> float:
 
 def _stop_against_plain_code_row(vehicle_name: str, engine_name: str, duration: float) -> Row:
     """Row: a stop on relaxing tyres in an engine, compared with independently written plain code."""
-    path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration, lags=True)
+    path = whole.run(whole.VEHICLES[vehicle_name](), engine_name, duration, with_lags=True)
     return Observed(
         f"braking_relaxation.reference.{vehicle_name}.{engine_name}",
         SYSTEM,
         f"difference of {duration:g} s of a stop in {engine_name} from plain code: {vehicle_name}, relaxing tyres, "
         "slip control",
-        whole.path_difference(path, whole.plain_run(vehicle_name, duration, lags=True)),
+        whole.path_difference(path, whole.plain_run(vehicle_name, duration, with_lags=True)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 

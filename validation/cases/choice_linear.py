@@ -90,7 +90,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     seeds = QUICK_SCENE_SEEDS if quick else range(SCENE_COUNT)
     choices = [
         judge_choice_for_ride(
-            random_linear_ride(seed, COMMON_TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+            random_linear_ride(seed, COMMON_TOLERANCE if seed % 2 == 0 else None, with_details=seed % 4 != 0),
             quick or seed < FREQUENCY_JUDGED_COUNT,
         )
         for seed in seeds

@@ -196,7 +196,7 @@ def _study_road_rows(work_folder: Path, time_steps: tuple[float, ...]) -> tuple[
         step=SAMPLE_PERIOD,
         duration=ROUGH_ROAD_SECONDS,
         interpolation="smooth",
-        override=paper,
+        parameter_changes=paper,
         effects=PRESCRIBED_PITCH_EFFECT,
     )
     true = exact_moment(scene)

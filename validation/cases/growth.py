@@ -349,7 +349,7 @@ def _linearised_vehicle_row(work_folder: Path) -> Row:
     true = simulate(changed_scene(road_scene(duration=60.0), vehicle=linear), "reference")
     write_measurement(true, work_folder, 1 / SAMPLING_RATE)
     start = dict(zip(STATES, true.states[0, :4].tolist(), strict=True))
-    wrong = force_scene(work_folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
+    wrong = force_scene(work_folder, duration=60.0, parameter_changes=perturbed_parameters(PARAMETERS))
     run = simulate(changed_scene(wrong, vehicle=linear, start=start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
     what = "largest pitch error of the perturbed model, linearised, in 60 s"

@@ -104,7 +104,11 @@ def _runs_without_spring(work_folder: Path) -> RunsWithoutSpring:
     quiet = assembly_of_scene(force_scene(work_folder, step=TIME_STEP, duration=DURATION))
     noisy = assembly_of_scene(
         force_scene(
-            work_folder, step=TIME_STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise
+            work_folder,
+            step=TIME_STEP,
+            duration=DURATION,
+            parameter_changes=perturbed_parameters(PARAMETERS),
+            effects=noise,
         )
     )
     predicted_stiffness = holding_stiffness(quiet.parameters, pitch_error_growth(quiet).rate)

@@ -65,7 +65,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     gyro = gyro_only_pitch_error(run_folder, 600.0, SEED)
     damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINE_NAMES) for i in range(SAMPLE_COUNT)]
     right = [
-        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINE_NAMES[:1], perturbed=False)["reference"]
+        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINE_NAMES[:1], with_wrong_parameters=False)["reference"]
         for i in range(2)
     ]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)

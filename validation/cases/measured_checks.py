@@ -124,7 +124,7 @@ FURTHER_FAULTS = (
         for name, check, place, size, unit, key, amounts in TRANSDUCER_FAULTS
     ),
     PlantedMeasurementFault(
-        "gravity not included", "gravity", "tower_az", 9.81, "m/s^2", scaled_channels(1.0, "tower_az", add=-9.81)
+        "gravity not included", "gravity", "tower_az", 9.81, "m/s^2", scaled_channels(1.0, "tower_az", offset=-9.81)
     ),
     *(
         PlantedMeasurementFault(name, check, of[0], factor, "1", scaled_channels(factor, *of))

@@ -79,7 +79,7 @@ def vehicle_and_road(
     """
     spatial = load_vehicle(vehicle_name)
     vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
-    return vehicle, paper_road(vehicle.wheels, cutoff=second_corner)
+    return vehicle, paper_road(vehicle.wheels, cutoff_wavenumber=second_corner)
 
 
 def _stationary_limit_rows(vehicle_name: str, stop_profile: SpeedProfile) -> list[Row]:

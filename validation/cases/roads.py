@@ -55,7 +55,7 @@ def _round_trip_rows(work_folder: Path) -> list[Row]:
             road_scene(
                 duration=2.5,
                 road={"source": source, "file": f"study.{suffix}", "speed": 20.0, "beyond_end": "refused"},
-                folder=work_folder,
+                scene_folder=work_folder,
             ),
             "reference",
         )

@@ -16,21 +16,23 @@ TOLERANCES = (0.02, 0.005, 0.05)
 class ChoiceQuestion:
     """A random scene, as a table, with the quantities and the tolerance for which effects are to be chosen."""
 
-    table: dict[str, Any]
+    scene_table: dict[str, Any]
     quantities: tuple[str, ...]
     tolerance: float
 
     def scene(self) -> Any:
         """Scene built from the table."""
-        return import_module(SYSTEMS[self.table.get("system", "pitch-plane")].scene).build(self.table, "drawn")
+        return import_module(SYSTEMS[self.scene_table.get("system", "pitch-plane")].scene).build(
+            self.scene_table, "drawn"
+        )
 
 
-def draw_scene(system: str, seed: int) -> ChoiceQuestion:
+def draw_scene(system_name: str, seed: int) -> ChoiceQuestion:
     """Random scene of a system with quantities and tolerance, for a seed."""
     draw = np.random.default_rng([SEED, seed])
-    table, quantities = DRAWN_SYSTEMS[system](draw)
+    table, quantities = DRAWN_SYSTEMS[system_name](draw)
     return ChoiceQuestion(
-        {"title": f"drawn {seed}", "system": system, **table}, quantities, TOLERANCES[seed % len(TOLERANCES)]
+        {"title": f"drawn {seed}", "system": system_name, **table}, quantities, TOLERANCES[seed % len(TOLERANCES)]
     )
 
 

@@ -29,20 +29,20 @@ ANGULAR_FREQUENCIES = np.geomspace(1e-2, 3e5, 3000)
 grid."""
 
 
-def chooser_over_speeds(drawn_scene: LinearRide) -> Chooser:
+def chooser_over_speeds(linear_ride: LinearRide) -> Chooser:
     """Chooser of effects for a range of speeds about the scene's speed."""
     return Chooser(
-        drawn_scene.scene,
-        [share * drawn_scene.speed for share in SPEED_SHARES],
-        drawn_scene.quantities,
-        drawn_scene.tolerance,
+        linear_ride.scene,
+        [share * linear_ride.speed for share in SPEED_SHARES],
+        linear_ride.quantities,
+        linear_ride.tolerance,
     )
 
 
-def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
+def changes_by_frequency(chooser: Chooser, ride_choice: RideChoice) -> np.ndarray:
     """Relative changes (number of quantities,) that a choice of effects causes, by frequency responses, at the speed at
     which they are largest."""
-    left = reduced_without(chooser.scene, choice.left_out)
+    left = reduced_without(chooser.scene, ride_choice.left_out)
     ratios = [
         _variances_by_frequency(full_scene, left, chooser.rows)
         / _variances_by_frequency(full_scene, chooser.scene, chooser.rows)
@@ -51,11 +51,13 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
     return largest_changes(np.sqrt(ratios) - 1)
 
 
-def _variances_by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
+def _variances_by_frequency(full_scene: FullScene, reduced_scene: ReducedScene, quantity_rows: list[int]) -> np.ndarray:
     """Variances (number of quantities,) of a scene from sums over frequencies with the mass, damping and stiffness
     matrices. No state space is built, so that the mass matrix may be singular."""
-    reduced = full_scene.reduced(scene)
-    densities = spectral_densities(reduced.vehicle, reduced.excitation, full_scene.speed, ANGULAR_FREQUENCIES)[:, rows]
+    reduced = full_scene.reduced(reduced_scene)
+    densities = spectral_densities(reduced.vehicle, reduced.excitation, full_scene.speed, ANGULAR_FREQUENCIES)[
+        :, quantity_rows
+    ]
     return 2 * np.trapezoid(densities, ANGULAR_FREQUENCIES, axis=0)
 
 
@@ -93,7 +95,7 @@ class ChoiceCheckedByRuns:
 
     system: str
     engine: str
-    asked: ChoiceQuestion | NonlinearRide
+    question: ChoiceQuestion | NonlinearRide
     choice: ChoiceByRuns
     repeated_changes: np.ndarray
 
@@ -101,11 +103,11 @@ class ChoiceCheckedByRuns:
     def is_honest(self) -> bool:
         """False if the choice claims to keep the tolerance and the further runs exceed it."""
         return not self.choice.within_tolerance or bool(
-            (self.repeated_changes <= self.asked.tolerance * (1 + 1e-9)).all()
+            (self.repeated_changes <= self.question.tolerance * (1 + 1e-9)).all()
         )
 
 
-def choice_checked_by_runs(question: ChoiceQuestion, system: str, engine: str) -> ChoiceCheckedByRuns:
+def choice_checked_by_runs(question: ChoiceQuestion, system_name: str, engine: str) -> ChoiceCheckedByRuns:
     """Choose effects for a scene in an engine, then run the full and the reduced scene once more to check the
     choice."""
     chooser = ChooserByRuns(question.scene(), engine, list(question.quantities), question.tolerance)
@@ -117,7 +119,7 @@ def choice_checked_by_runs(question: ChoiceQuestion, system: str, engine: str) -
     confirmed_changes = [
         largest_change(full_run.quantity(name).cases, reduced_run.quantity(name).cases) for name in question.quantities
     ]
-    return ChoiceCheckedByRuns(system, engine, question, choice, np.array(confirmed_changes))
+    return ChoiceCheckedByRuns(system_name, engine, question, choice, np.array(confirmed_changes))
 
 
 def largest_change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:

@@ -35,33 +35,33 @@ class SampledStatistics:
         """Longest time step (s) at which the Runge-Kutta method is stable."""
         return self.march.longest_stable_step
 
-    def deviations(self, step: float) -> np.ndarray:
-        """Standard deviations (number of quantities,) at the samples of a run in steps of ``step`` (s)."""
+    def deviations(self, time_step: float) -> np.ndarray:
+        """Standard deviations (number of quantities,) at the samples of a run in steps of ``time_step`` (s)."""
         assert not self.march.weightings
-        run, axles = replace(self, step=step), range(len(self._axle_delays))
+        run, axles = replace(self, step=time_step), range(len(self._axle_delays))
         total = np.zeros(len(self.march.rows))
         for i in axles:
             for j in [i] if self.march.reduced.excitation.independent else axles:
                 total += run._cross_covariance(i, j)
         return np.sqrt(total)
 
-    def _cross_covariance(self, i: int, j: int) -> np.ndarray:
+    def _cross_covariance(self, axle_i: int, axle_j: int) -> np.ndarray:
         """Covariances (number of quantities,) between the responses of the quantities to the road at axle i and at axle
         j."""
         read_modes, (by_i, by_j), late = (
             self.march.motions[1],
-            (self._quantities_by_filters(i), self._quantities_by_filters(j)),
-            self._axle_lag(i, j),
+            (self._quantities_by_filters(axle_i), self._quantities_by_filters(axle_j)),
+            self._axle_lag(axle_i, axle_j),
         )
-        motions = np.einsum("ql,lm,qm->q", read_modes, self._response_covariance(i, j), read_modes.conj())
-        with_road = np.einsum("ql,lm,qm->q", read_modes, self._response_road_covariance(i, late), by_j)
-        back = np.einsum("ql,lm,qm->q", read_modes, self._response_road_covariance(j, -late), by_i)
+        motions = np.einsum("ql,lm,qm->q", read_modes, self._response_covariance(axle_i, axle_j), read_modes.conj())
+        with_road = np.einsum("ql,lm,qm->q", read_modes, self._response_road_covariance(axle_i, late), by_j)
+        back = np.einsum("ql,lm,qm->q", read_modes, self._response_road_covariance(axle_j, -late), by_i)
         road = np.einsum("ql,lm,qm->q", by_i, self._filter_covariance(-late), by_j)
         return (motions + with_road + back + road).real
 
-    def _axle_lag(self, i: int, j: int) -> float:
+    def _axle_lag(self, axle_i: int, axle_j: int) -> float:
         """Delay (s) of the road at axle i minus the delay at axle j."""
-        return self._axle_delays[i] - self._axle_delays[j]
+        return self._axle_delays[axle_i] - self._axle_delays[axle_j]
 
     @cached_property
     def _axle_delays(self) -> np.ndarray:
@@ -142,21 +142,21 @@ class SampledStatistics:
             ]
         )
 
-    def _response_covariance(self, i: int, j: int) -> np.ndarray:
+    def _response_covariance(self, axle_i: int, axle_j: int) -> np.ndarray:
         """Covariance (n, n) of the responses x to axles i and j."""
-        covariances = self._step_factors[:, None] * self._response_forcing_covariance(i, j)
-        covariances += (self._step_factors[:, None] * self._response_forcing_covariance(j, i)).conj().T
+        covariances = self._step_factors[:, None] * self._response_forcing_covariance(axle_i, axle_j)
+        covariances += (self._step_factors[:, None] * self._response_forcing_covariance(axle_j, axle_i)).conj().T
         covariances += sum(
-            B @ self._forcing_covariance(j, share * self.step + self._axle_lag(j, i)).conj().T
-            for B, share in zip(self._stage_input_matrices(i), STEP_SHARES, strict=True)
+            B @ self._forcing_covariance(axle_j, share * self.step + self._axle_lag(axle_j, axle_i)).conj().T
+            for B, share in zip(self._stage_input_matrices(axle_i), STEP_SHARES, strict=True)
         )
         return covariances / (1 - self._step_factors[:, None] * self._step_factors.conj())
 
-    def _response_forcing_covariance(self, i: int, j: int) -> np.ndarray:
+    def _response_forcing_covariance(self, axle_i: int, axle_j: int) -> np.ndarray:
         """Covariance (n, n) of the response x to axle i at a step's start with the forcing by axle j in this step."""
         return np.asarray(
             sum(
-                self._response_road_covariance(i, self._axle_lag(i, j) + share * self.step) @ B.conj().T
-                for B, share in zip(self._stage_input_matrices(j), STEP_SHARES, strict=True)
+                self._response_road_covariance(axle_i, self._axle_lag(axle_i, axle_j) + share * self.step) @ B.conj().T
+                for B, share in zip(self._stage_input_matrices(axle_j), STEP_SHARES, strict=True)
             )
         )

@@ -9,9 +9,9 @@ CONFIDENCE_LEVEL = 0.999
 fails."""
 
 
-def mean_square(observed: Observed, expected: float, degrees_of_freedom: int, tolerance_reason: str) -> Row:
-    """Row for a mean square of ``degrees_of_freedom`` independent normal values with the variance ``expected``, by the
-    chi-square distribution.
+def mean_square(observed: Observed, expected_variance: float, degrees_of_freedom: int, tolerance_reason: str) -> Row:
+    """Row for a mean square of ``degrees_of_freedom`` independent normal values with the variance
+    ``expected_variance``, by the chi-square distribution.
 
     degrees_of_freedom times value divided by expected is chi-square distributed; the row passes inside the central band
     of CONFIDENCE_LEVEL, and states the band.
@@ -24,5 +24,5 @@ def mean_square(observed: Observed, expected: float, degrees_of_freedom: int, to
         f"{tolerance_reason}; {100 * CONFIDENCE_LEVEL:g} % band of {degrees_of_freedom:,} degrees of freedom: "
         f"{low:.4f} to {high:.4f} times the law"
     )
-    middle, half = expected * (low + high) / 2, expected * (high - low) / 2
+    middle, half = expected_variance * (low + high) / 2, expected_variance * (high - low) / 2
     return observed.within(middle, half, note, "closed form")

@@ -25,8 +25,8 @@ class BouncingVehicle:
     """Exact solution for a bouncing pitch-plane vehicle. A tyre must not change its contact state twice within a
     ``step`` (s)."""
 
-    def __init__(self, assembly: Assembly, step: float) -> None:
-        vehicle, self.parameters, self.step = assembly.vehicle, assembly.parameters, step
+    def __init__(self, assembly: Assembly, time_step: float) -> None:
+        vehicle, self.parameters, self.step = assembly.vehicle, assembly.parameters, time_step
         bare = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if strut.lower.body is not None))
         mass, damping, stiffness = matrices(bare)
         weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
@@ -34,7 +34,7 @@ class BouncingVehicle:
             (i, j): _rate_matrix(mass, damping, stiffness, weight, _tyre_laws(self.parameters, (i, j)))
             for i, j in product(range(3), range(3))
         }
-        self.transitions = {states: expm(rate * step) for states, rate in self.rates.items()}
+        self.transitions = {states: expm(rate * time_step) for states, rate in self.rates.items()}
 
     def path(self, start_state: np.ndarray, state_count: int) -> np.ndarray:
         """States (state_count + 1, 8) at intervals of ``step`` (s), from the initial state (8,)."""
@@ -43,39 +43,43 @@ class BouncingVehicle:
             states.append(self._state_after_step(states[-1]))
         return np.array(states)[:, :8]
 
-    def _state_after_step(self, x: np.ndarray) -> np.ndarray:
+    def _state_after_step(self, extended_state: np.ndarray) -> np.ndarray:
         """State (8,) with a 1 appended, a step later."""
-        left, states = self.step, self._contact_states(x)
+        left, states = self.step, self._contact_states(extended_state)
         while True:
-            state_after = (self.transitions[states] if left == self.step else expm(self.rates[states] * left)) @ x
+            state_after = (
+                self.transitions[states] if left == self.step else expm(self.rates[states] * left)
+            ) @ extended_state
             if self._contact_states(state_after) == states:
                 return state_after
-            passed, x = self._state_at_switch(x, states, left)
-            left, states = left - passed, self._contact_states(x)
+            passed, extended_state = self._state_at_switch(extended_state, states, left)
+            left, states = left - passed, self._contact_states(extended_state)
 
     def _state_at_switch(
-        self, x: np.ndarray, contact_states: ContactStates, longest_step: float
+        self, extended_state: np.ndarray, contact_states: ContactStates, time_limit: float
     ) -> tuple[float, np.ndarray]:
         """Time (s) until a tyre changes its contact state, and the vehicle's state (9,) then."""
-        time_before, time_after = 0.0, longest_step
+        time_before, time_after = 0.0, time_limit
         for _ in range(SWITCH_BISECTIONS):
             middle = 0.5 * (time_before + time_after)
-            if self._contact_states(expm(self.rates[contact_states] * middle) @ x) == contact_states:
+            if self._contact_states(expm(self.rates[contact_states] * middle) @ extended_state) == contact_states:
                 time_before = middle
             else:
                 time_after = middle
-        return time_after, expm(self.rates[contact_states] * time_after) @ x
+        return time_after, expm(self.rates[contact_states] * time_after) @ extended_state
 
-    def _contact_states(self, x: np.ndarray) -> ContactStates:
+    def _contact_states(self, extended_state: np.ndarray) -> ContactStates:
         """Contact states of the front and rear tyre: in the air, pressed, or with its damper limited."""
         p = self.parameters
-        return _contact_state(p.k1 * x[0], p.d1 * x[4]), _contact_state(p.k2 * x[1], p.d2 * x[5])
+        return _contact_state(p.k1 * extended_state[0], p.d1 * extended_state[4]), _contact_state(
+            p.k2 * extended_state[1], p.d2 * extended_state[5]
+        )
 
 
-def _contact_state(spring: float, damper: float) -> int:
-    if spring <= 0.0 or spring + damper <= 0.0:
+def _contact_state(spring_force: float, damper_force: float) -> int:
+    if spring_force <= 0.0 or spring_force + damper_force <= 0.0:
         return IN_AIR
-    return DAMPER_LIMITED if damper > spring else PRESSED
+    return DAMPER_LIMITED if damper_force > spring_force else PRESSED
 
 
 def _tyre_laws(parameters: Parameters, contact_states: ContactStates) -> list[tuple[float, float]]:

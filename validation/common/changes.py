@@ -18,10 +18,10 @@ CHANGE_KINDS = ("status", "gone", "new", "expected", "value")
 Change = Saved
 
 
-def read_results(path: Path) -> Saved:
+def read_results(report_path: Path) -> Saved:
     """Rows by id, and provenance, of an earlier ``results.json`` (or of the folder with it); raises InputError for
     other files."""
-    file = path / "results.json" if path.is_dir() else path
+    file = report_path / "results.json" if report_path.is_dir() else report_path
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         return {"file": str(file), "provenance": _provenance_tables(content), "rows": _rows_by_id(content)}
@@ -34,11 +34,11 @@ def read_results(path: Path) -> Saved:
         raise InputError("--against", "", str(file), allowed) from None
 
 
-def _misread_text(error: Exception) -> str:
+def _misread_text(read_error: Exception) -> str:
     """Text that says why a results file cannot be read."""
-    if isinstance(error, json.JSONDecodeError):
-        return f"line {error.lineno} is no JSON"
-    return f"{error} is missing" if isinstance(error, KeyError) else str(error)
+    if isinstance(read_error, json.JSONDecodeError):
+        return f"line {read_error.lineno} is no JSON"
+    return f"{read_error} is missing" if isinstance(read_error, KeyError) else str(read_error)
 
 
 def _rows_by_id(report_content: Saved) -> dict[str, Saved]:
@@ -56,7 +56,7 @@ def _provenance_tables(report_content: Saved) -> Saved:
     return tables | {name: dict(tables.get(name) or {}) for name in ("versions", "seeds")}
 
 
-def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], report_source: Saved) -> Saved:
+def comparison_with_earlier(earlier_report: Saved, report_rows: list[Saved], report_source: Saved) -> Saved:
     """Comparison of rows with an earlier report, for ``results.json``: the earlier file and commit, notes, and all
     changed rows.
 
@@ -74,7 +74,7 @@ def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], report_sou
         "file": earlier_report["file"],
         "commit": str(was.get("commit", "unknown")),
         "note": "; ".join(notes),
-        "changes": changed_rows(earlier_report["rows"], {row["id"]: row for row in rows}),
+        "changes": changed_rows(earlier_report["rows"], {row["id"]: row for row in report_rows}),
     }
 
 
@@ -112,12 +112,12 @@ def _status_rank(status: Any) -> int:
     return STATUSES.index(status) if status in STATUSES else 0
 
 
-def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> Iterator[Change]:
+def _changes_of_row(row_id: str, old_row: Saved | None, new_row: Saved | None) -> Iterator[Change]:
     row = new_row or old_row or {}
 
     def change(change_kind: str, old_value: Any, new_value: Any, change_size: float = 0.0) -> Change:
         return {
-            "id": id,
+            "id": row_id,
             "kind": change_kind,
             "quantity": row["quantity"],
             "unit": row["unit"],
@@ -140,8 +140,8 @@ def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> It
         yield change("value", old_row["value"], new_row["value"], size)
 
 
-def _is_number(row_value: Any) -> bool:
-    return isinstance(row_value, int | float) and not isinstance(row_value, bool)
+def _is_number(value_of_row: Any) -> bool:
+    return isinstance(value_of_row, int | float) and not isinstance(value_of_row, bool)
 
 
 def _values_differ(old_value: Any, new_value: Any) -> bool:
@@ -168,12 +168,14 @@ def _relative_change(old_row: Saved, new_row: Saved) -> float:
     return abs(current_value - was) / max(abs(was), abs(current_value))
 
 
-def change_lines(comparison: Saved) -> list[str]:
-    """Lines of text of a comparison: counts of changes, the note, then each changed row."""
-    changed = comparison["changes"]
+def change_lines(report_comparison: Saved) -> list[str]:
+    """Lines of text of a report_comparison: counts of changes, the note, then each changed row."""
+    changed = report_comparison["changes"]
     names = zip(CHANGE_KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
     counts = ", ".join(f"{sum(change['kind'] == kind for change in changed)} {text}" for kind, text in names)
-    head = f"against {comparison['file']} (commit {comparison['commit']}): {len(changed)} changes: {counts}"
+    head = (
+        f"against {report_comparison['file']} (commit {report_comparison['commit']}): {len(changed)} changes: {counts}"
+    )
     lines = [
         f"  {change['kind']}: {change['id']}: {change['quantity']}: "
         f"{_value_text(change['before'])} -> {_value_text(change['after'])}"
@@ -181,8 +183,8 @@ def change_lines(comparison: Saved) -> list[str]:
         f"{': ' + change['reason'] if change['reason'] else ''}"
         for change in changed
     ]
-    return [head, *([f"  note: {comparison['note']}"] if comparison["note"] else []), *lines]
+    return [head, *([f"  note: {report_comparison['note']}"] if report_comparison["note"] else []), *lines]
 
 
-def _value_text(row_value: Any) -> str:
-    return "-" if row_value is None else f"{row_value:.6g}" if _is_number(row_value) else str(row_value)
+def _value_text(value_of_row: Any) -> str:
+    return "-" if value_of_row is None else f"{value_of_row:.6g}" if _is_number(value_of_row) else str(value_of_row)

@@ -32,31 +32,35 @@ def files_of_at_most(byte_limit: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def damaged_moments(folder: Path) -> int:
+def damaged_moments(work_folder: Path) -> int:
     """Number of moments at which a full disk left a damaged file or caused no error."""
     result = simulate(road_scene(duration=0.05), "reference")
-    (folder / "whole").mkdir()
-    _save_until_full(result, folder / "whole")
-    complete_sizes = file_sizes(folder / "whole")
+    (work_folder / "whole").mkdir()
+    _save_until_full(result, work_folder / "whole")
+    complete_sizes = file_sizes(work_folder / "whole")
     shares = np.linspace(0.0, 0.99, MOMENTS_TRIED)
-    return sum(_is_damaged(result, folder / f"{i}", share, complete_sizes) for i, share in enumerate(shares))
+    return sum(_is_damaged(result, work_folder / f"{i}", share, complete_sizes) for i, share in enumerate(shares))
 
 
-def file_sizes(folder: Path) -> dict[str, int]:
+def file_sizes(measured_folder: Path) -> dict[str, int]:
     """File name -> size in bytes, for all files of a folder."""
-    return {path.name: path.stat().st_size for path in folder.iterdir()}
+    return {path.name: path.stat().st_size for path in measured_folder.iterdir()}
 
 
-def _is_damaged(result: Result, folder: Path, share: float, complete_sizes: dict[str, int]) -> bool:
-    folder.mkdir()
+def _is_damaged(
+    saved_result: Result, output_folder: Path, share_of_size: float, complete_sizes: dict[str, int]
+) -> bool:
+    output_folder.mkdir()
     try:
-        with files_of_at_most(int(share * max(complete_sizes.values()))):
-            _save_until_full(result, folder)
+        with files_of_at_most(int(share_of_size * max(complete_sizes.values()))):
+            _save_until_full(saved_result, output_folder)
     except OSError as error:
-        return error.errno not in DISK_FULL_ERRORS or not file_sizes(folder).items() <= complete_sizes.items()
+        return error.errno not in DISK_FULL_ERRORS or not file_sizes(output_folder).items() <= complete_sizes.items()
     return True
 
 
-def _save_until_full(result: Result, folder: Path) -> None:
-    write_table(folder / "table.csv", {"time": ("s", result.times[::4]), "z3": ("m", result["z3"][::4])})
-    result.save(folder / "result.nc")
+def _save_until_full(saved_result: Result, output_folder: Path) -> None:
+    write_table(
+        output_folder / "table.csv", {"time": ("s", saved_result.times[::4]), "z3": ("m", saved_result["z3"][::4])}
+    )
+    saved_result.save(output_folder / "result.nc")

@@ -22,10 +22,10 @@ ANY_ASSUMPTION = ""
 
 @dataclass(frozen=True)
 class Breach:
-    """An assumption that a run broke. run: title and engine; permission: reason why this is allowed, "" if it is
+    """An assumption that a run broke. run_name: title and engine; permission: reason why this is allowed, "" if it is
     not."""
 
-    run: str
+    run_name: str
     assumption: BrokenAssumption
     permission: str
 
@@ -39,13 +39,16 @@ class Grounds:
     part_index: int = 0
     is_closed: bool = False
 
-    def record(self, run: Result) -> None:
+    def record(self, run_result: Result) -> None:
         """Record the assumptions that a result's run broke."""
         if self.rows_rest_on_them:
             self.breaches, self.rows_rest_on_them, self.is_closed = [], False, False
         self.part_index = _instruction_index()
-        name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED_ASSUMPTIONS.get()
-        for broken in broken_of(run):
+        name, reasons = (
+            f"{run_result.data.attrs['title']}, {run_result.data.attrs['engine']}".strip(", "),
+            _ALLOWED_ASSUMPTIONS.get(),
+        )
+        for broken in broken_of(run_result):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
     def breaches_of_row(self, is_allowed: bool) -> str:
@@ -67,7 +70,7 @@ class Grounds:
 def _assumption_text(similar_breaches: list[Breach]) -> str:
     worst = max(similar_breaches, key=lambda breach: breach.assumption.share)
     runs = f"{len(similar_breaches)} runs, the longest " if len(similar_breaches) > 1 else ""
-    return f"{worst.assumption.fact()} ({runs}{worst.run}){f': {worst.permission}' if worst.permission else ''}"
+    return f"{worst.assumption.fact()} ({runs}{worst.run_name}){f': {worst.permission}' if worst.permission else ''}"
 
 
 _CURRENT_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)
@@ -77,14 +80,14 @@ _ALLOWED_ASSUMPTIONS: ContextVar[dict[str, str]] = ContextVar("allowed", default
 CaseResult = TypeVar("CaseResult")
 
 
-def measured_rows(measure: Callable[[], CaseResult]) -> tuple[CaseResult, str]:
+def measured_rows(measure_case: Callable[[], CaseResult]) -> tuple[CaseResult, str]:
     """Measure a case: returns its rows with the broken assumptions of its runs, and text on the assumptions that were
     broken without permission after its last row."""
     grounds = Grounds()
     token = _CURRENT_GROUNDS.set(grounds)
     try:
         with result_observer(grounds.record):
-            answer = measure()
+            answer = measure_case()
     finally:
         _CURRENT_GROUNDS.reset(token)
     return answer, "" if grounds.rows_rest_on_them else grounds.breach_text(is_allowed=False)
@@ -100,11 +103,11 @@ def _instruction_index() -> int:
 
 
 @contextmanager
-def allowing_breaches(tolerance_reason: str, *names: str) -> Iterator[None]:
+def allowing_breaches(tolerance_reason: str, *assumption_names: str) -> Iterator[None]:
     """Context or decorator in which runs may break the named assumptions, or any assumption if none is named.
     tolerance_reason: why this is allowed."""
     token = _ALLOWED_ASSUMPTIONS.set(
-        _ALLOWED_ASSUMPTIONS.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), tolerance_reason)
+        _ALLOWED_ASSUMPTIONS.get() | dict.fromkeys(assumption_names or (ANY_ASSUMPTION,), tolerance_reason)
     )
     try:
         yield

@@ -114,15 +114,15 @@ class Observed:
         return self._row(expected, None, tolerance_reason, independence, "reported")
 
     def aim(
-        self, bound: float, tolerance_reason: str, side: Side = "at most", independence: Independence = "none"
+        self, bound: float, tolerance_reason: str, missed_side: Side = "at most", independence: Independence = "none"
     ) -> Row:
         """Row of a stated aim, which does not pass or fail: "reported" where the aim is reached, else "missed".
 
         It serves for figures that depend on the machine, such as seconds, their ratios and memory, and for aims that
         the method is known not to reach; ``tolerance_reason`` says which.
         """
-        reached = self.value <= bound if side == "at most" else self.value >= bound
-        wanted = f"{side} {bound:,.4g}"
+        reached = self.value <= bound if missed_side == "at most" else self.value >= bound
+        wanted = f"{missed_side} {bound:,.4g}"
         missed = f"{self.value:,.4g}{f' {self.unit}' if self.unit else ''}; the aim is {wanted}"
         return self._row(
             wanted, None, tolerance_reason, independence, *(("reported", "") if reached else ("missed", missed))
@@ -142,24 +142,24 @@ class Observed:
 
 
 def behaviour_row(
-    id: str,
-    system: System,
+    row_id: str,
+    system_name: System,
     quantity: str,
     outcome: str,
-    expected: str,
+    expected_outcome: str,
     tolerance_reason: str,
     independence: Independence = "none",
 ) -> Row:
-    """Row for a behaviour in words, such as "refused"; it passes if ``outcome`` equals ``expected``."""
-    passed = outcome == expected
+    """Row for a behaviour in words, such as "refused"; it passes if ``outcome`` equals ``expected_outcome``."""
+    passed = outcome == expected_outcome
     reason = "" if passed else f"found {outcome!r}"
     return Row(
-        id,
-        system,
+        row_id,
+        system_name,
         quantity,
         outcome,
         "",
-        expected,
+        expected_outcome,
         None,
         tolerance_reason,
         independence,
@@ -168,32 +168,34 @@ def behaviour_row(
     )
 
 
-def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
+def not_run(row_id: str, system_name: System, quantity: str, reason: str) -> Row:
     """Row for a quantity that could not be measured here, with the reason."""
-    return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason, "", "")
+    return Row(row_id, system_name, quantity, None, "", "", None, "", "none", "not run", reason, "", "")
 
 
-def failed_row(id: str, quantity: str, reason: str) -> Row:
+def failed_row(row_id: str, quantity: str, reason: str) -> Row:
     """Failed row for a case that gave no value, or whose value rests on a broken assumption."""
-    return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
+    return Row(row_id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
 
 
-def rows_on_grounds(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
+def rows_on_grounds(case_name: str, measure_case: Callable[[], CaseAnswer]) -> CaseAnswer:
     """Measure a case: returns its rows, "failed" where they rest on an assumption broken without permission, and its
     saved data.
 
     Assumptions that runs after the last row broke have a separate row.
     """
-    (rows, data), remaining_breaches = grounds.measured_rows(measure)
+    (rows, data), remaining_breaches = grounds.measured_rows(measure_case)
     rows = [row.with_grounds() for row in rows]
     if remaining_breaches:
-        rows.append(failed_row(f"{name}.assumptions", f"runs of case {name} after its last row", remaining_breaches))
+        rows.append(
+            failed_row(f"{case_name}.assumptions", f"runs of case {case_name} after its last row", remaining_breaches)
+        )
     return rows, data
 
 
-def row_of_saved(row: dict[str, Any]) -> dict[str, Any]:
+def row_of_saved(saved_row: dict[str, Any]) -> dict[str, Any]:
     """Row read from saved results, brought to the present form: older reports used "passed" for rows without verdict,
     and had no assumptions."""
-    unjudged = row["status"] == "passed" and row["reason"] == "reported, not judged"
-    row = {"broken": "", "allowed": "", **row}
-    return row | {"status": "reported", "reason": ""} if unjudged else row
+    unjudged = saved_row["status"] == "passed" and saved_row["reason"] == "reported, not judged"
+    saved_row = {"broken": "", "allowed": "", **saved_row}
+    return saved_row | {"status": "reported", "reason": ""} if unjudged else saved_row

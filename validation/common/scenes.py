@@ -31,7 +31,7 @@ def road_scene(
     step: float = 1e-3,
     duration: float = 2.0,
     road: dict[str, Any] | None = None,
-    folder: Path = Path(),
+    scene_folder: Path = Path(),
 ) -> Scene:
     """Pitch-plane scene of the vehicle on a road, by default the road of the paper's study; step and duration in s."""
     return build(
@@ -42,12 +42,12 @@ def road_scene(
             "effects": {"road": road or STUDY_ROAD},
         },
         "",
-        folder,
+        scene_folder,
     )
 
 
 def virtual_drive(
-    folder: Path,
+    output_folder: Path,
     duration: float,
     sample_period: float = 1e-3,
     step: float = 1e-3,
@@ -58,17 +58,17 @@ def virtual_drive(
     the folder.
     """
     measured = run(road_scene(parameters, step, duration, road), "reference")
-    write_measurement(measured, folder, sample_period)
+    write_measurement(measured, output_folder, sample_period)
     return measured
 
 
 def force_scene(
-    folder: Path,
+    scene_folder: Path,
     parameters: str = "itwm_drift",
     step: float = 1e-3,
     duration: float = 2.0,
     interpolation: str = "linear",
-    override: dict[str, float] | None = None,
+    parameter_changes: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
     """Pitch-plane scene of the vehicle under the wheel forces that ``virtual_drive`` wrote to the folder; step and
@@ -77,12 +77,12 @@ def force_scene(
     return build(
         {
             "title": "validation",
-            "vehicle": {"parameters": parameters, "override": override or {}},
+            "vehicle": {"parameters": parameters, "override": parameter_changes or {}},
             "run": {"duration": duration, "step": step},
             "effects": forces | (effects or {}),
         },
         "",
-        folder,
+        scene_folder,
     )
 
 
@@ -93,6 +93,6 @@ def data_folder() -> Path | None:
     return Path(named) if named and Path(named).is_dir() else None
 
 
-def largest_difference(result: Result, other_result: Result) -> float:
+def largest_difference(first_result: Result, second_result: Result) -> float:
     """Largest difference of any state (m, rad, m/s, rad/s) of two runs on the same times."""
-    return float(np.abs(result.states - other_result.states).max())
+    return float(np.abs(first_result.states - second_result.states).max())

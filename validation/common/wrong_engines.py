@@ -21,29 +21,29 @@ class FaultlessIntegrator:
     def integrate(self, rate_function: Any, times: np.ndarray, start_state: np.ndarray, tolerance: float) -> np.ndarray:
         """States (len(times), 8) of y' = f(t, y), with f = ``rate_function``, by an adaptive Runge-Kutta method."""
 
-        def rate(t: float, y: np.ndarray) -> np.ndarray:
-            return self.rates_used(rate_function(t, y))
+        def rate(time: float, state: np.ndarray) -> np.ndarray:
+            return self.rates_used(rate_function(time, state))
 
         solution = solve_ivp(
             rate, times[[0, -1]], start_state, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01
         )
         return self.states_returned(solution.y.T)
 
-    def rates_used(self, rate: np.ndarray) -> np.ndarray:
+    def rates_used(self, state_rates: np.ndarray) -> np.ndarray:
         """Time derivatives (8,) that the integrator uses; faulty subclasses change them."""
-        return rate
+        return state_rates
 
-    def states_returned(self, states: np.ndarray) -> np.ndarray:
+    def states_returned(self, computed_states: np.ndarray) -> np.ndarray:
         """States (n, 8) that the integrator returns; faulty subclasses change them."""
-        return states
+        return computed_states
 
 
 class StandingIntegrator(FaultlessIntegrator):
     """Faulty integrator: the vehicle stays in its initial state."""
 
-    def states_returned(self, states: np.ndarray) -> np.ndarray:
+    def states_returned(self, computed_states: np.ndarray) -> np.ndarray:
         """The initial state at all times."""
-        return np.tile(states[0], (len(states), 1))
+        return np.tile(computed_states[0], (len(computed_states), 1))
 
 
 class OverstatedOrderIntegrator:
@@ -62,17 +62,17 @@ class OverstatedOrderIntegrator:
 class SwappedWheelsIntegrator(FaultlessIntegrator):
     """Faulty integrator: front and rear wheel are exchanged in the states that it returns."""
 
-    def states_returned(self, states: np.ndarray) -> np.ndarray:
+    def states_returned(self, computed_states: np.ndarray) -> np.ndarray:
         """States with the columns of front and rear wheel exchanged."""
-        return states[:, [1, 0, 2, 3, 5, 4, 6, 7]]
+        return computed_states[:, [1, 0, 2, 3, 5, 4, 6, 7]]
 
 
 class WeakForcesIntegrator(FaultlessIntegrator):
     """Faulty integrator: all forces are 1 % too small."""
 
-    def rates_used(self, rate: np.ndarray) -> np.ndarray:
+    def rates_used(self, state_rates: np.ndarray) -> np.ndarray:
         """Time derivatives with accelerations 1 % too small."""
-        return np.array([1.0] * 4 + [0.99] * 4) * rate
+        return np.array([1.0] * 4 + [0.99] * 4) * state_rates
 
 
 WRONG_ENGINES = (StandingIntegrator, OverstatedOrderIntegrator, SwappedWheelsIntegrator, WeakForcesIntegrator)

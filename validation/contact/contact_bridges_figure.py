@@ -25,12 +25,12 @@ WHEELS = 4
 LINE_STYLES = {1: ":", WHEELS: "-", 8: "--"}
 
 
-def figure(points: list[dict[str, Any]]) -> Figure:
+def figure(timed_points: list[dict[str, Any]]) -> Figure:
     """Figure of the computing time per step for each contact law, and of the shares of engine, kernel and bridge
     between them, by law and by number of wheels."""
     drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(COLUMN_WIDTH, 8.6))
     left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
-    some = [p for p in points if METHOD_OF_ENGINE[p["engine"]] == p["method"]]
+    some = [p for p in timed_points if METHOD_OF_ENGINE[p["engine"]] == p["method"]]
     best = [p for p in some if p["bridge"] in ("empty", _best_bridge(p["engine"]))]
     _plot_laws(left, some)
     _draw_stacked_shares(
@@ -51,22 +51,22 @@ def _best_bridge(engine: str) -> str:
     return "native" if engine == "mujoco" else "generic object"
 
 
-def _plot_laws(axis: Any, points: list[dict[str, Any]]) -> None:
+def _plot_laws(panel: Any, timed_points: list[dict[str, Any]]) -> None:
     """Plot the time per step over the contact laws: a line of the fastest bridge for each number of wheels, and marks
     for the other bridges between engine and kernel."""
     for engine in METHOD_OF_ENGINE:
-        of_engine = [p for p in points if p["engine"] == engine]
+        of_engine = [p for p in timed_points if p["engine"] == engine]
         for count, style in LINE_STYLES.items():
             line = [
                 p for p in of_engine if p["wheels"] == count and p["bridge"] in ("none", "empty", _best_bridge(engine))
             ]
             x, y = np.array(sorted((LAW_NAMES.index(p["law"]), 1e6 * p["step"]) for p in line)).T
             label = f"{ENGINE_NAMES[engine]}, {_best_bridge(engine)}, {count} wheel{'s' * (count > 1)}"
-            axis.semilogy(x, y, style, marker=".", color=COLOURS[engine], label=label)
+            panel.semilogy(x, y, style, marker=".", color=COLOURS[engine], label=label)
         others = [p for p in of_engine if p["bridge"] not in ("none", "empty", _best_bridge(engine))]
         for mark, bridge in zip("sD^", dict.fromkeys(p["bridge"] for p in others), strict=False):
             x, y = np.array([(LAW_NAMES.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
-            axis.semilogy(
+            panel.semilogy(
                 x,
                 y,
                 mark,
@@ -74,26 +74,26 @@ def _plot_laws(axis: Any, points: list[dict[str, Any]]) -> None:
                 mfc="white",
                 label=f"{ENGINE_NAMES[engine]}, {BRIDGE_NAMES.get(bridge, bridge)}, {WHEELS} wheels",
             )
-    axis.set_xticks(range(len(LAW_NAMES)), LAW_NAMES, rotation=35, ha="right")
-    axis.set(ylabel="time per step [µs]", title="One call per step")
-    axis.grid(True, axis="y", alpha=0.3)
-    low, high = axis.get_ylim()
-    axis.set_ylim(low, high * (high / low) ** 0.4)  # room for the legend
-    axis.legend(fontsize=SMALL_TEXT, loc="upper left", ncols=2)
+    panel.set_xticks(range(len(LAW_NAMES)), LAW_NAMES, rotation=35, ha="right")
+    panel.set(ylabel="time per step [µs]", title="One call per step")
+    panel.grid(True, axis="y", alpha=0.3)
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, high * (high / low) ** 0.4)  # room for the legend
+    panel.legend(fontsize=SMALL_TEXT, loc="upper left", ncols=2)
 
 
-def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
+def _draw_stacked_shares(panel: Any, timed_points: list[tuple[str, dict[str, Any]]]) -> None:
     """Draw for each measurement a bar of 100 % with the shares of engine, kernel and bridge; negative shares count as
     zero."""
-    labels, before = [label for label, _ in points], np.zeros(len(points))
-    whole = np.array([sum(max(p[part], 0.0) for part, _, _ in STEP_PARTS) for _, p in points])
+    labels, before = [label for label, _ in timed_points], np.zeros(len(timed_points))
+    whole = np.array([sum(max(p[part], 0.0) for part, _, _ in STEP_PARTS) for _, p in timed_points])
     for part, name, colour in STEP_PARTS:
-        share = np.array([100.0 * max(p[part], 0.0) for _, p in points]) / whole
-        axis.barh(labels, share, left=before, color=colour, label=name)
+        share = np.array([100.0 * max(p[part], 0.0) for _, p in timed_points]) / whole
+        panel.barh(labels, share, left=before, color=colour, label=name)
         for i, (at, value) in enumerate(zip(before, share, strict=True)):
             if value >= 6.0:
-                axis.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize=SMALL_TEXT)
+                panel.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize=SMALL_TEXT)
         before += share
-    axis.invert_yaxis()
-    axis.tick_params(axis="y", labelsize=SMALL_TEXT)
-    axis.set_xlabel("share of the step [%]")
+    panel.invert_yaxis()
+    panel.tick_params(axis="y", labelsize=SMALL_TEXT)
+    panel.set_xlabel("share of the step [%]")

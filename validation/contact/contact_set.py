@@ -86,21 +86,25 @@ def wide_contacts(part_number: int) -> list[ContactCase]:
 
 
 def _draw_contacts(
-    stream: int,
-    count: int,
-    ratios: Range,
-    size_range: Range,
+    stream_number: int,
+    contact_count: int,
+    axis_ratios: Range,
+    creepage_range: Range,
     contact_kind: str,
     material_pairs: list[MaterialPair],
-    absent_share: float = 0.0,
+    zero_creepage_share: float = 0.0,
 ) -> list[ContactCase]:
     """Random contacts from a stream of random numbers, with the material pairs in turn. Each creepage is zero in a
     share of the contacts, but never all three at a time."""
-    rng = np.random.default_rng((SEED, stream))
+    rng = np.random.default_rng((SEED, stream_number))
     ratio, level = (
-        np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, size_range)
+        np.exp(rng.uniform(np.log(low), np.log(high), contact_count)).tolist()
+        for low, high in (axis_ratios, creepage_range)
     )
-    directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent_share
+    directions, present = (
+        rng.normal(size=(contact_count, 3)),
+        rng.uniform(size=(contact_count, 3)) >= zero_creepage_share,
+    )
     present[~present.any(axis=1)] = True
     parts = map(tuple, (directions * present).tolist())
     drawn = zip(ratio, level, parts, cycle(material_pairs), strict=False)
@@ -110,8 +114,8 @@ def _draw_contacts(
     ]
 
 
-def _semi_axes(ratio: float) -> tuple[float, float]:
-    return CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5
+def _semi_axes(axis_ratio: float) -> tuple[float, float]:
+    return CONTACT_SIZE * axis_ratio**0.5, CONTACT_SIZE / axis_ratio**0.5
 
 
 def read_contacts() -> list[ContactCase]:
@@ -133,16 +137,16 @@ def read_wide(part_number: int) -> list[ContactCase]:
     ][: sum(WIDE_CONTACTS[part_number])]
 
 
-def _read_contacts(path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
-    with path.open(newline="") as file:
+def _read_contacts(table_path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
+    with table_path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     forces: list[dict[str, Any]] = [{name: float(row[name]) for name in RESULT_COLUMNS} for row in rows]
     return [replace(case, **force) for case, force in zip(contacts, forces, strict=True)]
 
 
-def compute_and_write(path: Path, contacts: list[ContactCase]) -> None:
+def compute_and_write(table_path: Path, contacts: list[ContactCase]) -> None:
     """Compute the exact forces of contacts and write them to a CSV file."""
-    with path.open("w", newline="") as file:
+    with table_path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("ratio", "kind", "level", *RESULT_COLUMNS))
         for case in map(with_exact_forces, contacts):

@@ -45,23 +45,32 @@ class Shape:
     box: Box | None = None
 
 
-def _shape_of_formula(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
-    """A shape whose undeformed distance is a formula, and whose exact contact area lies within -x..x and -y..y (m)."""
-    distance = from_function(height, (-2.0 * x, 2.0 * x), (-2.0 * y, 2.0 * y))
-    return Shape(name, distance, load, (-x, x, -y, y))
+def _shape_of_formula(
+    shape_name: str, gap_height: Callable[[Array, Array], Array], load: float, half_length: float, half_width: float
+) -> Shape:
+    """A shape whose undeformed distance is a formula, and whose exact contact area lies within
+    -half_length..half_length in x and -half_width..half_width in y (m)."""
+    distance = from_function(gap_height, (-2.0 * half_length, 2.0 * half_length), (-2.0 * half_width, 2.0 * half_width))
+    return Shape(shape_name, distance, load, (-half_length, half_length, -half_width, half_width))
 
 
-def _hertz_shape(name: str, ratio: float, x: float, y: float) -> Shape:
-    return _shape_of_formula(name, lambda u, v: CURVATURE * (u**2 + ratio * v**2), 1e5, x, y)
-
-
-def _two_grooves(name: str, ridge: float, load: float, half_spacing: float = 3e-3, tilt: float = 0.0) -> Shape:
-    """A shape with two parallel grooves at -half_spacing and half_spacing (m) in y, with a ridge (m) between them; the
-    second groove is ``tilt`` (m) higher."""
+def _hertz_shape(shape_name: str, axis_ratio: float, half_length: float, half_width: float) -> Shape:
     return _shape_of_formula(
-        name,
+        shape_name, lambda u, v: CURVATURE * (u**2 + axis_ratio * v**2), 1e5, half_length, half_width
+    )
+
+
+def _two_grooves(
+    shape_name: str, ridge_height: float, load: float, half_spacing: float = 3e-3, groove_tilt: float = 0.0
+) -> Shape:
+    """A shape with two parallel grooves at -half_spacing and half_spacing (m) in y, with a ridge (m) between them; the
+    second groove is ``groove_tilt`` (m) higher."""
+    return _shape_of_formula(
+        shape_name,
         lambda u, v: (
-            CURVATURE * u**2 + ridge * ((v / half_spacing) ** 2 - 1.0) ** 2 + tilt * (v / half_spacing + 1.0) / 2.0
+            CURVATURE * u**2
+            + ridge_height * ((v / half_spacing) ** 2 - 1.0) ** 2
+            + groove_tilt * (v / half_spacing + 1.0) / 2.0
         ),
         load,
         0.0135,
@@ -188,7 +197,9 @@ GRID_MARGINS = (1.4, 2.0, 3.0)
 """Side lengths of the exact grid divided by those of the simplified theory's contact area, tried in turn."""
 
 
-def exact_contact_of_wheelset(wheelset: PlacedWheelset, normal_contact: NormalContact, cells: int) -> NormalSolution:
+def exact_contact_of_wheelset(
+    placed_wheelset: PlacedWheelset, normal_contact: NormalContact, cell_count: int
+) -> NormalSolution:
     """Exact normal contact of a wheel with all its patches on a rail, with heights along the track's vertical."""
     boxes = np.array(
         [
@@ -199,11 +210,11 @@ def exact_contact_of_wheelset(wheelset: PlacedWheelset, normal_contact: NormalCo
     (x0, y0), (x1, y1) = boxes[::2].min(axis=1), boxes[1::2].max(axis=1)
     slope = float(np.cos(min(part.patch.lean for part in normal_contact.patches)))
     for margin in GRID_MARGINS:
-        step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
-        x, y = (x0 + x1) / 2 + cell_centres(cells, step_x), (y0 + y1) / 2 + cell_centres(2 * cells, step_y)
-        heights = np.min([_heights_of_patch(touch.patch, x, y) for touch in wheelset.touches], axis=0)
+        step_x, step_y = margin * (x1 - x0) / cell_count, margin * (y1 - y0 + 2e-3) / (2 * cell_count)
+        x, y = (x0 + x1) / 2 + cell_centres(cell_count, step_x), (y0 + y1) / 2 + cell_centres(2 * cell_count, step_y)
+        heights = np.min([_heights_of_patch(touch.patch, x, y) for touch in placed_wheelset.touches], axis=0)
         try:
-            return solve_normal(heights * slope, step_x, step_y, MATERIAL_PAIR, load=wheelset.load / slope)
+            return solve_normal(heights * slope, step_x, step_y, MATERIAL_PAIR, load=placed_wheelset.load / slope)
         except InputError as error:  # the contact reaches the edge of the grid
             refused = error
     raise refused
@@ -213,28 +224,28 @@ UNKNOWN_HEIGHT = 1e-3
 """Height (m) assumed where the undeformed distance is not known."""
 
 
-def _heights_of_patch(patch: Patch, x: Array, y: Array) -> Array:
+def _heights_of_patch(contact_patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) in m of a patch along the track's vertical, on the grid that all patches share."""
-    known, across = patch.distance, y - patch.contour_position
+    known, across = contact_patch.distance, y - contact_patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
     inside = np.clip(x, known.x[0], known.x[-1])
-    heights[over] = known.at(inside[None, :], across[over][:, None]) / np.cos(patch.lean)
+    heights[over] = known.at(inside[None, :], across[over][:, None]) / np.cos(contact_patch.lean)
     return heights
 
 
-def exact_normal(contact_shape: Shape, cells: int, box: Box) -> NormalSolution:
-    """Exact normal contact on a grid of cells x cells over the box x0, x1, y0, y1 (m)."""
-    x0, x1, y0, y1 = box
-    x, y = (low + (np.arange(cells) + 0.5) / cells * (high - low) for low, high in ((x0, x1), (y0, y1)))
+def exact_normal(contact_shape: Shape, cell_count: int, grid_box: Box) -> NormalSolution:
+    """Exact normal contact on a grid of cell_count x cell_count cells over the box x0, x1, y0, y1 (m)."""
+    x0, x1, y0, y1 = grid_box
+    x, y = (low + (np.arange(cell_count) + 0.5) / cell_count * (high - low) for low, high in ((x0, x1), (y0, y1)))
     heights = contact_shape.distance.at(x[None, :], y[:, None])
     solution = solve_normal(heights, x[1] - x[0], y[1] - y[0], MATERIAL_PAIR, load=contact_shape.load)
     return replace(solution, x=x, y=y)
 
 
-def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, float, float]]:
+def creepages(contact_area: float, load: float) -> dict[tuple[str, float], tuple[float, float, float]]:
     """Kind and level -> creepages xi_x, xi_y and spin (1/m) for a contact of an area (m^2) and a load (N)."""
-    c = np.sqrt(area / np.pi)
+    c = np.sqrt(contact_area / np.pi)
     scale = FRICTION * load / (4.0 * MATERIAL_PAIR.G * c**2)
     return {
         (name, level): (level * scale * x, level * scale * y, level * scale * spin / c)
@@ -243,9 +254,11 @@ def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, 
     }
 
 
-def exact_rolling(normal: NormalSolution, creepage: tuple[float, float, float]) -> RollingSolution | None:
+def exact_rolling(
+    normal_solution: NormalSolution, creepages_and_spin: tuple[float, float, float]
+) -> RollingSolution | None:
     """Exact rolling solution for creepages xi_x, xi_y and spin (1/m); None if the exact solver did not converge."""
     try:
-        return solve_rolling(normal, FRICTION, *creepage, MATERIAL_PAIR)
+        return solve_rolling(normal_solution, FRICTION, *creepages_and_spin, MATERIAL_PAIR)
     except RunFailed:
         return None

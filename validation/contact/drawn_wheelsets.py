@@ -67,11 +67,15 @@ def critical_speeds(wheelset: Wheelset, search_nearby: bool) -> dict[str, float 
     return speeds
 
 
-def _critical_speed_near(growth: Callable[[float], float], speed: float) -> float:
-    """Critical speed (m/s) at which ``growth`` (1/s) crosses zero, within HALF_BRACKET of ``speed``. If there is none
-    in this interval, a lower speed with growth, or the interval's upper end."""
+def _critical_speed_near(growth_rate_at_speed: Callable[[float], float], speed: float) -> float:
+    """Critical speed (m/s) at which ``growth_rate_at_speed`` (1/s) crosses zero, within HALF_BRACKET of ``speed``. If
+    there is none in this interval, a lower speed with growth, or the interval's upper end."""
     low, high = (1.0 - HALF_BRACKET) * speed, (1.0 + HALF_BRACKET) * speed
     for below in np.geomspace(LOWEST_SPEED, low, LOWER_SPEEDS):
-        if growth(float(below)) >= 0.0:
+        if growth_rate_at_speed(float(below)) >= 0.0:
             return float(below)
-    return high if growth(high) < 0.0 else float(brentq(growth, low, high, xtol=1e-12 * speed, rtol=1e-12))
+    return (
+        high
+        if growth_rate_at_speed(high) < 0.0
+        else float(brentq(growth_rate_at_speed, low, high, xtol=1e-12 * speed, rtol=1e-12))
+    )

@@ -78,50 +78,50 @@ def speed_rows_and_table(
     return rows, table
 
 
-def _call_kernel(ellipse: FastsimEllipse, values: tuple[float, ...]) -> None:
+def _call_kernel(ellipse: FastsimEllipse, ellipse_values: tuple[float, ...]) -> None:
     for _ in range(REPEATS):
-        ellipse(*values)
+        ellipse(*ellipse_values)
 
 
-def _processor_times(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
+def _processor_times(timed_jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
     """Job -> processor times (rounds,) in s per call or cell; the jobs take turns over several rounds."""
-    for job, _ in jobs.values():
+    for job, _ in timed_jobs.values():
         job()
-    seconds = np.empty((TIMING_ROUNDS, len(jobs)))
+    seconds = np.empty((TIMING_ROUNDS, len(timed_jobs)))
     for row in seconds:
-        for j, (job, units) in enumerate(jobs.values()):
+        for j, (job, units) in enumerate(timed_jobs.values()):
             start = time.process_time()
             job()
             row[j] = (time.process_time() - start) / units
-    return dict(zip(jobs, seconds.T, strict=True))
+    return dict(zip(timed_jobs, seconds.T, strict=True))
 
 
 @compiled
-def _arithmetic_bound(values, repeats):
+def _arithmetic_bound(numbers, repeat_count):
     """Loop that is timed as the lower bound of FASTSIM's arithmetic: a square root and a division per element, all
     independent, in vector registers."""
     total = 0.0
-    for _ in range(repeats):
-        for i in range(values.size):
-            values[i] = 1.0 / np.sqrt(values[i])
-        total += values[0]
+    for _ in range(repeat_count):
+        for i in range(numbers.size):
+            numbers[i] = 1.0 / np.sqrt(numbers[i])
+        total += numbers[0]
     return total
 
 
-def _aligned_blocks(count: int) -> np.ndarray:
+def _aligned_blocks(block_count: int) -> np.ndarray:
     """Array of zero blocks aligned to the vector registers; without alignment the march takes 1.5 times as long."""
-    room = np.zeros(count * BLOCK.itemsize // 8 + 8)
+    room = np.zeros(block_count * BLOCK.itemsize // 8 + 8)
     first = -room.ctypes.data % 64 // 8
     return room[first : first + room.size - 8].view(BLOCK)
 
 
 @compiled
-def _plain_loop(blocks, cells, repeats):
-    for _ in range(repeats):
-        march_plain(blocks[0], cells)
+def _plain_loop(contact_blocks, cell_count, repeat_count):
+    for _ in range(repeat_count):
+        march_plain(contact_blocks[0], cell_count)
 
 
 @compiled
-def _repeat_second_order(blocks, cells, repeats):
-    for _ in range(repeats):
-        march_second_order(blocks[0], cells)
+def _repeat_second_order(contact_blocks, cell_count, repeat_count):
+    for _ in range(repeat_count):
+        march_second_order(contact_blocks[0], cell_count)

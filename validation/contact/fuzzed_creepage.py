@@ -40,59 +40,61 @@ SUM_ROUNDING = 1e-12
 """Relative rounding error of sums over some hundred cells, each accurate to 1e-16."""
 
 
-def random_contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
-    """``count`` random contacts: load 1e-6 to 1e6 N, friction 1e-6 to 1, a/b 1e-3 to 1e3, creepage 0 to 1, spin up to
+def random_contacts(seed: int, stream_number: int, contact_count: int) -> dict[str, Any]:
+    """Random contacts: load 1e-6 to 1e6 N, friction 1e-6 to 1, a/b 1e-3 to 1e3, creepage 0 to 1, spin up to
     1/b.
 
     In turn: pure xi_x, xi_y and spin, none at all, spin against lateral creepage with its pole inside the ellipse, all
     of one size, all of random sizes, and a load of zero or less.
     """
-    draw = np.random.default_rng((seed, stream))
-    load, mu, ratio = (10.0 ** draw.uniform(*ends, count) for ends in ((-6, 6), (-6, 0), (-3, 3)))
-    mean = 1.2e-4 * np.cbrt(load) * 10.0 ** draw.uniform(-0.5, 0.5, count)
+    draw = np.random.default_rng((seed, stream_number))
+    load, mu, ratio = (10.0 ** draw.uniform(*ends, contact_count) for ends in ((-6, 6), (-6, 0), (-3, 3)))
+    mean = 1.2e-4 * np.cbrt(load) * 10.0 ** draw.uniform(-0.5, 0.5, contact_count)
     a, b = mean * np.sqrt(ratio), mean / np.sqrt(ratio)
-    kind = np.arange(count) % KIND_COUNT
-    sizes = 10.0 ** draw.uniform(-12, 0, (3, count)) * draw.choice((-1.0, 1.0), (3, count))
+    kind = np.arange(contact_count) % KIND_COUNT
+    sizes = 10.0 ** draw.uniform(-12, 0, (3, contact_count)) * draw.choice((-1.0, 1.0), (3, contact_count))
     sizes[:, kind == 5] = np.abs(sizes[0, kind == 5]) * np.sign(sizes[:, kind == 5])
     xi_x, xi_y, spin = sizes[0], sizes[1], sizes[2] / np.maximum(a, b)
     for i, values in enumerate((xi_x, xi_y, spin)):
         values[(kind < 4) & (kind != i)] *= 0.0
     against = kind == 4
-    xi_y[against] = (-spin * a * draw.uniform(-1, 1, count))[against]
-    xi_x[against] = (spin * b * draw.uniform(-1, 1, count) * draw.integers(0, 2, count))[against]
-    load[kind == 7] *= -draw.integers(0, 2, count)[kind == 7]
+    xi_y[against] = (-spin * a * draw.uniform(-1, 1, contact_count))[against]
+    xi_x[against] = (spin * b * draw.uniform(-1, 1, contact_count) * draw.integers(0, 2, contact_count))[against]
+    load[kind == 7] *= -draw.integers(0, 2, contact_count)[kind == 7]
     return {"a": a, "b": b, "load": load, "mu": mu, "xi_x": xi_x, "xi_y": xi_y, "spin": spin}
 
 
 def worst_violation(
-    columns: Mapping[str, Any], options: Mapping[str, Any], material_pair: MaterialPair
+    contact_columns: Mapping[str, Any], theory_options: Mapping[str, Any], material_pair: MaterialPair
 ) -> dict[str, float]:
     """Invariant -> its largest violation over contacts, divided by mu N (and by the creepages where these scale it);
     infinite for values that are not finite."""
-    creep = fastsim(RollingEllipse(**columns), material_pair, **options)
-    limit = columns["mu"] * np.maximum(columns["load"], 0.0)
-    least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])
-    motion = np.hypot(columns["xi_x"], columns["xi_y"]) + np.abs(columns["spin"]) * arm
+    creep = fastsim(RollingEllipse(**contact_columns), material_pair, **theory_options)
+    limit = contact_columns["mu"] * np.maximum(contact_columns["load"], 0.0)
+    least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(contact_columns["a"], contact_columns["b"])
+    motion = np.hypot(contact_columns["xi_x"], contact_columns["xi_y"]) + np.abs(contact_columns["spin"]) * arm
     still, power = (motion == 0.0) | (limit == 0.0), least * np.where(motion > 0.0, motion, 1.0)
-    net = {name: options[name] for name in ("cells", "bound") if name in options}
+    net = {name: theory_options[name] for name in ("cells", "bound") if name in theory_options}
 
-    def scaled_forces(values: CreepForces, value_sizes: tuple[float, ...]) -> Array:
-        parts = zip((values.fx, values.fy, values.mz), value_sizes, (least, least, least * arm), strict=True)
+    def scaled_forces(creep_forces: CreepForces, force_scales: tuple[float, ...]) -> Array:
+        parts = zip(
+            (creep_forces.fx, creep_forces.fy, creep_forces.mz), force_scales, (least, least, least * arm), strict=True
+        )
         return np.array([value / size / unit for value, size, unit in parts])
 
-    def difference_of_similar(name: str) -> float:
-        factors, sizes = SIMILAR_CONTACTS[name]
-        changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
+    def difference_of_similar(scaled_quantity: str) -> float:
+        factors, sizes = SIMILAR_CONTACTS[scaled_quantity]
+        changed = {key: value * factors.get(key, 1.0) for key, value in contact_columns.items()}
         return _largest_finite(
-            np.abs(forces - scaled_forces(fastsim(RollingEllipse(**changed), material_pair, **options), sizes))
+            np.abs(forces - scaled_forces(fastsim(RollingEllipse(**changed), material_pair, **theory_options), sizes))
         )
 
     forces = scaled_forces(creep, (1.0, 1.0, 1.0))
     return {
         "finite": 0.0 if all(np.isfinite(values).all() for values in vars(creep).values()) else np.inf,
         "bound": _largest_finite(np.hypot(forces[0], forces[1]) - 1.0),
-        "moment": _largest_finite((np.abs(creep.mz) - moment_bound(columns, **net)) / (least * arm)),
-        "limit": _largest_finite((creep.dissipation - power_bound(columns, **net)) / power),
+        "moment": _largest_finite((np.abs(creep.mz) - moment_bound(contact_columns, **net)) / (least * arm)),
+        "limit": _largest_finite((creep.dissipation - power_bound(contact_columns, **net)) / power),
         "reversal": difference_of_similar("reversal"),
         "mirror": difference_of_similar("mirror"),
         "power": _largest_finite(-creep.dissipation / power),
@@ -109,26 +111,30 @@ def _largest_finite(values: Array) -> float:
     return float(max(0.0, np.where(np.isfinite(values), values, np.inf).max()))
 
 
-def moment_bound(columns: Mapping[str, Any], cells: int = 21, bound: BoundShape = "intermediate") -> Array:
+def moment_bound(
+    contact_columns: Mapping[str, Any], cell_count: int = 21, traction_bound: BoundShape = "intermediate"
+) -> Array:
     """Upper bound (n,) of the spin moment (N m) for contacts with arrays (n,) of semi-axes a, b (m), load (N) and
     friction mu."""
     pure = {
-        "xi_x": np.zeros_like(columns["a"]),
-        "xi_y": np.zeros_like(columns["a"]),
-        "spin": np.ones_like(columns["a"]),
+        "xi_x": np.zeros_like(contact_columns["a"]),
+        "xi_y": np.zeros_like(contact_columns["a"]),
+        "spin": np.ones_like(contact_columns["a"]),
     }
-    return power_bound({**columns, **pure}, cells, bound)
+    return power_bound({**contact_columns, **pure}, cell_count, traction_bound)
 
 
-def power_bound(columns: Mapping[str, Any], cells: int = 21, bound: BoundShape = "intermediate") -> Array:
+def power_bound(
+    contact_columns: Mapping[str, Any], cell_count: int = 21, traction_bound: BoundShape = "intermediate"
+) -> Array:
     """Upper bound (n,) of the power that friction dissipates, divided by the rolling speed (N). The columns hold a, b,
     load, mu, and creepages xi_x, xi_y, spin."""
-    a, b, xi_x, xi_y, spin = (columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
-    work = np.zeros(len(columns["a"]))
-    for rows, net in grids_of_ratios(columns["a"] / columns["b"], cells, bound):
+    a, b, xi_x, xi_y, spin = (contact_columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
+    work = np.zeros(len(contact_columns["a"]))
+    for rows, net in grids_of_ratios(contact_columns["a"] / contact_columns["b"], cell_count, traction_bound):
         strips, along_strip = net.records
         y, half, part = (values[:, None] for values in (strips.y, strips.half, strips.part))
         along, across = -b[rows] * y, a[rows] * half * along_strip.centre
         slip = np.hypot(xi_x[rows] + spin[rows] * along, xi_y[rows] + spin[rows] * across)
         work[rows] = np.sum(part * along_strip.bound * slip, axis=(1, 2))
-    return columns["mu"] * np.maximum(columns["load"], 0.0) * work
+    return contact_columns["mu"] * np.maximum(contact_columns["load"], 0.0) * work

@@ -25,15 +25,25 @@ from models.contact.simplified_theory import SimplifiedOptions
 Box = tuple[float, float, float, float]
 
 
-def hermite_spline(nodes: Array, padded: Array) -> CubicHermiteSpline:
-    """Cubic spline along the first axis through values at equally spaced nodes; ``padded`` contains the values and an
-    extra value at each end."""
-    return CubicHermiteSpline(nodes, padded[1:-1], (padded[2:] - padded[:-2]) / (nodes[2] - nodes[0]))
+def hermite_spline(node_positions: Array, padded_values: Array) -> CubicHermiteSpline:
+    """Cubic spline along the first axis through values at equally spaced nodes; ``padded_values`` contains the values
+    and an extra value at each end."""
+    return CubicHermiteSpline(
+        node_positions,
+        padded_values[1:-1],
+        (padded_values[2:] - padded_values[:-2]) / (node_positions[2] - node_positions[0]),
+    )
 
 
-def extrapolated_rows(rows: Array) -> Array:
+def extrapolated_rows(values_in_rows: Array) -> Array:
     """The rows with an extra row at each end, extrapolated by the parabola through the three outermost rows."""
-    return np.concatenate([[3 * rows[0] - 3 * rows[1] + rows[2]], rows, [3 * rows[-1] - 3 * rows[-2] + rows[-3]]])
+    return np.concatenate(
+        [
+            [3 * values_in_rows[0] - 3 * values_in_rows[1] + values_in_rows[2]],
+            values_in_rows,
+            [3 * values_in_rows[-1] - 3 * values_in_rows[-2] + values_in_rows[-3]],
+        ]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +53,17 @@ class PlainBodies:
 
     x: Array
     y: Array
-    height: Array
+    heights: Array
     bottom: tuple[float, float]
 
     @cached_property
     def padded(self) -> Array:
         """Heights with one extrapolated node added on every side."""
-        return extrapolated_rows(extrapolated_rows(self.height).T).T
+        return extrapolated_rows(extrapolated_rows(self.heights).T).T
 
-    def line(self, y: float, order: int = 0) -> CubicHermiteSpline:
+    def line(self, y: float, derivative_order: int = 0) -> CubicHermiteSpline:
         """Spline over x of the undeformed distance at a position y, or of its y derivative of an order."""
-        return hermite_spline(self.x, hermite_spline(self.y, self.padded)(y, order))
+        return hermite_spline(self.x, hermite_spline(self.y, self.padded)(y, derivative_order))
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Undeformed distance (m) and its slopes in x and y, each (ny, nx), on the grid of x (nx,) and y (ny,)."""
@@ -69,7 +79,7 @@ class PlainBodies:
     def valleys(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """For lines across x and across y: their positions (two per node spacing, and one through the lowest point),
         and the square root of each line's least distance above the lowest point."""
-        swapped = PlainBodies(self.y, self.x, self.height.T, self.bottom[::-1])
+        swapped = PlainBodies(self.y, self.x, self.heights.T, self.bottom[::-1])
         return swapped._valley(), self._valley()
 
     def _valley(self) -> tuple[Array, Array]:
@@ -79,10 +89,10 @@ class PlainBodies:
         roots = np.append(np.sqrt(np.maximum(least - self.low, 0.0)), 0.0)
         return np.append(lines, self.bottom[1])[order], roots[order]
 
-    def box(self, depth: float) -> Box:
+    def box(self, patch_depth: float) -> Box:
         """Rectangle x0, x1, y0, y1 (m) around the area below a depth (m); the distance must rise to all sides from its
         lowest point."""
-        root, ends = math.sqrt(depth - self.low), list[float]()
+        root, ends = math.sqrt(patch_depth - self.low), list[float]()
         for (lines, roots), bottom in zip(self.valleys, self.bottom, strict=True):
             before, after = lines <= bottom, lines >= bottom
             ends += [np.interp(root, roots[before][::-1], lines[before][::-1])]
@@ -96,25 +106,29 @@ def _lowest_value(spline: CubicHermiteSpline) -> float:
     return float(min(spline(spline.x).min(), spline(turning[np.isfinite(turning)]).min(initial=np.inf)))
 
 
-def interval_midpoints(low: float, high: float, count: int) -> Array:
-    """Midpoints (count,) of equal intervals between low and high."""
-    return low + (np.arange(count) + 0.5) * (high - low) / count
+def interval_midpoints(lower_end: float, upper_end: float, interval_count: int) -> Array:
+    """Midpoints (interval_count,) of equal intervals between two ends."""
+    return lower_end + (np.arange(interval_count) + 0.5) * (upper_end - lower_end) / interval_count
 
 
-def pressure_from_heights(depth: float, low: float, height: Array, options: SimplifiedOptions) -> Array:
+def pressure_from_heights(
+    patch_depth: float, lowest_height: float, heights: Array, solver_options: SimplifiedOptions
+) -> Array:
     """Pressure times flexibility W (m) at heights (m), for a contact whose area lies below a depth (m)."""
-    over = np.maximum(depth - height, 0.0)
-    return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
+    over = np.maximum(patch_depth - heights, 0.0)
+    return over if solver_options.shape == "parabolic" else np.sqrt(over * (patch_depth - lowest_height))
 
 
-def surface_displacement(values: Array, step: tuple[float, float], material_pair: MaterialPair, parts: Array) -> Array:
-    """Surface displacement (m) on a square grid due to a traction component (Pa) on it. parts: indices of the
-    displacement and traction components."""
-    n = len(values)
-    kernel = influence_of_rectangle(cell_offsets(n, step[0]), cell_offsets(n, step[1])[:, None], *step, material_pair)[
-        (..., *parts)
-    ]
-    return convolve2d(kernel, values, mode="valid")
+def surface_displacement(
+    tractions: Array, cell_size: tuple[float, float], material_pair: MaterialPair, component_indices: Array
+) -> Array:
+    """Surface displacement (m) on a square grid due to a traction component (Pa) on it. component_indices: indices of
+    the displacement and traction components."""
+    n = len(tractions)
+    kernel = influence_of_rectangle(
+        cell_offsets(n, cell_size[0]), cell_offsets(n, cell_size[1])[:, None], *cell_size, material_pair
+    )[(..., *component_indices)]
+    return convolve2d(kernel, tractions, mode="valid")
 
 
 @dataclass(frozen=True)
@@ -127,7 +141,7 @@ class PlainPatch:
     stiffness: float
     approach: float
     box: Box
-    cover: Array
+    coverage: Array
 
     @property
     def load(self) -> float:
@@ -136,58 +150,75 @@ class PlainPatch:
 
 
 def patch_at_depth(
-    bodies: PlainBodies, depth: float, material_pair: MaterialPair, options: SimplifiedOptions
+    bodies: PlainBodies, patch_depth: float, material_pair: MaterialPair, solver_options: SimplifiedOptions
 ) -> PlainPatch:
     """The contact patch below a depth (m), with its stiffness fitted on the coarse grid."""
-    box, n = bodies.box(depth), options.net
+    box, n = bodies.box(patch_depth), solver_options.net
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     height, slope_x, slope_y = bodies.at(interval_midpoints(*box[:2], n), interval_midpoints(*box[2:], n))
-    cover = np.clip(0.5 + (depth - height) / (np.abs(slope_x) * step[0] + np.abs(slope_y) * step[1]), 0.0, 1.0)
-    pressure = pressure_from_heights(depth, bodies.low, height, options)
+    cover = np.clip(0.5 + (patch_depth - height) / (np.abs(slope_x) * step[0] + np.abs(slope_y) * step[1]), 0.0, 1.0)
+    pressure = pressure_from_heights(patch_depth, bodies.low, height, solver_options)
     u = surface_displacement(pressure, step, material_pair, np.array([Z, Z]))
-    least = LEAST_STIFFNESS_SHARE * (depth - bodies.low) / np.average(u, weights=cover)
-    stiffness = max(-1.0 / fitted_slopes(height[None], u[None], cover, step, options, True), least)
+    least = LEAST_STIFFNESS_SHARE * (patch_depth - bodies.low) / np.average(u, weights=cover)
+    stiffness = max(-1.0 / fitted_slopes(height[None], u[None], cover, step, solver_options, True), least)
     approach = float(np.average(stiffness * u + height, weights=pressure))
     m = POINTS_PER_MESH * n
     fine = pressure_from_heights(
-        depth, bodies.low, bodies.at(interval_midpoints(*box[:2], m), interval_midpoints(*box[2:], m))[0], options
+        patch_depth,
+        bodies.low,
+        bodies.at(interval_midpoints(*box[:2], m), interval_midpoints(*box[2:], m))[0],
+        solver_options,
     )
     return PlainPatch(
-        depth, float(fine.sum() * step[0] * step[1] / POINTS_PER_MESH**2), stiffness, approach, box, cover
+        patch_depth, float(fine.sum() * step[0] * step[1] / POINTS_PER_MESH**2), stiffness, approach, box, cover
     )
 
 
 def fitted_slopes(
-    u: Array, p: Array, cover: Array, step: tuple[float, float], options: SimplifiedOptions, by_height: bool = False
+    displacements: Array,
+    tractions: Array,
+    cell_coverage: Array,
+    cell_size: tuple[float, float],
+    solver_options: SimplifiedOptions,
+    by_height: bool = False,
 ) -> float:
-    """Slope of displacement u (k, n, n) over traction p by weighted least squares, common to all k components, or with
-    differences of u and p between neighbouring cells. by_height: p is fitted over u, also with differences along y."""
-    if options.fit == "displacement":
+    """Slope of displacements u (k, n, n) over tractions p by weighted least squares, common to all k components, or
+    with differences of u and p between neighbouring cells. by_height: p is fitted over u, also with differences along
+    y."""
+    if solver_options.fit == "displacement":
         parts = np.array(
-            [np.cov(a.ravel(), b.ravel(), aweights=cover.ravel(), ddof=0) for a, b in zip(u, p, strict=True)]
+            [
+                np.cov(a.ravel(), b.ravel(), aweights=cell_coverage.ravel(), ddof=0)
+                for a, b in zip(displacements, tractions, strict=True)
+            ]
         )
         products, squares = parts[:, 0, 1].sum(), parts[:, 1, 1].sum()
     else:
         products = squares = 0.0
-        for axis, size in ((2, step[0]), (1, step[1]))[: 2 if by_height else 1]:
-            weight = cover.take(range(1, cover.shape[axis - 1]), axis - 1) * cover.take(
-                range(cover.shape[axis - 1] - 1), axis - 1
+        for axis, size in ((2, cell_size[0]), (1, cell_size[1]))[: 2 if by_height else 1]:
+            weight = cell_coverage.take(range(1, cell_coverage.shape[axis - 1]), axis - 1) * cell_coverage.take(
+                range(cell_coverage.shape[axis - 1] - 1), axis - 1
             )
-            du, dp = np.diff(u, axis=axis) / size, np.diff(p, axis=axis) / size
+            du, dp = np.diff(displacements, axis=axis) / size, np.diff(tractions, axis=axis) / size
             products, squares = products + np.sum(weight * du * dp), squares + np.sum(weight * dp * dp)
     return float(squares / products if by_height else products / squares)
 
 
 def patch_at_approach(
-    bodies: PlainBodies, approach: float, material_pair: MaterialPair, options: SimplifiedOptions
+    bodies: PlainBodies, approach: float, material_pair: MaterialPair, solver_options: SimplifiedOptions
 ) -> PlainPatch:
     """The contact patch at a rigid approach (m) of the bodies."""
     over = approach - bodies.low
 
-    def residual(part: float) -> float:
-        return patch_at_depth(bodies, bodies.low + part * over, material_pair, options).approach - approach
+    def residual(depth_fraction: float) -> float:
+        return (
+            patch_at_depth(bodies, bodies.low + depth_fraction * over, material_pair, solver_options).approach
+            - approach
+        )
 
-    return patch_at_depth(bodies, bodies.low + brentq(residual, 0.2, 1.0, xtol=1e-15) * over, material_pair, options)
+    return patch_at_depth(
+        bodies, bodies.low + brentq(residual, 0.2, 1.0, xtol=1e-15) * over, material_pair, solver_options
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,41 +227,41 @@ class Strips:
     (strips, cells) in Pa from the leading edge back."""
 
     y: Array
-    low: Array
-    high: Array
+    lower_x: Array
+    upper_x: Array
     width: float
     pressure: Array
 
 
-def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: SimplifiedOptions) -> Strips:
+def strips(bodies: PlainBodies, patch: PlainPatch, cell_count: int, solver_options: SimplifiedOptions) -> Strips:
     """Strips of a patch, between the two points at which the undeformed distance equals the depth. Strips too short to
     contain a node or a midpoint between nodes are left out, as twinrig searches contact at these points."""
     box, ends = patch.box, []
-    for y in interval_midpoints(*box[2:], cells):
+    for y in interval_midpoints(*box[2:], cell_count):
         line = bodies.line(float(y))
         places = line.solve(patch.depth, extrapolate=False)
         looked = np.linspace(bodies.x[0], bodies.x[-1], 2 * bodies.x.size - 1)
         if places.size and (line(looked) < patch.depth).any():
             ends.append((y, places.min(), places.max(), line))
     y, low, high = (np.array([each[k] for each in ends]) for k in range(3))
-    rows = [each[3](interval_midpoints(b, a, cells)) for each, a, b in zip(ends, low, high, strict=True)]
-    pressure = pressure_from_heights(patch.depth, bodies.low, np.array(rows), options)
-    width = (box[3] - box[2]) / cells
-    carried = np.sum(pressure * (high - low)[:, None] * width / cells)
+    rows = [each[3](interval_midpoints(b, a, cell_count)) for each, a, b in zip(ends, low, high, strict=True)]
+    pressure = pressure_from_heights(patch.depth, bodies.low, np.array(rows), solver_options)
+    width = (box[3] - box[2]) / cell_count
+    carried = np.sum(pressure * (high - low)[:, None] * width / cell_count)
     return Strips(y, low, high, width, pressure * patch.load / carried)
 
 
 def strip_tractions(
-    net: Strips, mu: float, flexibility: float, motion: tuple[float, float, float]
+    patch_strips: Strips, mu: float, flexibility: float, creepages_and_spin: tuple[float, float, float]
 ) -> tuple[Array, Array]:
-    """Complex tractions (strips, cells) in Pa by the march along each strip, and whether each cell slips. motion:
-    creepages xi_x, xi_y, spin (1/m)."""
-    xi_x, xi_y, spin = motion
-    tractions, slips = np.zeros(net.pressure.shape, complex), np.zeros(net.pressure.shape, bool)
-    for s, (y, low, high) in enumerate(zip(net.y, net.low, net.high, strict=True)):
-        n = net.pressure.shape[1]
+    """Complex tractions (strips, cells) in Pa by the march along each strip, and whether each cell slips.
+    creepages_and_spin: creepages xi_x, xi_y, spin (1/m)."""
+    xi_x, xi_y, spin = creepages_and_spin
+    tractions, slips = np.zeros(patch_strips.pressure.shape, complex), np.zeros(patch_strips.pressure.shape, bool)
+    for s, (y, low, high) in enumerate(zip(patch_strips.y, patch_strips.lower_x, patch_strips.upper_x, strict=True)):
+        n = patch_strips.pressure.shape[1]
         dx, p, slipping, before = (high - low) / n, 0j, False, 0.0
-        for i, bound in enumerate(mu * net.pressure[s]):
+        for i, bound in enumerate(mu * patch_strips.pressure[s]):
             x, go = high - (i + 0.5) * dx, dx if i else 0.5 * dx
             rigid = complex(xi_x - spin * y, xi_y + spin * (x + 0.5 * go)) / flexibility
             trial = p - rigid * go
@@ -246,50 +277,71 @@ def strip_tractions(
     return tractions, slips
 
 
-def mean_tractions(net: Strips, tractions: Array, box: Box, n: int) -> Array:
+def mean_tractions(patch_strips: Strips, tractions: Array, grid_box: Box, cell_count: int) -> Array:
     """Mean tractions (2, n, n) in Pa in the cells of the coarse grid, weighted by the area that its cells and the
     strips' cells have in common."""
-    across = _common_lengths(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1))
-    cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
-    along = np.array([_common_lengths(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells])
-    mean = np.einsum("sj,sik,si->jk", across, along, tractions) * n**2 / ((box[1] - box[0]) * (box[3] - box[2]))
+    across = _common_lengths(
+        patch_strips.y - 0.5 * patch_strips.width,
+        patch_strips.y + 0.5 * patch_strips.width,
+        np.linspace(*grid_box[2:], cell_count + 1),
+    )
+    cells = (
+        patch_strips.upper_x[:, None]
+        - np.arange(tractions.shape[1] + 1)
+        * (patch_strips.upper_x - patch_strips.lower_x)[:, None]
+        / tractions.shape[1]
+    )
+    along = np.array([_common_lengths(row[1:], row[:-1], np.linspace(*grid_box[:2], cell_count + 1)) for row in cells])
+    mean = (
+        np.einsum("sj,sik,si->jk", across, along, tractions)
+        * cell_count**2
+        / ((grid_box[1] - grid_box[0]) * (grid_box[3] - grid_box[2]))
+    )
     return np.array([mean.real, mean.imag])
 
 
 def fitted_flexibility(
-    patch: PlainPatch, net: Strips, tractions: Array, material_pair: MaterialPair, options: SimplifiedOptions
+    patch: PlainPatch,
+    patch_strips: Strips,
+    tractions: Array,
+    material_pair: MaterialPair,
+    solver_options: SimplifiedOptions,
 ) -> float:
     """Tangential flexibility W_1 = W_2 (m/Pa), fitted to the displacements that the tractions cause."""
-    n, box = options.net, patch.box
+    n, box = solver_options.net, patch.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
-    p = mean_tractions(net, tractions, box, n)
+    p = mean_tractions(patch_strips, tractions, box, n)
     u = np.array(
         [sum(surface_displacement(p[m], step, material_pair, np.array([k, m])) for m in range(2)) for k in range(2)]
     )
-    return fitted_slopes(u, p, patch.cover, step, options)
+    return fitted_slopes(u, p, patch.coverage, step, solver_options)
 
 
-def _common_lengths(low: Array, high: Array, edges: Array) -> Array:
+def _common_lengths(interval_starts: Array, interval_ends: Array, segment_edges: Array) -> Array:
     """Lengths (m, n) that m intervals and the n segments between edges (n + 1,) have in common."""
-    return np.maximum(np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1]), 0.0)
+    return np.maximum(
+        np.minimum(interval_ends[:, None], segment_edges[1:])
+        - np.maximum(interval_starts[:, None], segment_edges[:-1]),
+        0.0,
+    )
 
 
 def roll(
     bodies: PlainBodies,
     patch: PlainPatch,
     mu: float,
-    motion: tuple[float, float, float],
+    creepages_and_spin: tuple[float, float, float],
     material_pair: MaterialPair,
-    cells: int,
-    options: SimplifiedOptions,
+    cell_count: int,
+    solver_options: SimplifiedOptions,
 ) -> tuple[Array, float]:
     """Rolling contact of a patch: forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,), and
     tangential flexibility W_1 (m/Pa)."""
-    net = strips(bodies, patch, cells, options)
-    first, _ = strip_tractions(net, mu, 1.0 / patch.stiffness, motion)
-    flexibility = fitted_flexibility(patch, net, first, material_pair, options)
-    p, slips = strip_tractions(net, mu, flexibility, motion)
-    area = ((net.high - net.low) / cells * net.width)[:, None] * np.ones(cells)
-    x = np.array([interval_midpoints(b, a, cells) for a, b in zip(net.low, net.high, strict=True)])
+    net = strips(bodies, patch, cell_count, solver_options)
+    first, _ = strip_tractions(net, mu, 1.0 / patch.stiffness, creepages_and_spin)
+    flexibility = fitted_flexibility(patch, net, first, material_pair, solver_options)
+    p, slips = strip_tractions(net, mu, flexibility, creepages_and_spin)
+    area = ((net.upper_x - net.lower_x) / cell_count * net.width)[:, None] * np.ones(cell_count)
+    x = np.array([interval_midpoints(b, a, cell_count) for a, b in zip(net.lower_x, net.upper_x, strict=True)])
     force, turn = np.sum(p * area), np.sum((x * p.imag - net.y[:, None] * p.real) * area)
     return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), flexibility

@@ -36,55 +36,59 @@ class SlowWheelsRun:
     error: float
 
 
-def wheel_and_start(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
+def wheel_and_start(rolling_speed: float) -> tuple[Wheels, tuple[Array, Array]]:
     """A wheel with FASTSIM at a speed (m/s), and the displaced positions and rates from which it is released."""
-    return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
+    return Wheels(1, speed=rolling_speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
-def counting_calls(function: Callable[..., Any], calls: list[int], increment: int = 1) -> Callable[..., Any]:
-    """Returns the function wrapped so that every call adds ``increment`` to ``calls[0]``."""
+def counting_calls(
+    counted_function: Callable[..., Any], call_total: list[int], increment_per_call: int = 1
+) -> Callable[..., Any]:
+    """Returns the function wrapped so that every call adds ``increment_per_call`` to ``call_total[0]``."""
 
     def counted(*arguments: Any) -> Any:
-        calls[0] += increment
-        return function(*arguments)
+        call_total[0] += increment_per_call
+        return counted_function(*arguments)
 
     return counted
 
 
-def end_positions(speed: float, method: str, step_count: int, with_slopes: bool = True) -> tuple[Array, int]:
+def end_positions(
+    rolling_speed: float, integrator_name: str, step_count: int, with_force_slopes: bool = True
+) -> tuple[Array, int]:
     """Simulate a released wheel: returns final positions and number of force calls. Raises RunFailed or Refused if the
     integrator cannot take the steps."""
-    (wheels, start), calls = wheel_and_start(speed), [0]
+    (wheels, start), calls = wheel_and_start(rolling_speed), [0]
     forces = Forces(wheels)
-    slopes = forces.slopes if with_slopes and method in METHODS else None
+    slopes = forces.slopes if with_force_slopes and integrator_name in METHODS else None
     rolling = Rolling(wheels, counting_calls(forces.of, calls), force_slopes=slopes)
-    return rolling.run(*start, step_count, DURATION / step_count, method)[: wheels.size], calls[0]
+    return rolling.run(*start, step_count, DURATION / step_count, integrator_name)[: wheels.size], calls[0]
 
 
-def longest_step(speed: float) -> float:
+def longest_step(rolling_speed: float) -> float:
     """Longest stable step (s) of the explicit RK44 for a wheel at a speed (m/s)."""
-    return longest_stable_step("RK44", 1e-3, LONG_RUN * 1e-3, linearised_wheels(wheel_and_start(speed)[0]))
+    return longest_stable_step("RK44", 1e-3, LONG_RUN * 1e-3, linearised_wheels(wheel_and_start(rolling_speed)[0]))
 
 
-def runs(speed: float, implicit_steps: tuple[float, ...]) -> list[SlowWheelsRun]:
+def runs(rolling_speed: float, implicit_time_steps: tuple[float, ...]) -> list[SlowWheelsRun]:
     """Runs of a wheel at a speed (m/s): an explicit run near its longest stable step, and implicit runs with several
     steps (s). Errors are relative to an explicit run with half the step."""
-    coarse = int(np.ceil(1.05 * DURATION / longest_step(speed)))
-    true, _ = end_positions(speed, "RK44", 2 * coarse)
+    coarse = int(np.ceil(1.05 * DURATION / longest_step(rolling_speed)))
+    true, _ = end_positions(rolling_speed, "RK44", 2 * coarse)
     done = []
     for method, count in [("RK44", coarse)] + [
-        (name, round(DURATION / step)) for name in METHODS for step in implicit_steps
+        (name, round(DURATION / step)) for name in METHODS for step in implicit_time_steps
     ]:
-        end, calls = end_positions(speed, method, count)
+        end, calls = end_positions(rolling_speed, method, count)
         error = float(np.abs(end - true).max() / np.abs(true).max())
-        done.append(SlowWheelsRun(speed, method, DURATION / count, count, calls, error))
+        done.append(SlowWheelsRun(rolling_speed, method, DURATION / count, count, calls, error))
     return done
 
 
-def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
+def rows(is_quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
     """Report rows and runs: errors of implicit integrators at 1 m/s, and the refusals where a step cannot be taken."""
-    done = runs(1.0, (STEP_RATIO * longest_step(1.0), *(() if quick else STEPS[1.0])))
-    if not quick:
+    done = runs(1.0, (STEP_RATIO * longest_step(1.0), *(() if is_quick else STEPS[1.0])))
+    if not is_quick:
         done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
     explicit = done[0]
     implicit = [next(run for run in done if run.method == method) for method in METHODS]

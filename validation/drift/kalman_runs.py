@@ -47,19 +47,19 @@ JUDGED_BAND = 15.0
 """Frequency (Hz) up to which the artificial moment is judged."""
 
 
-def deviation_at_period(deviation: float, sample_period: float) -> float:
-    """Standard deviation of samples at a sampling period (s) that has the same noise intensity as ``deviation`` at 1
-    kHz."""
-    return deviation * float(np.sqrt(1e-3 / sample_period))
+def deviation_at_period(noise_deviation: float, sample_period: float) -> float:
+    """Standard deviation of samples at a sampling period (s) that has the same noise intensity as ``noise_deviation``
+    at 1 kHz."""
+    return noise_deviation * float(np.sqrt(1e-3 / sample_period))
 
 
 @cache
-def measured_drive(folder: Path, duration: float, sample_period: float) -> Result:
+def measured_drive(output_folder: Path, duration: float, sample_period: float) -> Result:
     """Virtual measurement on the study road with rows ``sample_period`` (s) apart; its files are written to the
     folder.
     """
     path = simulate(road_scene(step=min(sample_period, 1e-3) / 2, duration=duration), "reference")
-    write_measurement(path, folder, sample_period)
+    write_measurement(path, output_folder, sample_period)
     return path.every(sample_period)
 
 
@@ -69,19 +69,25 @@ def force_deviation(true_run: Result) -> float:
 
 
 def force_driven_scene(
-    folder: Path, duration: float, effects: dict[str, Any], *, perturbed: bool = False, geometry: str = "exact"
+    scene_folder: Path,
+    duration: float,
+    effect_tables: dict[str, Any],
+    *,
+    with_wrong_parameters: bool = False,
+    geometry: str = "exact",
 ) -> Scene:
-    """Scene of the vehicle under the wheel forces in the folder, with steps of 1 ms. perturbed: whether the model's
-    parameters are wrong."""
-    override = perturbed_parameters(PARAMETERS) if perturbed else {}
+    """Scene of the vehicle under the wheel forces in the folder, with steps of 1 ms. with_wrong_parameters: whether the
+    model's parameters are wrong."""
+    override = perturbed_parameters(PARAMETERS) if with_wrong_parameters else {}
     return changed_scene(
-        force_scene(folder, duration=duration, override=override, effects=effects), vehicle={"geometry": geometry}
+        force_scene(scene_folder, duration=duration, parameter_changes=override, effects=effect_tables),
+        vehicle={"geometry": geometry},
     )
 
 
-def force_noise_settings(deviation: float, seed: int) -> dict[str, Any]:
+def force_noise_settings(noise_deviation: float, seed: int) -> dict[str, Any]:
     """Scene table of the effect that adds noise of a standard deviation (N) to the wheel forces."""
-    return {"force_noise": {"deviation": deviation, "seed": seed}}
+    return {"force_noise": {"deviation": noise_deviation, "seed": seed}}
 
 
 def free_run(assembly: Assembly, duration: float, sample_period: float) -> np.ndarray:
@@ -91,28 +97,28 @@ def free_run(assembly: Assembly, duration: float, sample_period: float) -> np.nd
 
 
 def filter_consistency(
-    folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]
+    scene_folder: Path, duration: float, seed: int, uncertainty_scales: dict[str, tuple[float, float]]
 ) -> dict[str, Any]:
     """Filter name -> normalised estimation errors squared (NEES), normalised innovations squared (NIS) and innovations
-    in a run without model error. ``scales``: factors of each filter's process and measurement noise.
+    in a run without model error. ``uncertainty_scales``: factors of each filter's process and measurement noise.
 
     The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
     taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
     """
-    true = measured_drive(folder, duration, COARSE_PERIOD)
+    true = measured_drive(scene_folder, duration, COARSE_PERIOD)
     force, angle = (
         deviation_at_period(force_deviation(true), COARSE_PERIOD),
         deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
     )
-    clean = assembly_of_scene(force_driven_scene(folder, duration, {}))
+    clean = assembly_of_scene(force_driven_scene(scene_folder, duration, {}))
     turn = START_DEVIATION * float(normal_samples(seed, 1, 1, 1, noise_source=PITCH_SENSOR)[0, 0])
     p, start = clean.parameters, clean.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
     states = free_run(replace(clean, initial=start), duration, COARSE_PERIOD)
     measured_pitch = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, noise_source=PITCH_SENSOR)[:, 0]
-    noisy = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
+    noisy = assembly_of_scene(force_driven_scene(scene_folder, duration, force_noise_settings(force, seed)))
     figures = {}
-    for name, (q, r) in scales.items():
+    for name, (q, r) in uncertainty_scales.items():
         measurement = PitchMeasurement(measured_pitch[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
         filtered = estimate_pitch(noisy, measurement, force * np.sqrt(q), start_deviation=START_DEVIATION)
         first = round(1 / COARSE_PERIOD)
@@ -128,26 +134,28 @@ START_DEVIATION = 0.02
 """Standard deviation (rad) of the initial pitch in the runs on filter consistency."""
 
 
-def normalised_estimation_error(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
+def normalised_estimation_error(pitch_estimate: PitchEstimate, true_states: np.ndarray) -> np.ndarray:
     """Normalised estimation error squared (NEES) of the six relative states, once a second from 2 s on."""
-    rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
-    wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE_STATES.T)[:, :, None]
-    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.error_covariances()[rows, :6, :6], wrong))[:, 0, 0]
+    rows = np.arange(round(2 / pitch_estimate.period), len(true_states), round(1 / pitch_estimate.period))
+    wrong = (pitch_estimate.states[rows, :6] - true_states[rows] @ RELATIVE_STATES.T)[:, :, None]
+    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(pitch_estimate.error_covariances()[rows, :6, :6], wrong))[
+        :, 0, 0
+    ]
 
 
-def closed_loop_covariance(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+def closed_loop_covariance(scene_folder: Path, noise_deviation: float) -> tuple[np.ndarray, np.ndarray]:
     """Transition matrix (14, 14) and stationary covariance (14, 14) of the linearised loop of filter and vehicle. Its
     states are the filter's error (6), the run's error (6) and the force noise (2).
 
     Errors are those of the six relative states at the samples, estimate after its update, ``COARSE_PERIOD`` apart.
     Exact: exponentials of the vehicle's and of the held vehicle's matrices under inputs that are linear between
     samples.
-    deviation : N, of each force sample at COARSE_PERIOD.
+    noise_deviation : N, of each force sample at COARSE_PERIOD.
     """
     import control
 
-    force, angle = deviation, deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD)
-    assembly = assembly_of_scene(force_driven_scene(folder, 1.0, {}, geometry="linear"))
+    force, angle = noise_deviation, deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD)
+    assembly = assembly_of_scene(force_driven_scene(scene_folder, 1.0, {}, geometry="linear"))
     stiffness, damping = pitch_spring(assembly.parameters, PULL_BANDWIDTH, 0.7)
     free, pushes = relative_state_matrices(assembly)
     lever = np.zeros((6, 6))
@@ -178,24 +186,24 @@ def relative_state_matrices(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]
     return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, FILTERED_STATES], RELATIVE_STATES @ pushes
 
 
-def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def first_order_hold(state_matrix: np.ndarray, input_matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Discretises x' = a x + b u over COARSE_PERIOD with linearly interpolated input: transition matrix, and input
     matrices for the samples at start and end."""
-    n, m = b.shape
+    n, m = input_matrix.shape
     block = np.zeros((n + 2 * m, n + 2 * m))
-    block[:n, :n], block[:n, n : n + m] = a, b
+    block[:n, :n], block[:n, n : n + m] = state_matrix, input_matrix
     block[n : n + m, n + m :] = np.eye(m) / COARSE_PERIOD
     transition = expm(block * COARSE_PERIOD)
     late = transition[:n, n + m :]
     return transition[:n, :n], transition[:n, n : n + m] - late, late
 
 
-def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> np.ndarray:
+def loop_errors(scene_folder: Path, noise_deviation: float, duration: float, seed: int) -> np.ndarray:
     """Errors (n, 12) of the estimate and of the run, from 2 s on, ordered as in ``closed_loop_covariance``, simulated
     with the effect ``kalman_filter`` on the linearised vehicle.
 
-    deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate between its
-    samples would add an error that is no noise.
+    noise_deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate
+    between its samples would add an error that is no noise.
     """
     rest_assembly = assembly_of_scene(
         build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}})
@@ -206,43 +214,43 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
         deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
     )
     count = round(duration / COARSE_PERIOD) + 1
-    write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
+    write_wheel_forces(scene_folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
     measured_pitch = start[3] + angle * normal_samples(seed, 0, count, 1, noise_source=PITCH_SENSOR)[:, 0]
-    write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, COARSE_PERIOD)
-    effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
-    noise = force_noise_settings(deviation, seed)
-    drawn = force_driven_scene(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
+    write_time_series(scene_folder / "read.csv", {"pitch": ("rad", measured_pitch)}, COARSE_PERIOD)
+    effect = {"file": "read.csv", "force_deviation": noise_deviation, "pitch_deviation": angle}
+    noise = force_noise_settings(noise_deviation, seed)
+    drawn = force_driven_scene(scene_folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
     run = free_run(assembly_of_scene(drawn), duration, COARSE_PERIOD)
     guide = guide_of(
-        assembly_of_scene(force_driven_scene(folder, duration, noise, geometry="linear")),
+        assembly_of_scene(force_driven_scene(scene_folder, duration, noise, geometry="linear")),
         drawn.effects["kalman_filter"],
     )
     errors = np.hstack([guide.states[:, :6] - RELATIVE_STATES @ start, (run - start) @ RELATIVE_STATES.T])
     return errors[round(2 / COARSE_PERIOD) :]
 
 
-def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, sample_count: int) -> np.ndarray:
+def spread_of_mean_square(transition_matrix: np.ndarray, covariance: np.ndarray, sample_count: int) -> np.ndarray:
     """Relative standard deviation of the mean square of each error over ``sample_count`` correlated samples.
 
     For Gaussian errors: 2/N times the sum over all lags of the squared autocorrelation.
     """
-    lags, total, carried = min(sample_count, 2000), np.zeros(len(step)), covariance.copy()
+    lags, total, carried = min(sample_count, 2000), np.zeros(len(transition_matrix)), covariance.copy()
     for lag in range(lags):
         total += (2.0 if lag else 1.0) * np.square(carried.diagonal() / covariance.diagonal())
-        carried = step @ carried
+        carried = transition_matrix @ carried
     return np.sqrt(2.0 * total / sample_count)
 
 
 def scores_of_stabilised(
-    folder: Path, duration: float, seed: int, engines: tuple[str, ...], perturbed: bool = True
+    scene_folder: Path, duration: float, seed: int, engines: tuple[str, ...], with_wrong_parameters: bool = True
 ) -> dict[str, dict[str, float]]:
     """Engine -> scores of a run that the Kalman filter stabilises, for a noise path: damage ratios, shares of the
     artificial moment, and largest pitch error (rad)."""
-    true = measured_drive(folder, duration, 1e-3)
+    true = measured_drive(scene_folder, duration, 1e-3)
     measured_pitch = (
         true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, noise_source=PITCH_SENSOR)[:, 0]
     )
-    write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, 1e-3)
+    write_time_series(scene_folder / "read.csv", {"pitch": ("rad", measured_pitch)}, 1e-3)
     force = force_deviation(true)
     effect = {
         "file": "read.csv",
@@ -251,7 +259,10 @@ def scores_of_stabilised(
         "inertia_deviation": INERTIA_UNCERTAINTY,
     }
     scene = force_driven_scene(
-        folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}, perturbed=perturbed
+        scene_folder,
+        duration,
+        force_noise_settings(force, seed) | {"kalman_filter": effect},
+        with_wrong_parameters=with_wrong_parameters,
     )
     return {engine: _scores_of_run(true, simulate(scene, engine)) for engine in engines}
 
@@ -260,24 +271,27 @@ INERTIA_UNCERTAINTY = 0.05
 """Standard deviation of the relative error of the model's inertia that the filter assumes: 5 %."""
 
 
-def _scores_of_run(true_run: Result, run: Result) -> dict[str, float]:
+def _scores_of_run(true_run: Result, stabilised_run: Result) -> dict[str, float]:
     wanted, had = (
         section_forces(compared_run["f3"], compared_run["f4"], compared_run["pitch"])
-        for compared_run in (true_run, run)
+        for compared_run in (true_run, stabilised_run)
     )
     scores = {name: damage_ratio(had[name], wanted[name]) for name in SECTION_FORCE_CHANNELS}
     term = PARAMETERS.I * np.gradient(true_run["pitch_rate"], true_run.times)
-    moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
+    moments = {
+        "pull": stabilised_run["kalman_moment"],
+        "all": stabilised_run["kalman_moment"] + stabilised_run["inertia_moment"],
+    }
     low = butter(4, JUDGED_BAND, fs=1 / float(true_run.times[1]), output="sos")
     for name, moment in moments.items():
         scores[name] = root_mean_square(moment) / root_mean_square(term)
         scores[f"{name}, band"] = root_mean_square(sosfiltfilt(low, moment)) / root_mean_square(sosfiltfilt(low, term))
-    scores["pitch"] = float(np.abs(run["pitch"] - true_run["pitch"]).max())
-    scores["inertia"] = float(run["inertia_share"][-1])
+    scores["pitch"] = float(np.abs(stabilised_run["pitch"] - true_run["pitch"]).max())
+    scores["inertia"] = float(stabilised_run["inertia_share"][-1])
     return scores
 
 
-def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str, float]:
+def gyro_only_pitch_error(scene_folder: Path, duration: float, seed: int) -> dict[str, float]:
     """Pitch error (rad) after a long run with a gyro as the only sensor: rms error, the filter's stated deviation, the
     deviation that the averaged instability predicts, and a random walk.
 
@@ -286,12 +300,12 @@ def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str,
     """
     import control
 
-    true = measured_drive(folder, duration, COARSE_PERIOD)
+    true = measured_drive(scene_folder, duration, COARSE_PERIOD)
     force, gyro = (
         deviation_at_period(force_deviation(true), COARSE_PERIOD),
         deviation_at_period(GYRO_DEVIATION, COARSE_PERIOD),
     )
-    assembly = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
+    assembly = assembly_of_scene(force_driven_scene(scene_folder, duration, force_noise_settings(force, seed)))
     clean = true.states
     measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, noise_source=PITCH_SENSOR)[:, 0]
     estimated = estimate_pitch(
@@ -313,35 +327,36 @@ def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str,
 
 
 def run_with_missing_samples(
-    folder: Path,
+    scene_folder: Path,
     duration: float,
     seed: int,
-    columns: tuple[int, ...],
-    random_gaps: float,
-    outage: tuple[float, float] | None,
+    missing_columns: tuple[int, ...],
+    random_gap_level: float,
+    outage_times: tuple[float, float] | None,
 ) -> dict[str, float]:
     """Figures of a stabilised run on a file with missing samples: largest pitch error (rad), largest pitch error
     divided by the deviation that the filter states, and counts of missing samples."""
-    true = measured_drive(folder, duration, COARSE_PERIOD)
+    true = measured_drive(scene_folder, duration, COARSE_PERIOD)
     deviations = {
         PITCH: deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
         PITCH_RATE: deviation_at_period(GYRO_DEVIATION, COARSE_PERIOD),
     }
-    clean = free_run(assembly_of_scene(force_driven_scene(folder, duration, {})), duration, COARSE_PERIOD)
+    clean = free_run(assembly_of_scene(force_driven_scene(scene_folder, duration, {})), duration, COARSE_PERIOD)
     noise = normal_samples(seed, 0, len(clean), 3, noise_source=PITCH_SENSOR)
-    lost = np.abs(noise[:, 2]) < random_gaps
-    if outage is not None:
-        lost[round(outage[0] / COARSE_PERIOD) : round(outage[1] / COARSE_PERIOD)] = True
+    lost = np.abs(noise[:, 2]) < random_gap_level
+    if outage_times is not None:
+        lost[round(outage_times[0] / COARSE_PERIOD) : round(outage_times[1] / COARSE_PERIOD)] = True
     names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), PITCH_RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
     table, force = {}, deviation_at_period(force_deviation(true), COARSE_PERIOD)
     effect: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
-    for i, column in enumerate(columns):
+    for i, column in enumerate(missing_columns):
         name, unit, state, key = names[column]
         table[name] = (unit, np.where(lost, np.nan, clean[:, state] + deviations[column] * noise[:, i]))
         effect[key] = deviations[column]
-    write_time_series(folder / "read.csv", table, COARSE_PERIOD)
+    write_time_series(scene_folder / "read.csv", table, COARSE_PERIOD)
     run = simulate(
-        force_driven_scene(folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}), "reference"
+        force_driven_scene(scene_folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}),
+        "reference",
     )
     stride = round(COARSE_PERIOD / 1e-3)
     wrong = run["pitch_estimate"][::stride] - clean[:, 3]
@@ -351,6 +366,6 @@ def run_with_missing_samples(
         "error": float(np.abs(wrong).max()),
         "run's error": float(np.abs(run["pitch"][::stride] - clean[:, 3]).max()),
         "deviation": float(sure.max()),
-        "miscounted": float(abs(run["kalman_missed"][-1] - lost.sum() * len(columns))),
+        "miscounted": float(abs(run["kalman_missed"][-1] - lost.sum() * len(missing_columns))),
         "missed": float(run["kalman_missed"][-1]),
     }

@@ -102,18 +102,20 @@ class Swing:
         return [setting.label()]
 
 
-def _step(t: float, y: float, step: float, stage_positions: tuple[float, ...], weights: tuple[float, ...]) -> float:
+def _step(
+    time: float, y: float, time_step: float, stage_positions: tuple[float, ...], stage_weights: tuple[float, ...]
+) -> float:
     slope = total = 0.0
-    for stage_position, weight in zip(stage_positions, weights, strict=True):
-        slope = (y + stage_position * step * slope) * math.cos(t + stage_position * step)
+    for stage_position, weight in zip(stage_positions, stage_weights, strict=True):
+        slope = (y + stage_position * time_step * slope) * math.cos(time + stage_position * time_step)
         total += weight * slope
-    return y + step * total
+    return y + time_step * total
 
 
 @cache
-def _error(setting: Setting) -> float:
+def _error(integration_setting: Setting) -> float:
     """Largest true error of a setting over the complete run; infinite if a value is not finite."""
-    sample_times, values, _ = Swing().solve(setting, Swing.full_duration)
+    sample_times, values, _ = Swing().solve(integration_setting, Swing.full_duration)
     worst = float(np.abs(values - np.exp(np.sin(sample_times))).max())
     return worst if math.isfinite(worst) else math.inf
 
@@ -139,17 +141,17 @@ def _choice_for(tolerance: float) -> Recommendation:
 
 
 def _largest_over_recommended(
-    size_of: Callable[[SettingChoice, float], float],
+    size_of_choice: Callable[[SettingChoice, float], float],
     cost_kind_prefix: str = "",
     tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,),
 ) -> float:
-    """Largest ``size_of`` over tolerances and the settings recommended for a kind of cost ("calls" or "seconds");
-    infinite where none is recommended.
+    """Largest ``size_of_choice`` over tolerances and the settings recommended for a kind of cost ("calls" or
+    "seconds"); infinite where none is recommended.
     """
     return max(
         max(
             (
-                size_of(choice, tolerance)
+                size_of_choice(choice, tolerance)
                 for (_, cost_kind), choice in _choice_for(tolerance).winners.items()
                 if cost_kind.startswith(cost_kind_prefix)
             ),
@@ -159,16 +161,16 @@ def _largest_over_recommended(
     )
 
 
-def _error_by_tolerance(choice: SettingChoice, tolerance: float) -> float:
-    return _error(choice.tried.setting) / tolerance
+def _error_by_tolerance(setting_choice: SettingChoice, tolerance: float) -> float:
+    return _error(setting_choice.tried.setting) / tolerance
 
 
-def _log_error_ratio(choice: SettingChoice, tolerance: float) -> float:
-    return abs(math.log(max(choice.error, 1e-300) / min(_error(choice.tried.setting), 1e300)))
+def _log_error_ratio(setting_choice: SettingChoice, tolerance: float) -> float:
+    return abs(math.log(max(setting_choice.error, 1e-300) / min(_error(setting_choice.tried.setting), 1e300)))
 
 
-def _excess_calls(choice: SettingChoice, tolerance: float) -> float:
-    return choice.calls / _fewest_calls(tolerance) - 1.0
+def _excess_calls(setting_choice: SettingChoice, tolerance: float) -> float:
+    return setting_choice.calls / _fewest_calls(tolerance) - 1.0
 
 
 CHECKS = {
@@ -194,15 +196,17 @@ CHECKS = {
 }
 
 
-def _advice_patch(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
-    return attribute_patch(f"models.advice.price.{module}:{name}", change)
+def _advice_patch(
+    function_name: str, change_function: Callable[[Any], Any], module_name: str = "recommendation"
+) -> Patch:
+    return attribute_patch(f"models.advice.price.{module_name}:{function_name}", change_function)
 
 
-def _tenfold_smaller_errors(original: Any) -> Any:
+def _tenfold_smaller_errors(original_function: Any) -> Any:
     """Fault: errors of the recommended settings are reported ten times too small."""
 
     def planted(*arguments: Any) -> Any:
-        known, timed, winners = original(*arguments)
+        known, timed, winners = original_function(*arguments)
         return known, timed, {key: replace(choice, error=choice.error / 10.0) for key, choice in winners.items()}
 
     return planted
@@ -216,20 +220,20 @@ def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: 
     return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
-def _mean_error(self: ReferenceSolution, other_run: PricedRun) -> float:
-    exact = values_at(self.run, other_run.times, self.kink_period)
-    return float(np.abs(other_run.values - exact).mean()) if np.isfinite(other_run.values).all() else np.inf
+def _mean_error(self: ReferenceSolution, compared_run: PricedRun) -> float:
+    exact = values_at(self.run, compared_run.times, self.kink_period)
+    return float(np.abs(compared_run.values - exact).mean()) if np.isfinite(compared_run.values).all() else np.inf
 
 
-def _error_without_nan(self: ReferenceSolution, other_run: PricedRun) -> float:
-    exact = values_at(self.run, other_run.times, self.kink_period)
-    return float(np.nanmax(np.abs(other_run.values - exact)))
+def _error_without_nan(self: ReferenceSolution, compared_run: PricedRun) -> float:
+    exact = values_at(self.run, compared_run.times, self.kink_period)
+    return float(np.nanmax(np.abs(compared_run.values - exact)))
 
 
 def _coarsest_reference(
-    scene: Any, ladder: SettingLadder, tolerance: float, duration: float, first_rung: int, executor: object
+    scene: Any, setting_ladder: SettingLadder, tolerance: float, duration: float, first_rung: int, executor: object
 ) -> Any:
-    return scene.priced_run(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
+    return scene.priced_run(scene.solve(setting_ladder.setting(0), duration)), 0, 0.0, 0.0, {}
 
 
 FAULTS = (

@@ -40,12 +40,12 @@ CONSTRAINED_INTEGRATORS = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mu
 ROUNDING_BOUND = 1e-12
 
 
-def bench_scene(parameters: str, duration: float) -> Scene:
+def bench_scene(parameter_set: str, duration: float) -> Scene:
     """Scene of the vehicle with a parameter set on the study road at 20 m/s."""
     return build_scene(
         {
             "title": "bench",
-            "vehicle": {"parameters": parameters},
+            "vehicle": {"parameters": parameter_set},
             "run": {"duration": duration, "step": STEP},
             "effects": {"road": {"source": "study", "speed": 20.0}},
         }
@@ -56,13 +56,13 @@ def bench_scene(parameters: str, duration: float) -> Scene:
 class Bench:
     """A vehicle, named by its parameter set, in several situations of a duration (s), for checks on planted faults."""
 
-    parameters: str
+    parameter_set: str
     duration: float
 
     @cached_property
     def road(self) -> Assembly:
         """The vehicle on the study road."""
-        return assembly_of_scene(bench_scene(self.parameters, self.duration))
+        return assembly_of_scene(bench_scene(self.parameter_set, self.duration))
 
     @cached_property
     def flat_road(self) -> Assembly:
@@ -110,15 +110,15 @@ class Bench:
         return checks.engine("reference")(self.road, Settings("RK4", ORDER_STEP / 16, self.duration)).run()
 
     @cache  # noqa: B019 - a bench lives as long as its case
-    def reference_run(self, situation: str) -> Trajectory:
+    def reference_run(self, situation_name: str) -> Trajectory:
         """The reference's run of a situation, given by the name of its attribute."""
-        return checks.engine("reference")(getattr(self, situation), self.settings("reference")).run()
+        return checks.engine("reference")(getattr(self, situation_name), self.settings("reference")).run()
 
     @cache  # noqa: B019
-    def reference_accelerations(self, situation: str) -> np.ndarray:
+    def reference_accelerations(self, situation_name: str) -> np.ndarray:
         """The reference's accelerations (100, 4) at random states in a situation."""
         reference, settings = checks.engine("reference"), self.settings("reference")
-        return checks.accelerations(reference, getattr(self, situation), settings, random_states())
+        return checks.accelerations(reference, getattr(self, situation_name), settings, random_states())
 
     def _oscillation(self, frequency: float) -> np.ndarray:
         """Samples that rise smoothly from 0 to 1 and fall back, periodically with a frequency in rad/s."""
@@ -150,44 +150,44 @@ class Check:
     measure: Callable[[Bench, str, ModelBuilder], float]
 
 
-def _acceleration_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+def _acceleration_error(bench: Bench, engine: str, build_model: ModelBuilder) -> float:
     settings, states = bench.settings(engine), random_states()
     return max(
         relative_difference(
-            checks.accelerations(make_engine, getattr(bench, name), settings, states),
+            checks.accelerations(build_model, getattr(bench, name), settings, states),
             bench.reference_accelerations(name),
         )
         for name in ("road", "linear_forces")
     )
 
 
-def _order_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+def _order_error(bench: Bench, engine: str, build_model: ModelBuilder) -> float:
     return order_gap(
-        make_engine, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.fine_reference_run
+        build_model, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.fine_reference_run
     )
 
 
-def _momentum_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+def _momentum_error(bench: Bench, engine: str, build_model: ModelBuilder) -> float:
     return max(
-        momentum_gap(make_engine, assembly, bench.settings(engine))
+        momentum_gap(build_model, assembly, bench.settings(engine))
         for assembly in (bench.linear_forces, bench.held_forces)
     )
 
 
-def _enforced_force_check(situation: str) -> Callable[[Bench, str, ModelBuilder], float]:
+def _enforced_force_check(situation_name: str) -> Callable[[Bench, str, ModelBuilder], float]:
     """Returns a check's function: error of the enforced moment and force in a situation, against the reference, which
     eliminates the prescribed coordinates."""
     return lambda bench, engine, make: enforced_gap(
         make,
-        getattr(bench, situation),
+        getattr(bench, situation_name),
         replace(bench.settings(engine), integrator=CONSTRAINED_INTEGRATORS[engine], step=STEP / 2),
     )
 
 
-def _path_difference_check(situation: str) -> Callable[[Bench, str, ModelBuilder], float]:
+def _path_difference_check(situation_name: str) -> Callable[[Bench, str, ModelBuilder], float]:
     """Returns a check's function: largest difference of an engine's path from the reference's in a situation."""
     return lambda bench, engine, make: state_gap(
-        run(make, getattr(bench, situation), bench.settings(engine)), bench.reference_run(situation)
+        run(make, getattr(bench, situation_name), bench.settings(engine)), bench.reference_run(situation_name)
     )
 
 
@@ -258,9 +258,9 @@ CHECKS: dict[str, Check] = {
 """Name -> check that is run under every fault, in the order of the report's table."""
 
 
-def size_of_error(check: Check, bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+def size_of_error(bench_check: Check, bench: Bench, engine: str, build_model: ModelBuilder) -> float:
     """Error that a check measures on an engine; infinite where the engine refuses or fails."""
     try:
-        return check.measure(bench, engine, make_engine)
+        return bench_check.measure(bench, engine, build_model)
     except (InputError, RunFailed):
         return float("inf")

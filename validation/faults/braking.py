@@ -28,12 +28,15 @@ from validation.faults.patches import Patch, attribute_patch
 SPLIT_ROAD, STEP = road_of_stretches([RoadStretch(0.0, 1, 0)]), 5.5e-3
 
 
-def _truck_after_first_step(course: RoadSurfaces, steer: float = 0.0) -> RollingTruck:
+def _truck_after_first_step(road_surfaces: RoadSurfaces, steer: float = 0.0) -> RollingTruck:
     """The truck after a time step with all wheels locked, or, if steered, with rolling wheels. On SPLIT_ROAD the left
     side is dry and the right side ice; else the road is ice."""
     tables = tyre_table.stacked_tables([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
     truck = RollingTruck(
-        on_road(plane_vehicle.plane_of_truck(PAPER_TRUCK), tables, course), 10.0, steer=steer, step_function=advance
+        on_road(plane_vehicle.plane_of_truck(PAPER_TRUCK), tables, road_surfaces),
+        10.0,
+        steer=steer,
+        advance_step=advance,
     )
     if not steer:
         truck.turning[:] = 0.0
@@ -143,29 +146,35 @@ CHECKS = {
 }
 
 
-def _truck_patch(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _truck_patch(**change_of_parameter: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Patch that changes parameters of every truck: name -> function of the original array."""
     return attribute_patch(
         "models.brake.plane_vehicle:plane_of_truck",
-        lambda real: lambda *arguments: _changed_plane(real(*arguments), change),
+        lambda real: lambda *arguments: _changed_plane(real(*arguments), change_of_parameter),
     )
 
 
-def _changed_plane(plane: PlaneVehicle, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> PlaneVehicle:
-    parts: dict[str, Any] = {name: change_field(getattr(plane, name)) for name, change_field in change.items()}
-    return plane._replace(**parts)
+def _changed_plane(
+    plane_vehicle: PlaneVehicle, change_of_parameter: dict[str, Callable[[np.ndarray], np.ndarray]]
+) -> PlaneVehicle:
+    parts: dict[str, Any] = {
+        name: change_field(getattr(plane_vehicle, name)) for name, change_field in change_of_parameter.items()
+    }
+    return plane_vehicle._replace(**parts)
 
 
-def _brakes_patch(change: Callable[[Any], Any]) -> Patch:
+def _brakes_patch(change_brakes: Callable[[Any], Any]) -> Patch:
     return attribute_patch(
-        "models.brake.brake:brakes_of_wheels", lambda real: lambda *arguments: change(real(*arguments))
+        "models.brake.brake:brakes_of_wheels", lambda real: lambda *arguments: change_brakes(real(*arguments))
     )
 
 
-def _force_of_step_start(original: Any) -> Any:
+def _force_of_step_start(original_function: Any) -> Any:
     """Fault: the vehicle's speed is integrated with the tyre force at the start of each step."""
 
-    def stop(quarter_car: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
+    def stop(
+        quarter_car: Any, tyre: Any, torque: float, speed: float, *further_arguments: Any, **keyword_arguments: Any
+    ) -> Any:
         distance = stopping_distance(LITERAL, quarter_car, tyre[0], torque, speed, STEP)[0]
         zeros = np.zeros(2)
         return QuarterStop(QuarterPath(zeros, np.array([0.0, distance]), np.array([speed, 0.0]), zeros, zeros), 1)
@@ -173,35 +182,37 @@ def _force_of_step_start(original: Any) -> Any:
     return stop
 
 
-def _tables_patch(changed_friction: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    def stacked(original: Any) -> Any:
-        def with_changed_friction(tables: Any) -> Any:
-            made = original(tables)
-            return made._replace(mu_x=np.ascontiguousarray(changed_friction(made.mu_x)))
+def _tables_patch(change_friction: Callable[[np.ndarray], np.ndarray]) -> Patch:
+    def stacked(original_function: Any) -> Any:
+        def with_changed_friction(tyre_tables: Any) -> Any:
+            made = original_function(tyre_tables)
+            return made._replace(mu_x=np.ascontiguousarray(change_friction(made.mu_x)))
 
         return with_changed_friction
 
     return attribute_patch("models.tyre.tyre_table:stacked_tables", stacked)
 
 
-def _mirrored_steering(original: Any) -> Any:
+def _mirrored_steering(original_function: Any) -> Any:
     """Fault: steer angles, and thus the slip angles of steered wheels, have the opposite sign."""
-    return lambda motion, torques, step, steer, vehicle: original(motion, torques, step, -steer, vehicle)
+    return lambda motion, torques, step, steer, vehicle: original_function(motion, torques, step, -steer, vehicle)
 
 
 def _spin_inertia_patch(factor: float) -> Patch:
     """Fault: the spin inertia of the quarter vehicle's wheel is changed in the time step, but not in the closed
     form."""
 
-    def change(original: Any) -> Any:
-        return property(lambda truck: _changed_plane(original.fget(truck), {"spin": lambda spin: factor * spin}))
+    def change(original_property: Any) -> Any:
+        return property(
+            lambda truck: _changed_plane(original_property.fget(truck), {"spin": lambda spin: factor * spin})
+        )
 
     return attribute_patch("models.brake.quarter:QuarterVehicle.plane", change)
 
 
-def _coarser_conversion(original: Any) -> Any:
+def _coarser_conversion(original_function: Any) -> Any:
     """Fault: a signal is converted with one bit less than stated."""
-    return lambda table, *further: original(table.model_copy(update={"bits": table.bits - 1}), *further)
+    return lambda table, *further: original_function(table.model_copy(update={"bits": table.bits - 1}), *further)
 
 
 FAULTS = (

@@ -28,11 +28,11 @@ DIFFERENCE_BOUND = 1e-10
 
 
 def _law_difference_check(
-    sides: Callable[[int], tuple[np.ndarray, np.ndarray]], state_count: int = 60
+    compiled_and_plain_values: Callable[[int], tuple[np.ndarray, np.ndarray]], state_count: int = 60
 ) -> Callable[[], float]:
     """Returns a check's function: largest difference between compiled and plain code at ``state_count`` random
     states."""
-    return lambda: laws.largest_difference(*sides(state_count))
+    return lambda: laws.largest_difference(*compiled_and_plain_values(state_count))
 
 
 def _acceleration_difference() -> float:
@@ -49,8 +49,8 @@ def _stop_difference() -> float:
 
 
 def _lagging_difference() -> float:
-    path = whole.run(whole.car(), ENGINE, DURATION, lags=True)
-    return whole.path_difference(path, whole.plain_run("car", DURATION, lags=True))
+    path = whole.run(whole.car(), ENGINE, DURATION, with_lags=True)
+    return whole.path_difference(path, whole.plain_run("car", DURATION, with_lags=True))
 
 
 CHECKS = {
@@ -74,13 +74,13 @@ CHECKS = {
 }
 
 
-def _table_patch(change: Callable[[Handling], None]) -> Patch:
+def _table_patch(change_car: Callable[[Handling], None]) -> Patch:
     """Fault: the car's parameter table is changed after it was filled."""
 
-    def packed(original: Any) -> Any:
-        def make(*given: Any, **more: Any) -> Handling:
-            handling: Handling = original(*given, **more)
-            change(handling)
+    def packed(original_function: Any) -> Any:
+        def make(*arguments: Any, **keyword_arguments: Any) -> Handling:
+            handling: Handling = original_function(*arguments, **keyword_arguments)
+            change_car(handling)
             return handling
 
         return make
@@ -88,122 +88,131 @@ def _table_patch(change: Callable[[Handling], None]) -> Patch:
     return attribute_patch("models.brake.sprung:Handling", packed)
 
 
-def _section_rows(handling: Handling, first: int, count_index: int, width: int) -> np.ndarray:
-    """View of the rows (number of rows, width) of a section of the car's parameter table. ``first`` and ``count_index``
-    are the positions in the table's head of the section's start and number of rows.
+def _section_rows(handling_car: Handling, start_index: int, count_index: int, column_count: int) -> np.ndarray:
+    """View of the rows (number of rows, width) of a section of the car's parameter table. ``start_index`` and
+    ``count_index`` are the positions in the table's head of the section's start and number of rows.
     """
-    begin, rows = int(handling.numbers[first]), int(handling.numbers[count_index])
-    return handling.numbers[begin : begin + width * rows].reshape(rows, width)
+    begin, rows = int(handling_car.numbers[start_index]), int(handling_car.numbers[count_index])
+    return handling_car.numbers[begin : begin + column_count * rows].reshape(rows, column_count)
 
 
-def _rows_of_parts(handling: Handling) -> np.ndarray:
-    return _section_rows(handling, at.OF_PARTS, at.PARTS, PER_PART)
+def _rows_of_parts(handling_car: Handling) -> np.ndarray:
+    return _section_rows(handling_car, at.OF_PARTS, at.PARTS, PER_PART)
 
 
-def _exchange_spring_numbers(handling: Handling) -> None:
+def _exchange_spring_numbers(handling_car: Handling) -> None:
     """Fault: stiffness and damping of the first spring are exchanged."""
-    first = _rows_of_parts(handling)[0]
+    first = _rows_of_parts(handling_car)[0]
     first[[STIFFNESS, DAMPING]] = first[[DAMPING, STIFFNESS]]
 
 
-def _without_bars(handling: Handling) -> None:
-    _rows_of_parts(handling)[len(handling.vehicle.springs) :, STIFFNESS] = 0.0
+def _without_bars(handling_car: Handling) -> None:
+    _rows_of_parts(handling_car)[len(handling_car.vehicle.springs) :, STIFFNESS] = 0.0
 
 
-def _shift_stiffnesses(handling: Handling) -> None:
+def _shift_stiffnesses(handling_car: Handling) -> None:
     """Fault: every spring has the stiffness of the previous spring in the table."""
-    parts = _rows_of_parts(handling)
+    parts = _rows_of_parts(handling_car)
     parts[:, STIFFNESS] = np.roll(parts[:, STIFFNESS], 1)
 
 
-def _moved_point(handling: Handling) -> None:
-    _section_rows(handling, at.OF_POINTS, at.POINTS, PER_POINT)[0, LOCAL] += 0.01
+def _moved_point(handling_car: Handling) -> None:
+    _section_rows(handling_car, at.OF_POINTS, at.POINTS, PER_POINT)[0, LOCAL] += 0.01
 
 
-def _softer_tyre(handling: Handling) -> None:
-    handling.tyre_numbers(1)[at.VERTICAL] *= 0.99
+def _softer_tyre(handling_car: Handling) -> None:
+    handling_car.tyre_numbers(1)[at.VERTICAL] *= 0.99
 
 
-def _damped_tyre(handling: Handling) -> None:
-    handling.tyre_numbers(1)[at.VISCOUS] *= 1.3
+def _damped_tyre(handling_car: Handling) -> None:
+    handling_car.tyre_numbers(1)[at.VISCOUS] *= 1.3
 
 
-def _remove_dry_friction(handling: Handling) -> None:
-    _rows_of_parts(handling)[:, FRICTION] = 0.0
+def _remove_dry_friction(handling_car: Handling) -> None:
+    _rows_of_parts(handling_car)[:, FRICTION] = 0.0
 
 
-def _remove_curves(handling: Handling) -> None:
-    _rows_of_parts(handling)[:, ON_TRAVEL] = 0.0
+def _remove_curves(handling_car: Handling) -> None:
+    _rows_of_parts(handling_car)[:, ON_TRAVEL] = 0.0
 
 
-def _double_drag(handling: Handling) -> None:
-    handling.numbers[at.DRAG] *= 2.0
+def _double_drag(handling_car: Handling) -> None:
+    handling_car.numbers[at.DRAG] *= 2.0
 
 
-def _preload_patch(change: Callable[[Preloads], Preloads]) -> Patch:
-    return attribute_patch("models.multibody.numbers:preloads", lambda real: lambda vehicle: change(real(vehicle)))
+def _preload_patch(change_preloads: Callable[[Preloads], Preloads]) -> Patch:
+    return attribute_patch(
+        "models.multibody.numbers:preloads", lambda real: lambda vehicle: change_preloads(real(vehicle))
+    )
 
 
-def _first_value_larger(values: dict[str, float]) -> dict[str, float]:
+def _first_value_larger(named_values: dict[str, float]) -> dict[str, float]:
     """Copy of the values with the first value 1 % larger."""
-    name = next(iter(values))
-    return values | {name: 1.01 * values[name]}
+    name = next(iter(named_values))
+    return named_values | {name: 1.01 * named_values[name]}
 
 
-def _march_patch(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
-    """Patch of an engine's step under constant tyre forces; change(step, engine, q, v) replaces it."""
-    return attribute_patch("models.brake.sprung_step:march", lambda real: lambda *arguments: change(real, *arguments))
+def _march_patch(change_march: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
+    """Patch of an engine's step under constant tyre forces; change_march(step, engine, q, v) replaces it."""
+    return attribute_patch(
+        "models.brake.sprung_step:march", lambda real: lambda *arguments: change_march(real, *arguments)
+    )
 
 
-def _euler_step(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
+def _euler_step(march_function: Any, engine_model: Any, q: np.ndarray, v: np.ndarray) -> bool:
     """Fault: the engine's step uses the accelerations at its start (explicit Euler) instead of Runge-Kutta."""
-    rates = engine.acceleration(0.0, q, v)
-    q += engine.step * v
-    v += engine.step * rates
+    rates = engine_model.acceleration(0.0, q, v)
+    q += engine_model.step * v
+    v += engine_model.step * rates
     return True
 
 
-def _larger_spin_moment(march: Any, engine: Any, *state: np.ndarray) -> Any:
-    wheel_force_views(engine.numbers).spin_moments[:] *= 1.01
-    return march(engine, *state)
+def _larger_spin_moment(march_function: Any, engine_model: Any, *state: np.ndarray) -> Any:
+    wheel_force_views(engine_model.numbers).spin_moments[:] *= 1.01
+    return march_function(engine_model, *state)
 
 
-def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
+def _forces_exchanged(march_function: Any, engine_model: Any, *state: np.ndarray) -> Any:
     """Fault: the forces of the front wheels are exchanged."""
-    forces = wheel_force_views(engine.numbers).forces
+    forces = wheel_force_views(engine_model.numbers).forces
     forces[:2] = forces[1::-1].copy()
-    return march(engine, *state)
+    return march_function(engine_model, *state)
 
 
-def _stacked_tables_patch(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
+def _stacked_tables_patch(change_friction: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
     """Patch that replaces longitudinal friction mu_x and lateral friction h in the stacked tyre tables for compiled
     code."""
 
-    def stack(original: Any) -> Any:
-        return lambda tyres: _with_friction(original(tyres), change)
+    def stack(original_function: Any) -> Any:
+        return lambda tyres: _with_friction(original_function(tyres), change_friction)
 
     return attribute_patch("validation.braking.plain_brakes:stacked_tables", stack)
 
 
-def _with_friction(tables: Tables, change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
-    mu_x, h = change(tables)
+def _with_friction(tyre_tables: Tables, change_friction: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
+    mu_x, h = change_friction(tyre_tables)
     return Tables(
-        tables.angles, tables.slips, tables.loads, np.ascontiguousarray(mu_x), tables.g, np.ascontiguousarray(h)
+        tyre_tables.angles,
+        tyre_tables.slips,
+        tyre_tables.loads,
+        np.ascontiguousarray(mu_x),
+        tyre_tables.g,
+        np.ascontiguousarray(h),
     )
 
 
-def _heavy_wheel(original: Any) -> Any:
+def _heavy_wheel(original_function: Any) -> Any:
     """Fault: a wheel's inertia is 1 % too large."""
-    return lambda tables, under, motion, load, braked: original(
+    return lambda tables, under, motion, load, braked: original_function(
         tables, under, motion, load, replace(braked, inertia=1.01 * braked.inertia)
     )
 
 
-def _exchanged_shares(original: Any) -> Any:
+def _exchanged_shares(original_function: Any) -> Any:
     """Fault: the shares of the first and second stretch of road are exchanged."""
 
     def under(*arguments: Any) -> np.ndarray:
-        surface: np.ndarray = original(*arguments)
+        surface: np.ndarray = original_function(*arguments)
         mixed = surface[:, 0] != surface[:, 1]
         surface[mixed, 2] = 1.0 - surface[mixed, 2]
         return surface
@@ -211,58 +220,63 @@ def _exchanged_shares(original: Any) -> Any:
     return under
 
 
-def _larger_torque(original: Any) -> Any:
+def _larger_torque(original_function: Any) -> Any:
     """Fault: brake torques are 1 % too large."""
 
     def planted(*arguments: Any) -> None:
-        original(*arguments)
+        original_function(*arguments)
         arguments[-1][:] *= 1.01
 
     return planted
 
 
-def _late_torque(original: Any) -> Any:
+def _late_torque(original_function: Any) -> Any:
     """Fault: brake torques at a step's end equal those at its start."""
 
     def planted(*arguments: Any) -> None:
-        original(*arguments)
+        original_function(*arguments)
         arguments[-1][1:] = arguments[-1][:-1].copy()
 
     return planted
 
 
-def _valves_without_delay(original: Any) -> Any:
+def _valves_without_delay(original_function: Any) -> Any:
     """Fault: valves have no delay within a sample."""
 
-    def planted(states: Any, sample: Any, air: Any, chambers: Any, *further: Any) -> None:
-        whole_samples = sample * int(chambers.delay / sample)
-        original(states, sample, air, chambers._replace(delay=whole_samples), *further)
+    def planted(valve_states: Any, sample: Any, air_system: Any, brake_chambers: Any, *further_arguments: Any) -> None:
+        whole_samples = sample * int(brake_chambers.delay / sample)
+        original_function(
+            valve_states, sample, air_system, brake_chambers._replace(delay=whole_samples), *further_arguments
+        )
 
     return planted
 
 
-def _longer_relaxation(original: Any) -> Any:
+def _longer_relaxation(original_function: Any) -> Any:
     """Fault: relaxation lengths are 1 % too long."""
-    return lambda state, time, steer, slope, length, lag: original(state, time, steer, slope, 1.01 * length, lag)
-
-
-def _relaxation_patch(change: Callable[..., tuple[Any, ...]]) -> Patch:
-    """Patch that changes the inputs by which lagging slip angles are advanced for a vehicle on its suspension."""
-    return attribute_patch(
-        "models.brake.sprung_relaxation:advance_contact_lag", lambda real: lambda *arguments: real(*change(*arguments))
+    return lambda state, time, steer, slope, length, lag: original_function(
+        state, time, steer, slope, 1.01 * length, lag
     )
 
 
-def _lag_over_half_step(contacts: Any, half: float, *further: Any) -> tuple[Any, ...]:
+def _relaxation_patch(change_lag_inputs: Callable[..., tuple[Any, ...]]) -> Patch:
+    """Patch that changes the inputs by which lagging slip angles are advanced for a vehicle on its suspension."""
+    return attribute_patch(
+        "models.brake.sprung_relaxation:advance_contact_lag",
+        lambda real: lambda *arguments: real(*change_lag_inputs(*arguments)),
+    )
+
+
+def _lag_over_half_step(tyre_contacts: Any, half_step: float, *further_arguments: Any) -> tuple[Any, ...]:
     """Fault: lagging slip angles are advanced without the half of the previous step."""
-    lag = further[1]
+    lag = further_arguments[1]
     lag.behind[0] = 0.0
-    return contacts, half, *further
+    return tyre_contacts, half_step, *further_arguments
 
 
-def _faster_lag(contacts: Any, *further: Any) -> tuple[Any, ...]:
+def _faster_lag(tyre_contacts: Any, *further_arguments: Any) -> tuple[Any, ...]:
     """Fault: lagging slip angles are advanced with wheel speeds that are 1 % too large."""
-    return contacts._replace(along=1.01 * contacts.along), *further
+    return tyre_contacts._replace(along=1.01 * tyre_contacts.along), *further_arguments
 
 
 PLAIN_BENCH_MODULE, COMPILED_MODULE = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"

@@ -55,11 +55,11 @@ class Campaign:
     checks: dict[str, Check]
     faults: tuple[CampaignFault, ...]
 
-    def measure(self, stride: int = 1) -> list[Record]:
+    def measure(self, fault_stride: int = 1) -> list[Record]:
         """Records with the ratio of error to tolerance of every check: first without a fault, then with every
-        ``stride``-th fault planted."""
+        ``fault_stride``-th fault planted."""
         clean = {"fault": "no fault", "place": "nowhere", "ratios": self._error_ratios()}
-        planted = self.faults[::stride]
+        planted = self.faults[::fault_stride]
         return [
             clean,
             *(
@@ -68,16 +68,16 @@ class Campaign:
             ),
         ]
 
-    def _ratios_with_fault(self, fault: CampaignFault) -> dict[str, float]:
-        with fault.patch()():
+    def _ratios_with_fault(self, campaign_fault: CampaignFault) -> dict[str, float]:
+        with campaign_fault.patch()():
             return self._error_ratios()
 
     def _error_ratios(self) -> dict[str, float]:
         return {name: check.size() / check.tolerance for name, check in self.checks.items()}
 
-    def rows(self, records: list[Record]) -> list[Row]:
+    def rows(self, fault_records: list[Record]) -> list[Row]:
         """Report rows: numbers of faults caught, of false alarms, and of faults that a single check catches."""
-        clean, *faulty = records
+        clean, *faulty = fault_records
         single = [
             f"{record['fault']} ({seeing_checks(record)[0]})" for record in faulty if len(seeing_checks(record)) == 1
         ]
@@ -110,7 +110,7 @@ class Campaign:
             ).beside("few", "what would pass if that check were dropped: " + (", ".join(single) or "none"), "native"),
         ]
 
-    def table(self, records: list[Record]) -> Table:
+    def table(self, fault_records: list[Record]) -> Table:
         """Table of every planted fault with the checks that see it and their errors."""
         lines = tuple(
             (
@@ -119,7 +119,7 @@ class Campaign:
                 self._sizes_text(record),
                 ", ".join(name for name in self.checks if name not in seeing_checks(record)),
             )
-            for record in records[1:]
+            for record in fault_records[1:]
         )
         checks = (f"{name}: {check.title} (allowed {check.tolerance:g})" for name, check in self.checks.items())
         return Table(
@@ -129,7 +129,7 @@ class Campaign:
             lines,
         )
 
-    def lines(self, records: list[Record]) -> list[tuple[str, ...]]:
+    def lines(self, fault_records: list[Record]) -> list[tuple[str, ...]]:
         """Table lines, one for each fault: system, subject, fault, checks that see it, checks that do not."""
         return [
             (
@@ -139,15 +139,16 @@ class Campaign:
                 ", ".join(seeing_checks(record)) or "none",
                 ", ".join(name for name in self.checks if name not in seeing_checks(record)),
             )
-            for record in records[1:]
+            for record in fault_records[1:]
         ]
 
-    def _sizes_text(self, record: Record) -> str:
+    def _sizes_text(self, fault_record: Record) -> str:
         return ", ".join(
-            f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seeing_checks(record)
+            f"{name} {fault_record['ratios'][name] * self.checks[name].tolerance:.1g}"
+            for name in seeing_checks(fault_record)
         )
 
 
-def seeing_checks(record: Record) -> list[str]:
+def seeing_checks(fault_record: Record) -> list[str]:
     """Names of the checks that see the fault of a record: their error exceeds the tolerance."""
-    return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]
+    return [name for name, ratio in fault_record["ratios"].items() if not ratio <= 1.0]

@@ -18,28 +18,29 @@ def unchanged(assembly: Assembly) -> Assembly:
     return assembly
 
 
-def changed_vehicle_of(change: Callable[[Vehicle], Vehicle]) -> AssemblyChange:
+def changed_vehicle_of(change_vehicle: Callable[[Vehicle], Vehicle]) -> AssemblyChange:
     """Fault: the vehicle's description is changed."""
-    return lambda assembly: replace(assembly, vehicle=change(assembly.vehicle))
+    return lambda assembly: replace(assembly, vehicle=change_vehicle(assembly.vehicle))
 
 
-def replaced_struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> AssemblyChange:
-    """Fault: each strut is replaced by change(strut, struts), where ``struts`` are all struts of the vehicle by
+def replaced_struts(change_strut: Callable[[Strut, dict[str, Strut]], Strut]) -> AssemblyChange:
+    """Fault: each strut is replaced by change_strut(strut, struts), where ``struts`` are all struts of the vehicle by
     name."""
 
     def changed(original_vehicle: Vehicle) -> Vehicle:
         named = {strut.name: strut for strut in original_vehicle.struts}
-        return replace(original_vehicle, struts=tuple(change(strut, named) for strut in original_vehicle.struts))
+        return replace(original_vehicle, struts=tuple(change_strut(strut, named) for strut in original_vehicle.struts))
 
     return changed_vehicle_of(changed)
 
 
-def replaced_bodies(change: Callable[[Body, dict[str, Body]], Body]) -> AssemblyChange:
-    """Fault: each body is replaced by change(body, bodies), where ``bodies`` are all bodies of the vehicle by name."""
+def replaced_bodies(change_body: Callable[[Body, dict[str, Body]], Body]) -> AssemblyChange:
+    """Fault: each body is replaced by change_body(body, bodies), where ``bodies`` are all bodies of the vehicle by
+    name."""
 
     def changed(original_vehicle: Vehicle) -> Vehicle:
         named = {body.name: body for body in original_vehicle.bodies}
-        return replace(original_vehicle, bodies=tuple(change(body, named) for body in original_vehicle.bodies))
+        return replace(original_vehicle, bodies=tuple(change_body(body, named) for body in original_vehicle.bodies))
 
     return changed_vehicle_of(changed)
 
@@ -63,33 +64,35 @@ def _point_moved_to(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
-def swapped_struts(first_strut: str, other_strut: str) -> AssemblyChange:
+def swapped_struts(first_strut: str, second_strut: str) -> AssemblyChange:
     """Fault: stiffness and damping of two struts are exchanged."""
 
-    def change(strut: Strut, struts: dict[str, Strut]) -> Strut:
-        source = struts.get({first_strut: other_strut, other_strut: first_strut}.get(strut.name, strut.name), strut)
+    def change(strut: Strut, all_struts: dict[str, Strut]) -> Strut:
+        source = all_struts.get(
+            {first_strut: second_strut, second_strut: first_strut}.get(strut.name, strut.name), strut
+        )
         return replace(strut, stiffness=source.stiffness, damping=source.damping)
 
     return replaced_struts(change)
 
 
-def stiffened_strut(name: str, factor: float) -> AssemblyChange:
+def stiffened_strut(strut_name: str, factor: float) -> AssemblyChange:
     """Fault: the stiffness of one strut is multiplied by a factor."""
-    return replaced_struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == name else s)
+    return replaced_struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == strut_name else s)
 
 
-def undamped_tyre(strut: Strut, struts: dict[str, Strut]) -> Strut:
+def undamped_tyre(strut: Strut, all_struts: dict[str, Strut]) -> Strut:
     """Fault: a tyre has no damping."""
     return replace(strut, damping=0.0) if strut.name.startswith("tyre") else strut
 
 
-def swapped_wheel(body: Body, bodies: dict[str, Body]) -> Body:
+def swapped_wheel(body: Body, all_bodies: dict[str, Body]) -> Body:
     """Fault: a wheel has the mass of the other wheel."""
     other_wheel = {"wheel1": "wheel2", "wheel2": "wheel1"}.get(body.name, body.name)
-    return replace(body, mass=bodies[other_wheel].mass)
+    return replace(body, mass=all_bodies[other_wheel].mass)
 
 
-def mixed_inertia(body: Body, bodies: dict[str, Body]) -> Body:
+def mixed_inertia(body: Body, all_bodies: dict[str, Body]) -> Body:
     """Fault: mass and inertia of the chassis are exchanged."""
     return body if body.pitch_inertia is None else replace(body, mass=body.pitch_inertia, pitch_inertia=body.mass)
 
@@ -98,7 +101,7 @@ def inertia_about_axle(assembly: Assembly) -> Assembly:
     """Fault: the pitch inertia is taken about the front axle instead of the centre of mass."""
     b = assembly.parameters.b
 
-    def change(body: Body, bodies: dict[str, Body]) -> Body:
+    def change(body: Body, all_bodies: dict[str, Body]) -> Body:
         axle_inertia = None if body.pitch_inertia is None else body.pitch_inertia + body.mass * b**2
         return replace(body, pitch_inertia=axle_inertia)
 
@@ -128,8 +131,8 @@ class AlteredSignal:
     delay: float = 0.0
     change: SignalChange = field(default=lambda values: values)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.signal, name)
+    def __getattr__(self, attribute_name: str) -> Any:
+        return getattr(self.signal, attribute_name)
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
         """Values (sample_count, channels) of the altered signal at start_time + i step (s)."""
@@ -171,54 +174,56 @@ class OtherTrack(AlteredSignal):
         return replace(self.signal, profile=iso8608_road("A", 1))
 
 
-def replaced_input(modes: tuple[str, ...], change: Callable[[Any], Any]) -> AssemblyChange:
-    """Fault: the input signal is replaced by change(signal), if the vehicle is excited in one of the modes."""
+def replaced_input(excitation_modes: tuple[str, ...], change_signal: Callable[[Any], Any]) -> AssemblyChange:
+    """Fault: the input signal is replaced by change_signal(signal), if the vehicle is excited in one of the modes."""
 
     def changed(assembly: Assembly) -> Assembly:
-        if assembly.input is None or assembly.mode not in modes:
+        if assembly.input is None or assembly.mode not in excitation_modes:
             return assembly
-        return replace(assembly, input=change(assembly.input))
+        return replace(assembly, input=change_signal(assembly.input))
 
     return changed
 
 
-def replaced_channels(modes: tuple[str, ...], change: SignalChange) -> AssemblyChange:
-    """Fault: the input's values are replaced by change(values)."""
-    return replaced_input(modes, lambda signal: AlteredSignal(signal, 0.0, change))
+def replaced_channels(excitation_modes: tuple[str, ...], change_values: SignalChange) -> AssemblyChange:
+    """Fault: the input's values are replaced by change_values(values)."""
+    return replaced_input(excitation_modes, lambda signal: AlteredSignal(signal, 0.0, change_values))
 
 
-def multiplied_channels(factors: dict[int, float]) -> SignalChange:
+def multiplied_channels(factor_of_channel: dict[int, float]) -> SignalChange:
     """Returns a function that multiplies channels of a signal by factors (channel number -> factor)."""
 
-    def change(values: np.ndarray) -> np.ndarray:
-        changed_values = values.copy()
-        for channel, factor in factors.items():
+    def change(channel_values: np.ndarray) -> np.ndarray:
+        changed_values = channel_values.copy()
+        for channel, factor in factor_of_channel.items():
             changed_values[:, channel] *= factor
         return changed_values
 
     return change
 
 
-def replaced_springs(change: Callable[[PitchSpring], PitchSpring]) -> AssemblyChange:
-    """Fault: every pitch spring is replaced by change(spring)."""
+def replaced_springs(change_spring: Callable[[PitchSpring], PitchSpring]) -> AssemblyChange:
+    """Fault: every pitch spring is replaced by change_spring(spring)."""
     return changed_vehicle_of(
-        lambda original: replace(original, pitch_springs=tuple(change(spring) for spring in original.pitch_springs))
+        lambda original: replace(
+            original, pitch_springs=tuple(change_spring(spring) for spring in original.pitch_springs)
+        )
     )
 
 
-def front_values_at_rear(values: np.ndarray) -> np.ndarray:
+def front_values_at_rear(channel_values: np.ndarray) -> np.ndarray:
     """Fault: the rear channel has the values of the front channel."""
-    return values[:, [0, 0, *range(2, values.shape[1])]]
+    return channel_values[:, [0, 0, *range(2, channel_values.shape[1])]]
 
 
-def changed_moment(delay_periods: float, change: SignalChange = lambda values: values) -> AssemblyChange:
+def changed_moment(delay_periods: float, change_values: SignalChange = lambda values: values) -> AssemblyChange:
     """Fault: the added moment is delayed by a fraction of its sampling period, and its values are changed."""
 
     def changed(assembly: Assembly) -> Assembly:
         signal = assembly.moment
         if signal is None:
             return assembly
-        return replace(assembly, moment=AlteredSignal(signal, delay_periods * (signal.period or 0.0), change))
+        return replace(assembly, moment=AlteredSignal(signal, delay_periods * (signal.period or 0.0), change_values))
 
     return changed
 
@@ -230,9 +235,11 @@ def with_late_input(delay_periods: float, step: float = 1e-3) -> AssemblyChange:
     )
 
 
-def scaled_road(**factors: float) -> AssemblyChange:
+def scaled_road(**parameter_factors: float) -> AssemblyChange:
     """Fault: parameters of the road signal (speed, wheelbase) are multiplied by factors."""
     return replaced_input(
         ("road",),
-        lambda signal: replace(signal, **{name: factor * getattr(signal, name) for name, factor in factors.items()}),
+        lambda signal: replace(
+            signal, **{name: factor * getattr(signal, name) for name, factor in parameter_factors.items()}
+        ),
     )

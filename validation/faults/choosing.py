@@ -65,7 +65,7 @@ def _choice_by_runs() -> ChoiceCheckedByRuns:
 
 
 @cache
-def _linear_choice_with_functions(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
+def _linear_choice_with_functions(*replaced_functions: Any) -> tuple[RideChoice, np.ndarray, float]:
     chooser = chooser_over_speeds(_linear_ride())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWN_RIDES, DRAWN_RIDES) * chooser.tolerance
@@ -73,7 +73,7 @@ def _linear_choice_with_functions(*functions: Any) -> tuple[RideChoice, np.ndarr
 
 
 @cache
-def _choice_with_functions(*functions: Any) -> ChoiceCheckedByRuns:
+def _choice_with_functions(*replaced_functions: Any) -> ChoiceCheckedByRuns:
     return choice_checked_by_runs(_half_car_question(), "pitch-plane", "reference")
 
 
@@ -130,28 +130,37 @@ CHECKS = {
 }
 
 
-def _opposite_prediction(original: Any) -> Any:
-    def predicted(linear_screen: LinearScreen, reduced: Any) -> np.ndarray:
+def _opposite_prediction(original_function: Any) -> Any:
+    def predicted(linear_screen: LinearScreen, reduced_scene: Any) -> np.ndarray:
         C = linear_screen.base.system.C[linear_screen.rows]
         full = np.einsum("ki,ij,kj->k", C, linear_screen.P, C)
-        return np.maximum(2 * full - original(linear_screen, reduced), 0.0)
+        return np.maximum(2 * full - original_function(linear_screen, reduced_scene), 0.0)
 
     return predicted
 
 
-def _tolerance_ignored(original: Any) -> Any:
-    def init(chooser: Any, first: Any, second_argument: Any, quantities: Any, tolerance: float, *further: Any) -> None:
-        original(chooser, first, second_argument, quantities, 0.9, *further)
+def _tolerance_ignored(original_function: Any) -> Any:
+    def init(
+        chooser: Any,
+        first_argument: Any,
+        second_argument: Any,
+        quantities: Any,
+        tolerance: float,
+        *further_arguments: Any,
+    ) -> None:
+        original_function(chooser, first_argument, second_argument, quantities, 0.9, *further_arguments)
 
     return init
 
 
-def _unconfirmed_report(change: Callable[[EffectChooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
+def _unconfirmed_report(
+    predict_changes: Callable[[EffectChooser, frozenset[str], int], np.ndarray],
+) -> Callable[[Any], Any]:
     """Fault: predicted changes are reported as confirmed without a run."""
 
     def confirmed_changes(chooser: EffectChooser, omitted_effects: frozenset[str]) -> np.ndarray:
         step_factor = chooser.longest_step_factor(omitted_effects)
-        shares = change(chooser, omitted_effects, step_factor)
+        shares = predict_changes(chooser, omitted_effects, step_factor)
         chooser._confirmed[omitted_effects] = step_factor, shares, np.zeros_like(shares)
         return shares
 

@@ -122,13 +122,13 @@ CHECKS = {
 }
 
 
-def _contacts_patch(change: Callable[[Array], None]) -> Patch:
+def _contacts_patch(change_contacts: Callable[[Array], None]) -> Patch:
     """Patch that changes FASTSIM's input records CONTACT (n,) in place."""
 
-    def contacts(original: Any) -> Any:
-        def planted(*given: Any) -> Any:
-            answer, shape = original(*given)
-            change(answer)
+    def contacts(original_function: Any) -> Any:
+        def planted(*arguments: Any) -> Any:
+            answer, shape = original_function(*arguments)
+            change_contacts(answer)
             return answer, shape
 
         return planted
@@ -136,16 +136,19 @@ def _contacts_patch(change: Callable[[Array], None]) -> Patch:
     return attribute_patch("models.contact.fastsim:contact_records", contacts)
 
 
-def _multiplication_patch(name: str, factor: float) -> Patch:
-    def change(contacts: Array) -> None:
-        contacts[name] *= factor
+def _multiplication_patch(field_name: str, field_factor: float) -> Patch:
+    def change(contact_records: Array) -> None:
+        contact_records[field_name] *= field_factor
 
     return _contacts_patch(change)
 
 
 def _exchange_patch(first_field: str, second_field: str) -> Patch:
-    def change(contacts: Array) -> None:
-        contacts[first_field], contacts[second_field] = contacts[second_field].copy(), contacts[first_field].copy()
+    def change(contact_records: Array) -> None:
+        contact_records[first_field], contact_records[second_field] = (
+            contact_records[second_field].copy(),
+            contact_records[first_field].copy(),
+        )
 
     return _contacts_patch(change)
 

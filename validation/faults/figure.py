@@ -15,42 +15,47 @@ BLUE_COLOUR_MAP = LinearSegmentedColormap.from_list("seen", ("#d6e6f4", "#6aaed6
 
 
 def fault_map(
-    faults: Sequence[str],
-    checks: Sequence[str],
-    ratios: dict[str, list[list[float]]],
-    titles: dict[str, str],
-    hidden: Sequence[bool],
+    fault_names: Sequence[str],
+    check_names: Sequence[str],
+    ratios_by_vehicle: dict[str, list[list[float]]],
+    vehicle_titles: dict[str, str],
+    hidden_faults: Sequence[bool],
 ) -> Figure:
     """Coloured table of log10(error / tolerance) for each vehicle, with faults as rows and checks as columns; white
     where a check does not see the fault.
 
-    ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.
+    ratios_by_vehicle : by vehicle, rows of faults and columns of checks; hidden_faults : faults that the second vehicle
+    hides.
     """
-    figure, axes = subplots(1, len(ratios), figsize=(COLUMN_WIDTH, 1.6 + 0.17 * len(faults)), sharey=True)
+    figure, axes = subplots(
+        1, len(ratios_by_vehicle), figsize=(COLUMN_WIDTH, 1.6 + 0.17 * len(fault_names)), sharey=True
+    )
     add_heading(figure, "Which check sees which fault: decades above its tolerance")
-    for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios.items(), strict=True):
-        image = _draw_cells(axis, np.array(values), checks)
-        axis.set_title(titles[vehicle])
+    for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios_by_vehicle.items(), strict=True):
+        image = _draw_cells(axis, np.array(values), check_names)
+        axis.set_title(vehicle_titles[vehicle])
     first_axis, last_axis = np.atleast_1d(axes)[[0, -1]]
-    first_axis.set_yticks(range(len(faults)), faults, fontsize=SMALL_TEXT)
-    for row in np.flatnonzero(hidden):
+    first_axis.set_yticks(range(len(fault_names)), fault_names, fontsize=SMALL_TEXT)
+    for row in np.flatnonzero(hidden_faults):
         last_axis.text(
-            len(checks) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=SMALL_TEXT, color="#b03000"
+            len(check_names) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=SMALL_TEXT, color="#b03000"
         )
     bar = figure.colorbar(image, ax=axes, shrink=0.4, aspect=30, pad=0.01)
     bar.set_label("size of what it sees / tolerance [decades]")
     return figure
 
 
-def _draw_cells(axis: Any, ratios: np.ndarray, checks: Sequence[str]) -> Any:
-    decades = np.log10(np.clip(ratios, 1e-3, 10.0**SCALE_DECADES))
-    image = axis.imshow(
-        np.where(ratios > 1, decades, np.nan), cmap=BLUE_COLOUR_MAP, vmin=0, vmax=SCALE_DECADES, aspect="auto"
+def _draw_cells(panel: Any, error_ratios: np.ndarray, check_names: Sequence[str]) -> Any:
+    decades = np.log10(np.clip(error_ratios, 1e-3, 10.0**SCALE_DECADES))
+    image = panel.imshow(
+        np.where(error_ratios > 1, decades, np.nan), cmap=BLUE_COLOUR_MAP, vmin=0, vmax=SCALE_DECADES, aspect="auto"
     )
-    axis.set_xticks(range(len(checks)), checks, rotation=45, ha="right", rotation_mode="anchor", fontsize=SMALL_TEXT)
-    axis.set_xticks(np.arange(0.5, len(checks) - 1), minor=True)
-    axis.set_yticks(np.arange(0.5, len(ratios) - 1), minor=True)
-    axis.grid(False)
-    axis.grid(True, which="minor", color="#cccccc", linewidth=0.5, alpha=1.0)
-    axis.tick_params(which="both", length=0)
+    panel.set_xticks(
+        range(len(check_names)), check_names, rotation=45, ha="right", rotation_mode="anchor", fontsize=SMALL_TEXT
+    )
+    panel.set_xticks(np.arange(0.5, len(check_names) - 1), minor=True)
+    panel.set_yticks(np.arange(0.5, len(error_ratios) - 1), minor=True)
+    panel.grid(False)
+    panel.grid(True, which="minor", color="#cccccc", linewidth=0.5, alpha=1.0)
+    panel.tick_params(which="both", length=0)
     return image

@@ -16,9 +16,9 @@ from validation.faults.patches import Patch, attribute_patch
 from validation.spatial.cars import hub_forces_by_jacobians, r19, static_forces
 
 
-def _driven_model(hubs: np.ndarray) -> HubModel:
+def _driven_model(hub_wrenches: np.ndarray) -> HubModel:
     """The vehicle R19-free in MuJoCo under hub forces and moments (3, 6 number of hubs) in N, N m."""
-    return build("mujoco", r19(), HubInputs(hubs), 1e-3, 1e-3)
+    return build("mujoco", r19(), HubInputs(hub_wrenches), 1e-3, 1e-3)
 
 
 def _jacobian_difference() -> float:
@@ -47,15 +47,17 @@ CHECKS = {
 
 
 def wrench_reading_patch(
-    change_wrenches: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = "hub"
+    change_wrenches: Callable[[np.ndarray], np.ndarray] | None = None, force_frame: str = "hub"
 ) -> Patch:
     """Fault: hub forces and moments (samples, hubs, 6) are changed as they are read, or read in a wrong frame."""
 
-    def table(original: Any) -> Any:
+    def table(original_function: Any) -> Any:
         def planted(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:
             parts = hub_inputs.hubs.reshape(len(hub_inputs.hubs), -1, WRENCH)
             rows = parts if change_wrenches is None else change_wrenches(parts)
-            return original(vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=frame), step)
+            return original_function(
+                vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=force_frame), step
+            )
 
         return planted
 
@@ -65,7 +67,7 @@ def wrench_reading_patch(
 FAULTS = (
     CampaignFault("left and right hubs swapped", "input", wrench_reading_patch(lambda parts: parts[:, [1, 0, 3, 2]])),
     CampaignFault("front and rear hubs swapped", "input", wrench_reading_patch(lambda parts: parts[:, [2, 3, 0, 1]])),
-    CampaignFault("forces read along axes of the road", "input", wrench_reading_patch(frame="inertial")),
+    CampaignFault("forces read along axes of the road", "input", wrench_reading_patch(force_frame="inertial")),
     CampaignFault(
         "y turned round",
         "input",

@@ -187,57 +187,65 @@ CHECKS = {
 }
 
 
-def _noise_block_patch(change: Callable[..., tuple[int, ...]]) -> Patch:
+def _noise_block_patch(change_arguments: Callable[..., tuple[int, ...]]) -> Patch:
     """Fault: noise blocks are generated for changed values of (seed, path, block, channels, source)."""
     return attribute_patch(
         "models.core.noise:normal_block",
         lambda real: (
             lambda seed, path, block, channels, source=0, **rows: real(
-                *change(seed, path, block, channels, source), **rows
+                *change_arguments(seed, path, block, channels, source), **rows
             )
         ),
     )
 
 
-def _change_resampling(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
+def _change_resampling(
+    delay_periods: float = 0.0, change_samples: Callable[[np.ndarray], np.ndarray] = np.asarray
+) -> Patch:
     return attribute_patch(
         "models.measured.resampling:resample_to",
-        lambda real: lambda times, values, period, grid: change(real(times + late * period, values, period, grid)),
+        lambda real: (
+            lambda times, values, period, grid: change_samples(
+                real(times + delay_periods * period, values, period, grid)
+            )
+        ),
     )
 
 
-def _factor_patch(name: str, factor: float) -> Patch:
+def _factor_patch(unit_name: str, factor: float) -> Patch:
     return attribute_patch(
         "models.measured.units:factor_to_si",
-        lambda real: lambda unit, *arguments: real(unit, *arguments) * (factor if unit == name else 1.0),
+        lambda real: lambda unit, *arguments: real(unit, *arguments) * (factor if unit == unit_name else 1.0),
     )
 
 
-def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
+def _change_rainflow(change_cycles: Callable[[Any], Any]) -> Patch:
     """Fault: ranges, means and counts of rainflow cycles are changed."""
     return attribute_patch(
-        "models.fatigue.rainflow_cycles:rainflow_cycles", lambda real: lambda turns: change(real(turns))
+        "models.fatigue.rainflow_cycles:rainflow_cycles", lambda real: lambda turns: change_cycles(real(turns))
     )
 
 
-def _readings_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _readings_patch(change_readings: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Fault: the sensors' readings (n, 4, 3) are changed before motion is computed from them."""
     return attribute_patch(
         "models.sensors.rigid_body_motion:body_rotation_from_readings",
         lambda real: (
             lambda array, readings: real(
-                array, change(readings) if readings.shape[1] == len(SENSOR_PLACES) else readings
+                array, change_readings(readings) if readings.shape[1] == len(SENSOR_PLACES) else readings
             )
         ),
     )
 
 
-def _second_sensor_scaled(readings: np.ndarray) -> np.ndarray:
-    return readings * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
+def _second_sensor_scaled(sensor_readings: np.ndarray) -> np.ndarray:
+    return sensor_readings * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
 
 
-def _crossings_both_ways(original: Any) -> Any:
-    return lambda load, levels: original(load, levels) + original(-np.asarray(load), -np.asarray(levels)[::-1])[::-1]
+def _crossings_both_ways(original_function: Any) -> Any:
+    return lambda load, levels: (
+        original_function(load, levels) + original_function(-np.asarray(load), -np.asarray(levels)[::-1])[::-1]
+    )
 
 
 FAULTS = (

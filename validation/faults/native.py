@@ -33,87 +33,89 @@ CHECKS = {
 }
 
 
-def _mujoco_model_patch(change: Callable[[Any], None]) -> Patch:
+def _mujoco_model_patch(change_model: Callable[[Any], None]) -> Patch:
     """Fault: MuJoCo's compiled model is changed after its force laws were written into it."""
 
-    def set_laws(original: Any) -> Any:
-        def written(model: Any, native_parts: Any) -> None:
-            original(model, native_parts)
+    def set_laws(original_function: Any) -> Any:
+        def written(mujoco_model: Any, native_parts: Any) -> None:
+            original_function(mujoco_model, native_parts)
             if native_parts:
-                change(model)
+                change_model(mujoco_model)
 
         return written
 
     return attribute_patch("models.engines.free_vehicle_mujoco:set_laws", set_laws)
 
 
-def _scale_patch(array: str) -> Patch:
+def _scale_patch(array_name: str) -> Patch:
     """Fault: the first row of an array of MuJoCo's model is 1 % too large."""
 
-    def change(model: Any) -> None:
-        getattr(model, array)[:1] *= 1.01
+    def change(mujoco_model: Any) -> None:
+        getattr(mujoco_model, array_name)[:1] *= 1.01
 
     return _mujoco_model_patch(change)
 
 
-def _larger_bar_coefficient(model: Any) -> None:
+def _larger_bar_coefficient(mujoco_model: Any) -> None:
     """Fault: the coefficient of the first coordinate in the first anti-roll bar's tendon is 1 % too large."""
-    bar = next(i for i in range(model.ntendon) if model.tendon(i).name.endswith("bar"))
-    model.wrap_prm[model.tendon_adr[bar]] *= 1.01
+    bar = next(i for i in range(mujoco_model.ntendon) if mujoco_model.tendon(i).name.endswith("bar"))
+    mujoco_model.wrap_prm[mujoco_model.tendon_adr[bar]] *= 1.01
 
 
-def _site_actuator(model: Any) -> int:
+def _site_actuator(mujoco_model: Any) -> int:
     """Number of the first actuator in a MuJoCo model that acts between two sites."""
-    return int(np.argmax(model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE))
+    return int(np.argmax(mujoco_model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE))
 
 
-def _swap_sites(model: Any) -> None:
+def _swap_sites(mujoco_model: Any) -> None:
     """Fault: an actuator's reference site lies on the other body, so that its axis turns with this body."""
-    sites = model.actuator_trnid[_site_actuator(model)]
+    sites = mujoco_model.actuator_trnid[_site_actuator(mujoco_model)]
     sites[:] = sites[::-1].copy()
 
 
-def _larger_mount_preload(model: Any) -> None:
-    sited = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
-    actuator = int(np.argmax(sited * (model.actuator_forcelimited == 0) * abs(model.actuator_biasprm[:, 0])))
-    model.actuator_biasprm[actuator, 0] *= 1.01
+def _larger_mount_preload(mujoco_model: Any) -> None:
+    sited = mujoco_model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
+    actuator = int(
+        np.argmax(sited * (mujoco_model.actuator_forcelimited == 0) * abs(mujoco_model.actuator_biasprm[:, 0]))
+    )
+    mujoco_model.actuator_biasprm[actuator, 0] *= 1.01
 
 
-def _shift_corner(model: Any) -> None:
+def _shift_corner(mujoco_model: Any) -> None:
     """Fault: the force limit of an actuator, which represents a corner of a curve, is switched off."""
-    model.actuator_forcelimited[int(np.argmax(model.actuator_forcelimited))] = 0
+    mujoco_model.actuator_forcelimited[int(np.argmax(mujoco_model.actuator_forcelimited))] = 0
 
 
-def _element_law_patch(**factors: float) -> Patch:
+def _element_law_patch(**law_factors: float) -> Patch:
     """Fault: stiffness, damping or preload of Exudyn's first element is multiplied by a factor."""
 
-    def add_parts(original: Any) -> Any:
-        def added(built: Any, node: Any, native_parts: Any) -> None:
+    def add_parts(original_function: Any) -> Any:
+        def added(exudyn_model: Any, node: Any, native_parts: Any) -> None:
             first = native_parts[0].element
-            changed = replace(first, **{name: factor * getattr(first, name) for name, factor in factors.items()})
-            original(built, node, (replace(native_parts[0], element=changed), *native_parts[1:]))
+            changed = replace(first, **{name: factor * getattr(first, name) for name, factor in law_factors.items()})
+            original_function(exudyn_model, node, (replace(native_parts[0], element=changed), *native_parts[1:]))
 
         return added
 
     return attribute_patch("models.engines.free_vehicle_exudyn:add_parts", add_parts)
 
 
-def _larger_bar_factor(original: Any) -> Any:
+def _larger_bar_factor(original_function: Any) -> Any:
     """Fault: the coefficient of the first coordinate in a bar is 1 % too large."""
 
     def add(self: Any, element: Any, travel: Any) -> None:
         first, *other_factors = travel.factors
         scaled = replace(travel, factors=(1.01 * first, *other_factors))
-        original(self, element, scaled if element.name.endswith("bar") else travel)
+        original_function(self, element, scaled if element.name.endswith("bar") else travel)
 
     return add
 
 
-def _axes_fixed_in_space(original: Any) -> Any:
+def _axes_fixed_in_space(original_function: Any) -> Any:
     """Fault: mounts are measured along axes fixed in space, since the connector belongs to the vehicle's tree."""
 
-    def tree(self: Any, frame: str) -> Any:
-        return self.built.links[frame][0]
+    def tree(self: Any, axes_frame: str) -> Any:
+        return self.built.links[axes_frame][0]
 
     return tree
 

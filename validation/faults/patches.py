@@ -25,20 +25,20 @@ def no_fault() -> Context:
     return nullcontext
 
 
-def attribute_patch(path: str, change: Callable[[Any], Any]) -> Patch:
-    """Patch that replaces ``module:object.name`` by change(original)."""
+def attribute_patch(attribute_path: str, change_attribute: Callable[[Any], Any]) -> Patch:
+    """Patch that replaces ``module:object.name`` by change_attribute(original)."""
 
     def prepare() -> Context:
-        owner, name = _owner_and_name(path)
-        return lambda: patch.object(owner, name, change(getattr(owner, name)))
+        owner, name = _owner_and_name(attribute_path)
+        return lambda: patch.object(owner, name, change_attribute(getattr(owner, name)))
 
     return prepare
 
 
-def _owner_and_name(path: str) -> tuple[Any, str]:
+def _owner_and_name(attribute_path: str) -> tuple[Any, str]:
     from importlib import import_module
 
-    module, _, qualified_name = path.partition(":")
+    module, _, qualified_name = attribute_path.partition(":")
     *parents, name = qualified_name.split(".")
     owner: Any = import_module(module)
     for parent in parents:
@@ -46,18 +46,18 @@ def _owner_and_name(path: str) -> tuple[Any, str]:
     return owner, name
 
 
-def with_globals(function: Callable[..., Any], **other_globals: Any) -> Callable[..., Any]:
+def with_globals(copied_function: Callable[..., Any], **other_globals: Any) -> Callable[..., Any]:
     """A copy of a function in which some of its module's global names are replaced. Raises AttributeError for a name
     that the module does not have."""
-    if unknown := other_globals.keys() - function.__globals__.keys():
-        raise AttributeError(f"{function.__module__} has no {', '.join(sorted(unknown))}")
-    return FunctionType(function.__code__, function.__globals__ | other_globals, function.__name__)
+    if unknown := other_globals.keys() - copied_function.__globals__.keys():
+        raise AttributeError(f"{copied_function.__module__} has no {', '.join(sorted(unknown))}")
+    return FunctionType(copied_function.__code__, copied_function.__globals__ | other_globals, copied_function.__name__)
 
 
 # Exudyn
 
 
-def sample_of_step_end(original: Any) -> Any:
+def sample_of_step_end(original_function: Any) -> Any:
     """Fault: with samples that are constant over a step, a step reads the sample at its end."""
 
     def advance(clock: Any, mbs: Any, t: float) -> bool:
@@ -67,23 +67,23 @@ def sample_of_step_end(original: Any) -> Any:
     return advance
 
 
-def truncated_time(original: Any) -> Any:
+def truncated_time(original_function: Any) -> Any:
     """Fault: the row number in the table of input samples at half steps is truncated instead of rounded."""
 
-    def reader(clock: Any, column: int, time_scale: float) -> Any:
+    def reader(clock: Any, column_number: int, time_scale: float) -> Any:
         if not clock.table:
-            return original(clock, column, time_scale)
-        return lambda mbs, t, load: time_scale * clock.table[column][int(t * clock.per_time)]
+            return original_function(clock, column_number, time_scale)
+        return lambda mbs, t, load: time_scale * clock.table[column_number][int(t * clock.per_time)]
 
     return reader
 
 
-def reset_accelerations(original: Any) -> Any:
+def reset_accelerations(original_function: Any) -> Any:
     """Fault: a constrained run starts with accelerations that Exudyn computes without the acceleration of the
     prescribed motion."""
 
     def start(model: Any, options: Any) -> None:
-        original(model, options)
+        original_function(model, options)
         options.timeIntegration.generalizedAlpha.computeInitialAccelerations = True
         options.timeIntegration.generalizedAlpha.resetAccelerations = True
 
@@ -93,49 +93,49 @@ def reset_accelerations(original: Any) -> Any:
 # MuJoCo
 
 
-def weightless_wheel(original: Any) -> Any:
+def weightless_wheel(original_function: Any) -> Any:
     """Fault: the front wheel has no weight."""
 
     def spec(*arguments: Any) -> Any:
-        built = original(*arguments)
+        built = original_function(*arguments)
         built.body("wheel1").gravcomp = 1.0
         return built
 
     return spec
 
 
-def turning_reference(original: Any) -> Any:
+def turning_reference(original_function: Any) -> Any:
     """Fault: struts are measured along the chassis' axis, because the reference site lies on the rotating body."""
 
-    def suspension(spec: Any, vehicle: Any, strut: Any, joints: Any) -> None:
-        original(spec, vehicle, strut, joints)
-        actuator = spec.actuator(strut.name)
+    def suspension(mujoco_spec: Any, vehicle: Any, strut: Any, joints: Any) -> None:
+        original_function(mujoco_spec, vehicle, strut, joints)
+        actuator = mujoco_spec.actuator(strut.name)
         actuator.target, actuator.refsite = actuator.refsite, actuator.target
 
     return suspension
 
 
-def reversed_pitch_row(original: Any) -> Any:
+def reversed_pitch_row(original_function: Any) -> Any:
     """Fault: with a prescribed pitch, the chassis' row of eq. (39) has the wrong sign."""
 
     def guidance(*arguments: Any) -> np.ndarray:
-        forces = original(*arguments)
+        forces = original_function(*arguments)
         forces[:, 2:] *= -1.0
         return forces
 
     return guidance
 
 
-def callback_not_installed(original: Any) -> Any:
+def callback_not_installed(original_function: Any) -> Any:
     """Fault: the context that installs a callback does not install it."""
     return lambda law: nullcontext()
 
 
-def negated_result(original: Any) -> Any:
+def negated_result(original_function: Any) -> Any:
     """Fault: a method's result has the opposite sign."""
 
     def method(*arguments: Any) -> Any:
-        answer = original(*arguments)
+        answer = original_function(*arguments)
         return None if answer is None else -answer
 
     return method
@@ -144,7 +144,7 @@ def negated_result(original: Any) -> Any:
 # the equations
 
 
-def rewritten_reference(**functions: Callable[[], Any]) -> Patch:
+def rewritten_reference(**replaced_functions: Callable[[], Any]) -> Patch:
     """Patch that runs the reference without compilation, with some functions of its equations replaced."""
 
     def prepare() -> Context:
@@ -152,7 +152,7 @@ def rewritten_reference(**functions: Callable[[], Any]) -> Patch:
 
         changes = {
             reference: {"_FIXED": {}, "_SINGLE": {}, "njit": lambda **options: lambda function: function},
-            equations: {name: function() for name, function in functions.items()},
+            equations: {name: function() for name, function in replaced_functions.items()},
         }
         return lambda: _patched_functions(changes)
 
@@ -160,9 +160,9 @@ def rewritten_reference(**functions: Callable[[], Any]) -> Patch:
 
 
 @contextmanager
-def _patched_functions(changes: dict[Any, dict[str, Any]]) -> Iterator[None]:
+def _patched_functions(replacements_by_module: dict[Any, dict[str, Any]]) -> Iterator[None]:
     with ExitStack() as stack:
-        for module, replaced in changes.items():
+        for module, replaced in replacements_by_module.items():
             for name, value in replaced.items():
                 stack.enter_context(patch.object(module, name, value))
         yield

@@ -32,34 +32,35 @@ a."""
 
 
 def measure(
-    faults: Sequence[EngineFault] = FAULTS,
-    clean: Sequence[EngineFault] = CONTROLS_WITHOUT_FAULT,
-    vehicles: Sequence[str] = (ASYMMETRIC_SET, SYMMETRIC_SET),
+    engine_faults: Sequence[EngineFault] = FAULTS,
+    faultless_controls: Sequence[EngineFault] = CONTROLS_WITHOUT_FAULT,
+    vehicle_names: Sequence[str] = (ASYMMETRIC_SET, SYMMETRIC_SET),
 ) -> Saved:
     """Records with the ratio of error to tolerance of every check on every vehicle: "clean" without faults, "faults"
     with each fault planted."""
-    benches = [Bench(name, RUN_DURATION) for name in vehicles]
+    benches = [Bench(name, RUN_DURATION) for name in vehicle_names]
     return {
         name: [_error_ratios(fault, benches) for fault in planted_here]
-        for name, planted_here in (("clean", clean), ("faults", faults))
+        for name, planted_here in (("clean", faultless_controls), ("faults", engine_faults))
     }
 
 
-def _error_ratios(fault: EngineFault, benches: list[Bench]) -> Saved:
+def _error_ratios(engine_fault: EngineFault, benches: list[Bench]) -> Saved:
     """Record of a fault: ratio of error to tolerance by vehicle, engine and check; None for a refused or failed run."""
     ratios = {
-        bench.parameters: {
-            engine: {name: _error_ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
+        bench.parameter_set: {
+            engine: {name: _error_ratio(engine_fault, engine, name, bench) for name in CHECKS}
+            for engine in engine_fault.engines
         }
         for bench in benches
     }
-    place_of_fault = next((name for name, group in FAULTS_BY_PLACE.items() if fault in group), "nowhere")
-    return {"fault": fault.name, "place": place_of_fault, "engines": fault.engines, "ratios": ratios}
+    place_of_fault = next((name for name, group in FAULTS_BY_PLACE.items() if engine_fault in group), "nowhere")
+    return {"fault": engine_fault.name, "place": place_of_fault, "engines": engine_fault.engines, "ratios": ratios}
 
 
-def _error_ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | None:
-    check = CHECKS[name]
-    ratio = size_of_error(check, bench, engine, planted_builder(fault, engine)) / check.tolerance(engine)
+def _error_ratio(engine_fault: EngineFault, engine: str, check_name: str, bench: Bench) -> float | None:
+    check = CHECKS[check_name]
+    ratio = size_of_error(check, bench, engine, planted_builder(engine_fault, engine)) / check.tolerance(engine)
     return ratio if math.isfinite(ratio) else None
 
 
@@ -71,23 +72,25 @@ FAULTS_BY_PLACE = {
 }
 
 
-def is_seen(record: Saved, check: str, vehicle: str = ASYMMETRIC_SET) -> bool:
+def is_seen(fault_record: Saved, check_name: str, vehicle_name: str = ASYMMETRIC_SET) -> bool:
     """Whether a check sees the fault of a record on a vehicle, in every engine in which it is planted."""
-    return all(ratio is None or ratio > 1 for ratio in _ratios_of_check(record, check, vehicle))
+    return all(ratio is None or ratio > 1 for ratio in _ratios_of_check(fault_record, check_name, vehicle_name))
 
 
-def smallest_ratio(record: Saved, check: str, vehicle: str) -> float:
+def smallest_ratio(fault_record: Saved, check_name: str, vehicle_name: str) -> float:
     """Smallest ratio of error to tolerance of a check on a vehicle, over the engines; infinite for refused runs."""
-    return min(math.inf if ratio is None else ratio for ratio in _ratios_of_check(record, check, vehicle))
+    return min(
+        math.inf if ratio is None else ratio for ratio in _ratios_of_check(fault_record, check_name, vehicle_name)
+    )
 
 
-def _ratios_of_check(record: Saved, check: str, vehicle: str) -> list[float | None]:
-    return [ratios[check] for ratios in record["ratios"][vehicle].values()]
+def _ratios_of_check(fault_record: Saved, check_name: str, vehicle_name: str) -> list[float | None]:
+    return [ratios[check_name] for ratios in fault_record["ratios"][vehicle_name].values()]
 
 
-def is_caught(record: Saved, vehicle: str = ASYMMETRIC_SET) -> bool:
+def is_caught(fault_record: Saved, vehicle_name: str = ASYMMETRIC_SET) -> bool:
     """Whether at least one check sees the fault of a record on a vehicle, in every engine in which it is planted."""
-    engines = record["ratios"][vehicle].values()
+    engines = fault_record["ratios"][vehicle_name].values()
     return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
 
 
@@ -137,8 +140,8 @@ def _has_symmetric_vehicle(case_data: Saved) -> bool:
     return all(SYMMETRIC_SET in record["ratios"] for record in case_data["faults"])
 
 
-def _hidden_faults_row(faulty: list[Saved]) -> Row:
-    missed = [record for record in faulty if not is_caught(record, SYMMETRIC_SET)]
+def _hidden_faults_row(fault_records: list[Saved]) -> Row:
+    missed = [record for record in fault_records if not is_caught(record, SYMMETRIC_SET)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
     return Observed(
         "planted.hidden",
@@ -219,11 +222,11 @@ def _fault_table(case_data: Saved) -> Table:
     )
 
 
-def _size_text(record: Saved, name: str) -> str:
+def _size_text(fault_record: Saved, check_name: str) -> str:
     """Text with a check's smallest error over the engines on the asymmetric vehicle, or "refused"."""
     sizes = [
-        math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
-        for engine, ratios in record["ratios"][ASYMMETRIC_SET].items()
+        math.inf if ratios[check_name] is None else ratios[check_name] * CHECKS[check_name].tolerance(engine)
+        for engine, ratios in fault_record["ratios"][ASYMMETRIC_SET].items()
     ]
     smallest_error = min(sizes)
     return (

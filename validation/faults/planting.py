@@ -25,8 +25,8 @@ EXUDYN_ONLY, MUJOCO_ONLY, REFERENCE_ONLY = ("exudyn",), ("mujoco",), ("reference
 FORCE_FUNCTIONS = ("force", "pitch")
 
 
-def _unchanged_settings(settings: Settings) -> Settings:
-    return settings
+def _unchanged_settings(run_settings: Settings) -> Settings:
+    return run_settings
 
 
 @dataclass(frozen=True)
@@ -63,21 +63,21 @@ class PlantedModel:
         return self.model.plan()
 
 
-def planted_builder(fault: EngineFault, engine: str) -> ModelBuilder:
+def planted_builder(engine_fault: EngineFault, engine: str) -> ModelBuilder:
     """Returns a function (assembly, settings) -> model that builds models with the fault in an engine."""
 
     def make(assembly: Assembly, settings: Settings) -> PlantedModel:
-        context = fault.patch()
+        context = engine_fault.patch()
         with context():
-            return PlantedModel(context, build(engine, fault.change(assembly), fault.settings(settings)))
+            return PlantedModel(context, build(engine, engine_fault.change(assembly), engine_fault.settings(settings)))
 
     return make
 
 
-def _first_order_settings(settings: Settings) -> Settings:
+def _first_order_settings(run_settings: Settings) -> Settings:
     """Fault: a first-order integrator is used instead of Runge-Kutta."""
     lower = {"RK44": "ExplicitEuler", "RK4": "Euler"}
-    return replace(settings, integrator=lower.get(settings.integrator, settings.integrator))
+    return replace(run_settings, integrator=lower.get(run_settings.integrator, run_settings.integrator))
 
 
 CONTROLS_WITHOUT_FAULT = (

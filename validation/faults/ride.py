@@ -27,11 +27,13 @@ PUBLISHED_INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.599530
 """Published inertia (kg m^2) of the sprung mass of the vehicle R19, body and engine together."""
 
 
-def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
+def _system(
+    vehicle_name: str, road_of_vehicle: Callable[[LinearVehicle], Excitation]
+) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
     from models.ride import excited
 
-    vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(name))
-    met = road(vehicle)
+    vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(vehicle_name))
+    met = road_of_vehicle(vehicle)
     return vehicle, met, excited.vehicle_with_road(vehicle, met, SPEED)
 
 
@@ -115,8 +117,8 @@ def _sprung_inertia_error() -> float:
 
 
 @cache
-def _hand_written_accelerations(name: str) -> np.ndarray:
-    vehicle = vehicle_file.load_vehicle(name)
+def _hand_written_accelerations(vehicle_name: str) -> np.ndarray:
+    vehicle = vehicle_file.load_vehicle(vehicle_name)
     return SpatialReference(vehicle, SPEED).acceleration(0.0, *_small_state(vehicle))
 
 
@@ -170,39 +172,46 @@ CHECKS = {
 }
 
 
-def _vehicle_patch(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
-    """Fault: every vehicle is replaced by change(vehicle) as it is loaded."""
+def _vehicle_patch(change_vehicle: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
+    """Fault: every vehicle is replaced by change_vehicle(vehicle) as it is loaded."""
     return attribute_patch(
-        "models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *arguments: change(real(*arguments))
+        "models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *arguments: change_vehicle(real(*arguments))
     )
 
 
-def _excited_patch(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
-    """Fault: every linear system of vehicle and road is replaced by change(system, speed)."""
+def _excited_patch(change_system: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
+    """Fault: every linear system of vehicle and road is replaced by change_system(system, speed)."""
     return attribute_patch(
-        "models.ride.excited:vehicle_with_road", lambda real: lambda v, e, speed: change(real(v, e, speed), speed)
+        "models.ride.excited:vehicle_with_road",
+        lambda real: lambda v, e, speed: change_system(real(v, e, speed), speed),
     )
 
 
-def _reversed_delays(original: Any) -> Any:
-    def hits(system: DelayedSystem) -> Any:
-        met = original(system)
+def _reversed_delays(original_function: Any) -> Any:
+    def hits(delayed_system: DelayedSystem) -> Any:
+        met = original_function(delayed_system)
         delays = [met.delays[-1] - delay for delay in met.delays[::-1]]
         return met._replace(B=met.B[::-1], D=met.D[::-1], delays=delays)
 
     return hits
 
 
-def _on_front_track(original: Any) -> Any:
-    def row(wheel: WheelPosition, mean: Any, roll: Any, left_right_word: str, wheels: tuple[WheelPosition, ...]) -> Any:
+def _on_front_track(original_function: Any) -> Any:
+    def row(
+        wheel: WheelPosition,
+        mean_process: Any,
+        roll_process: Any,
+        left_right_word: str,
+        wheels: tuple[WheelPosition, ...],
+    ) -> Any:
         y = np.copysign(abs(wheels[0].y), wheel.y)
-        return original(replace(wheel, y=y), mean, roll, left_right_word, wheels)
+        return original_function(replace(wheel, y=y), mean_process, roll_process, left_right_word, wheels)
 
     return row
 
 
-def _opposite_twist(original: Any) -> Any:
-    return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - original(motion, bar)
+def _opposite_twist(original_function: Any) -> Any:
+    return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - original_function(motion, bar)
 
 
 def _mirrored_body(vehicle: SpatialVehicle) -> SpatialVehicle:
@@ -216,19 +225,19 @@ def _mirrored_body(vehicle: SpatialVehicle) -> SpatialVehicle:
 def _opposite_products_of_inertia(vehicle: SpatialVehicle) -> SpatialVehicle:
     """Fault: products of inertia have the opposite sign."""
 
-    def tensor(inertia: Any) -> Any:
-        return tuple(map(tuple, 2.0 * np.diag(np.diag(inertia)) - np.array(inertia)))
+    def tensor(inertia_matrix: Any) -> Any:
+        return tuple(map(tuple, 2.0 * np.diag(np.diag(inertia_matrix)) - np.array(inertia_matrix)))
 
     return replace(vehicle, bodies=tuple(replace(body, inertia=tensor(body.inertia)) for body in vehicle.bodies))
 
 
-def _wrong_wk(original: Any) -> Any:
-    return {**original, "Wk": weighting_of_standard("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
+def _wrong_wk(standard_weightings: Any) -> Any:
+    return {**standard_weightings, "Wk": weighting_of_standard("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
 
 
-def _missing_coupling(original: Any) -> Any:
-    def matrices(weighting: Any) -> Any:
-        A, B, C = original(weighting)
+def _missing_coupling(original_function: Any) -> Any:
+    def matrices(weighting_filter: Any) -> Any:
+        A, B, C = original_function(weighting_filter)
         A = A.copy()
         A[5, 2:4] = 0.0  # what the third section hears of the second
         return A, B, C

@@ -50,9 +50,9 @@ def _mirror_error() -> float:
     )
 
 
-def _read_report(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    report, ledger = np.empty((1, len(car.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
-    at.reports(car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
+def _read_report(handling_car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    report, ledger = np.empty((1, len(handling_car.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
+    at.reports(handling_car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 
@@ -94,15 +94,17 @@ CHECKS = {
 ALL_WHEELS = (0, 1, 2, 3)
 
 
-def tyre_table_patch(column: int, factor: float, tyre_numbers: tuple[int, ...] = (0,), shift: float = 0.0) -> Patch:
+def tyre_table_patch(
+    column_number: int, value_factor: float, tyre_numbers: tuple[int, ...] = (0,), value_shift: float = 0.0
+) -> Patch:
     """Fault: a parameter (column of the table) of some tyres is multiplied by a factor and shifted."""
 
-    def table(original: Any) -> Any:
+    def table(original_function: Any) -> Any:
         def planted(car: Handling) -> np.ndarray:
-            numbers: np.ndarray = original(car)
+            numbers: np.ndarray = original_function(car)
             for i in tyre_numbers:
-                index_in_table = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
-                numbers[index_in_table] = factor * numbers[index_in_table] + shift
+                index_in_table = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column_number
+                numbers[index_in_table] = value_factor * numbers[index_in_table] + value_shift
             return numbers
 
         return planted
@@ -118,7 +120,10 @@ FAULTS = tuple(
         ("friction of all tyres 1 % off", tyre_table_patch(at.GRIP, 1.01, ALL_WHEELS)),
         ("one wheel steered the other way", tyre_table_patch(at.STEERED, -1.0)),
         ("load of one tyre at rest 1 % off", tyre_table_patch(at.STATIC, 1.01)),
-        ("inclination of one wheel, which has none, by half a degree", tyre_table_patch(at.INCLINED, 1.0, shift=9e-3)),
+        (
+            "inclination of one wheel, which has none, by half a degree",
+            tyre_table_patch(at.INCLINED, 1.0, value_shift=9e-3),
+        ),
     )
 )
 

@@ -37,9 +37,9 @@ HALF_DIFFERENCE_TIME = 1e-6
 """Half the time difference (s) over which energies are differentiated."""
 
 
-def equations(law: CreepLaw = "fastsim") -> Equations:
+def equations(creep_law: CreepLaw = "fastsim") -> Equations:
     """The reference's equations of the chosen wheelset, with few contact cells."""
-    return Equations(CHOSEN_WHEELSET, SPEED, law, 7)
+    return Equations(CHOSEN_WHEELSET, SPEED, creep_law, 7)
 
 
 @cache
@@ -85,8 +85,8 @@ def _energy_balance_error() -> float:
     return float(np.abs(missing).max() / np.abs(powers).max())
 
 
-def _contact_report(state: Array, law: CreepLaw = "fastsim") -> Array:
-    return equations(law).at(state[None])[1][0]
+def _contact_report(wheelset_state: Array, creep_law: CreepLaw = "fastsim") -> Array:
+    return equations(creep_law).at(wheelset_state[None])[1][0]
 
 
 def _sliding_force_error() -> float:
@@ -139,13 +139,13 @@ CHECKS = {
 }
 
 
-def plain_python_patch(**functions: Any) -> Patch:
+def plain_python_patch(**replaced_functions: Any) -> Patch:
     """Patch that runs the wheelset's equations as plain Python, contact by contact, with some functions replaced."""
 
     def prepare() -> Context:
         @contextmanager
         def context() -> Iterator[None]:
-            faulty_patches = with_globals(wf.patch_by_patch.py_func, **functions)
+            faulty_patches = with_globals(wf.patch_by_patch.py_func, **replaced_functions)
             faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=faulty_patches)
             plain = {
                 name: getattr(eq, name).py_func for name in ("rates", "set_rates", "workspace_for", "rails_from_tuples")
@@ -158,47 +158,47 @@ def plain_python_patch(**functions: Any) -> Patch:
     return prepare
 
 
-def after_rates_patch(change: Callable[..., None]) -> Patch:
-    """Patch that changes the state's time derivatives by change(state, body, rates) after their computation."""
+def after_rates_patch(change_rates: Callable[..., None]) -> Patch:
+    """Patch that changes the state's time derivatives by change_rates(state, body, rates) after their computation."""
 
-    def with_change(original: Any) -> Any:
-        def rates(state: Any, speed: Any, body: Any, *further: Any) -> None:
-            original(state, speed, body, *further)
-            change(state, eq.Body(*body), further[-2])
+    def with_change(original_function: Any) -> Any:
+        def rates(wheelset_state: Any, speed: Any, body_parameters: Any, *further_arguments: Any) -> None:
+            original_function(wheelset_state, speed, body_parameters, *further_arguments)
+            change_rates(wheelset_state, eq.Body(*body_parameters), further_arguments[-2])
 
         return rates
 
     return attribute_patch("models.rail.equations:rates", with_change)
 
 
-def creep_law_patch(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
-    """Patch of the creep law: its inputs are changed by change(contacts, slip), and its rolling speed is multiplied by
-    the factor ``speed``."""
+def creep_law_patch(change_inputs: Callable[[Any, Any], None], speed_factor: float = 1.0) -> Patch:
+    """Patch of the creep law: its inputs are changed by change_inputs(contacts, slip), and its rolling speed is
+    multiplied by the factor ``speed_factor``."""
 
-    def creep(contacts: Any, slip: Any, velocity: float, *further: Any) -> None:
-        contacts, slip = contacts.copy(), slip.copy()
-        change(contacts, slip)
-        wf.fill_creep_forces(contacts, slip, speed * velocity, *further)
+    def creep(wheel_contacts: Any, slips: Any, rolling_speed: float, *further_arguments: Any) -> None:
+        wheel_contacts, slips = wheel_contacts.copy(), slips.copy()
+        change_inputs(wheel_contacts, slips)
+        wf.fill_creep_forces(wheel_contacts, slips, speed_factor * rolling_speed, *further_arguments)
 
     return plain_python_patch(fill_creep_forces=creep)
 
 
-def contact_point_patch(change: Callable[[Any], None]) -> Patch:
-    """Patch that changes the wheels' contact points by change(touches) after their computation."""
+def contact_point_patch(change_points: Callable[[Any], None]) -> Patch:
+    """Patch that changes the wheels' contact points by change_points(touches) after their computation."""
 
-    def contact_points(pose: Any, rails: Any, touches: Any) -> None:
-        wf.contact_points(pose, rails, touches)
-        change(touches)
+    def contact_points(wheelset_pose: Any, rails: Any, contact_points: Any) -> None:
+        wf.contact_points(wheelset_pose, rails, contact_points)
+        change_points(contact_points)
 
     return plain_python_patch(contact_points=contact_points)
 
 
-def multiplied_field(name: str, factor: float, argument_index: int = 0) -> Callable[..., None]:
+def multiplied_field(field_name: str, field_factor: float, argument_index: int = 0) -> Callable[..., None]:
     """Returns a function that multiplies a field of its argument number ``argument_index``, an array of records, by a
     factor."""
 
-    def change(*arrays: Any) -> None:
-        arrays[argument_index][name] *= factor
+    def change(*record_arrays: Any) -> None:
+        record_arrays[argument_index][field_name] *= field_factor
 
     return change
 
@@ -206,39 +206,49 @@ def multiplied_field(name: str, factor: float, argument_index: int = 0) -> Calla
 spin_reversed = multiplied_field("turn", -1.0, argument_index=1)
 
 
-def _mean_load_on_both_wheels(contacts: Any, slip: Any) -> None:
-    contacts["load"] = contacts["load"].mean()
+def _mean_load_on_both_wheels(wheel_contacts: Any, slips: Any) -> None:
+    wheel_contacts["load"] = wheel_contacts["load"].mean()
 
 
-def _opposite_spin_moment(contacts: Any, slip: Any, *further: Any) -> None:
+def _opposite_spin_moment(wheel_contacts: Any, slips: Any, *further_arguments: Any) -> None:
     """Fault: the creep law gives the spin moment the opposite sign."""
-    wf.fill_creep_forces(contacts, slip, *further)
-    further[-1].forces["mz"] *= -1.0
+    wf.fill_creep_forces(wheel_contacts, slips, *further_arguments)
+    further_arguments[-1].forces["mz"] *= -1.0
 
 
-def _swap_contacts(touches: Any) -> None:
+def _swap_contacts(contact_points: Any) -> None:
     """Fault: each wheel has the contact of the other wheel."""
-    sides = {name: touches[name].copy() for name in ("y", "n_y")}
-    touches[:] = touches[::-1].copy()
+    sides = {name: contact_points[name].copy() for name in ("y", "n_y")}
+    contact_points[:] = contact_points[::-1].copy()
     for name, values in sides.items():
-        touches[name] = values
+        contact_points[name] = values
 
 
-def _no_gyroscope(state: Any, body: Any, rates: Any) -> None:
-    whirl, cosine = body.spin_inertia * state[eq.SPIN] / body.yaw_inertia, np.cos(state[eq.ROLL])
-    rates[eq.ROLL_RATE] -= whirl * state[eq.YAW_RATE] * cosine
-    rates[eq.YAW_RATE] += whirl * state[eq.ROLL_RATE] / cosine
+def _no_gyroscope(wheelset_state: Any, body_parameters: Any, state_rates: Any) -> None:
+    whirl, cosine = (
+        body_parameters.spin_inertia * wheelset_state[eq.SPIN] / body_parameters.yaw_inertia,
+        np.cos(wheelset_state[eq.ROLL]),
+    )
+    state_rates[eq.ROLL_RATE] -= whirl * wheelset_state[eq.YAW_RATE] * cosine
+    state_rates[eq.YAW_RATE] += whirl * wheelset_state[eq.ROLL_RATE] / cosine
 
 
-def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
-    rates[eq.ROLL_RATE] -= body.spin_inertia * state[eq.SPIN] / body.yaw_inertia * state[eq.YAW_RATE]
+def _one_gyroscope(wheelset_state: Any, body_parameters: Any, state_rates: Any) -> None:
+    state_rates[eq.ROLL_RATE] -= (
+        body_parameters.spin_inertia
+        * wheelset_state[eq.SPIN]
+        / body_parameters.yaw_inertia
+        * wheelset_state[eq.YAW_RATE]
+    )
 
 
-def _doubled_damping(original: Any) -> Any:
-    def rates(state: Any, speed: Any, body: Any, *further: Any) -> None:
-        body_record = eq.Body(*body)
+def _doubled_damping(original_function: Any) -> Any:
+    def rates(wheelset_state: Any, speed: Any, body_parameters: Any, *further_arguments: Any) -> None:
+        body_record = eq.Body(*body_parameters)
         x, y, z = body_record.damping
-        original(state, speed, tuple(body_record._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *further)
+        original_function(
+            wheelset_state, speed, tuple(body_record._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *further_arguments
+        )
 
     return rates
 

@@ -29,21 +29,21 @@ from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_
 DIFFERENCE_BOUND = 1e-12
 
 
-def _car_difference(name: str = "twin") -> float:
+def _car_difference(car_name: str = "twin") -> float:
     """Relative difference of the accelerations of a steered and braked car on a rough slope, between MuJoCo and the
     plain equations."""
-    car = rolling_cars()[name]
+    car = rolling_cars()[car_name]
     ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
     return largest_relative_difference(
         *(build_in_engine(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE_ENGINE))
     )
 
 
-def _hub_twin_difference(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
+def _hub_twin_difference(choose_input: Callable[[list[HubInputs]], HubInputs]) -> float:
     """Relative difference of the accelerations of the asymmetric twin under hub forces, between MuJoCo and the plain
-    equations. choose: picks the hub forces."""
+    equations. choose_input: picks the hub forces."""
     vehicle = cut_cars()["twin"]
-    hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
+    hub_inputs, (q, v) = choose_input(hub_input_sets(vehicle)), cut_state(vehicle, 3)
     return largest_relative_difference(
         *(
             hub_model(engine, vehicle, hub_inputs, STEP, STEP).acceleration(0.0, q, v)
@@ -77,25 +77,25 @@ CHECKS = {
 }
 
 
-def _preload_patch(module: str) -> Patch:
+def _preload_patch(module_name: str) -> Patch:
     """Fault: the preload of one spring is 1 % too large."""
 
-    def changed(original: Any) -> Any:
+    def changed(original_function: Any) -> Any:
         def planted(vehicle: SpatialVehicle) -> Preloads:
-            parts, tyres = original(vehicle)
+            parts, tyres = original_function(vehicle)
             first = max(parts, key=lambda name: abs(parts[name]))
             return Preloads(parts | {first: 1.01 * parts[first]}, tyres)
 
         return planted
 
-    return attribute_patch(f"{module}:preloads", changed)
+    return attribute_patch(f"{module_name}:preloads", changed)
 
 
-def _scaled_wave(original: Any) -> Any:
+def _scaled_wave(original_function: Any) -> Any:
     """Fault: the first wave of the road has a 1 % larger amplitude in the table."""
 
     def planted(car: Any) -> np.ndarray:
-        numbers: np.ndarray = original(car)
+        numbers: np.ndarray = original_function(car)
         first = int(numbers[at.OF_WAVES])
         numbers[first + 2 : first + 4] *= 1.01
         return numbers
@@ -103,26 +103,28 @@ def _scaled_wave(original: Any) -> Any:
     return planted
 
 
-def _raised_sample(original: Any) -> Any:
+def _raised_sample(original_function: Any) -> Any:
     """Fault: the road under the first hub is read 0.1 mm too high."""
 
     def planted(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
         hubs = hub_inputs.hubs.copy()
         hubs[:, 0] += 1e-4
-        return np.asarray(original(vehicle, replace(hub_inputs, hubs=hubs), step))
+        return np.asarray(original_function(vehicle, replace(hub_inputs, hubs=hubs), step))
 
     return planted
 
 
-def _towed_marks_cleared(section: int, count_index: int, per_row: int, column: int) -> Callable[[Any], Any]:
+def _towed_marks_cleared(
+    section_index: int, count_index: int, columns_per_row: int, column_index: int
+) -> Callable[[Any], Any]:
     """Fault: the table's column that marks the tyres or springs of a trailer is set to 0."""
 
-    def changed(original: Any) -> Any:
+    def changed(original_function: Any) -> Any:
         def planted(car: Any) -> np.ndarray:
-            numbers: np.ndarray = original(car)
-            first = int(numbers[section])
-            rows = numbers[first : first + int(numbers[count_index]) * per_row].reshape(-1, per_row)
-            rows[:, column] = 0.0
+            numbers: np.ndarray = original_function(car)
+            first = int(numbers[section_index])
+            rows = numbers[first : first + int(numbers[count_index]) * columns_per_row].reshape(-1, columns_per_row)
+            rows[:, column_index] = 0.0
             return numbers
 
         return planted
@@ -130,11 +132,11 @@ def _towed_marks_cleared(section: int, count_index: int, per_row: int, column: i
     return changed
 
 
-def _stiff_bars(original: Any) -> Any:
+def _stiff_bars(original_function: Any) -> Any:
     """Fault: anti-roll bars of a car on tyres are 1 % too stiff."""
 
     def planted(*arguments: Any) -> Iterator[Any]:
-        for row, curves in original(*arguments):
+        for row, curves in original_function(*arguments):
             yield [1.01 * row[0], *row[1:]], curves
 
     return planted
@@ -143,9 +145,9 @@ def _stiff_bars(original: Any) -> Any:
 def _swapped_numbers(first_index: int, second_index: int) -> Callable[[Any], Any]:
     """Fault: two numbers in a row of the table are exchanged."""
 
-    def changed(original: Any) -> Any:
+    def changed(original_function: Any) -> Any:
         def planted(*arguments: Any) -> list[float]:
-            row = list(original(*arguments))
+            row = list(original_function(*arguments))
             row[first_index], row[second_index] = row[second_index], row[first_index]
             return row
 
@@ -154,36 +156,36 @@ def _swapped_numbers(first_index: int, second_index: int) -> Callable[[Any], Any
     return changed
 
 
-def _turned_bar(original: Any) -> Any:
+def _turned_bar(original_function: Any) -> Any:
     """Fault: anti-roll bars of a cut car act in the opposite direction."""
 
-    def planted(element: Any, joined: Any) -> list[float]:
-        row: list[float] = original(element, joined)
-        if not np.isclose(np.linalg.norm(element.axis), 1.0):
+    def planted(bar_element: Any, joined_bodies: Any) -> list[float]:
+        row: list[float] = original_function(bar_element, joined_bodies)
+        if not np.isclose(np.linalg.norm(bar_element.axis), 1.0):
             row[cut_at.AXIS : cut_at.AXIS + 3] = [-value for value in row[cut_at.AXIS : cut_at.AXIS + 3]]
         return row
 
     return planted
 
 
-def _changed_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
-    """Fault: in the engine, the inertia of the heaviest body is replaced by change(inertia)."""
+def _changed_inertia(change_inertia: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
+    """Fault: in the engine, the inertia of the heaviest body is replaced by change_inertia(inertia)."""
 
-    def changed(original: Any) -> Any:
+    def changed(original_function: Any) -> Any:
         def planted(vehicle: SpatialVehicle, *arguments: Any) -> Any:
             heavy = max(vehicle.bodies, key=lambda body: body.mass)
-            x, y, z = change(np.array(heavy.inertia)).tolist()
+            x, y, z = change_inertia(np.array(heavy.inertia)).tolist()
             other_body = replace(heavy, inertia=(tuple(x), tuple(y), tuple(z)))
             bodies = tuple(other_body if body is heavy else body for body in vehicle.bodies)
-            return original(replace(vehicle, bodies=bodies), *arguments)
+            return original_function(replace(vehicle, bodies=bodies), *arguments)
 
         return planted
 
     return changed
 
 
-def _turned_products(inertia: np.ndarray) -> np.ndarray:
-    return 2.0 * np.diag(np.diag(inertia)) - inertia
+def _turned_products(inertia_matrix: np.ndarray) -> np.ndarray:
+    return 2.0 * np.diag(np.diag(inertia_matrix)) - inertia_matrix
 
 
 TABLE_WRITER, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"

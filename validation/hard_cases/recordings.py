@@ -89,7 +89,7 @@ CASES = (
                 "dead channel",
                 "a constant is a valid number",
                 "named as dead",
-                planted_fault_case("clipped", "fr_fz", None, bench.scaled_channels(0.0, "fr_fz", add=3e3)),
+                planted_fault_case("clipped", "fr_fz", None, bench.scaled_channels(0.0, "fr_fz", offset=3e3)),
             ),
             (
                 "front wheels exchanged",

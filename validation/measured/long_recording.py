@@ -35,13 +35,13 @@ SEED = 81
 
 
 @cache
-def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[MeasuredSignal, ...], np.ndarray]:
+def repeated_pattern(pattern_duration: float = 20.0) -> tuple[tuple[MeasuredSignal, ...], np.ndarray]:
     """Signals, and their samples without noise (n, 60): one repetition of the recording, with the transition to the
     next one."""
     car = r19()
     names = [element.name for element in car.elements]
     table = VirtualTable(
-        duration=seconds,
+        duration=pattern_duration,
         accelerometers={name: list(sensor_position) for name, sensor_position in SENSOR_PLACES.items()},
         travels=names[:10],
         sections=names[:9],
@@ -51,11 +51,11 @@ def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[MeasuredSignal, ...],
     return virtual.signals, virtual.samples(SimulatedFaults(), 1)
 
 
-def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.ndarray]:
+def sample_blocks(duration: float, pattern_seconds: float = 20.0) -> Iterator[np.ndarray]:
     """Samples (n, 60) of a recording of a given length (s), returned block by block."""
     signals, pattern = repeated_pattern(pattern_seconds)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
-    length, count = len(pattern) - SEAM_SAMPLES, round(seconds / SAMPLE_PERIOD) + 1
+    length, count = len(pattern) - SEAM_SAMPLES, round(duration / SAMPLE_PERIOD) + 1
     fade = np.linspace(0.0, 1.0, SEAM_SAMPLES, endpoint=False)[:, None]
     once = pattern[:length].copy()
     once[:SEAM_SAMPLES] = fade * pattern[:SEAM_SAMPLES] + (1 - fade) * pattern[length:]
@@ -67,12 +67,12 @@ def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.
         yield values + normal_samples(SEED, 0, len(sample_numbers), 60, first) * deviation
 
 
-def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) -> Recording:
-    """The long recording as an object, without any measurement files. Its samples are stored at ``path`` and are
-    created if they are missing."""
+def long_recording(duration: float, samples_path: Path, pattern_seconds: float = 20.0) -> Recording:
+    """The long recording as an object, without any measurement files. Its samples are stored at ``samples_path`` and
+    are created if they are missing."""
     signals, _ = repeated_pattern(pattern_seconds)
-    columns = SampleFile(path, tuple(signal.name for signal in signals), round(seconds / SAMPLE_PERIOD) + 1)
-    for values in sample_blocks(seconds, pattern_seconds) if columns.done == 0 else ():
+    columns = SampleFile(samples_path, tuple(signal.name for signal in signals), round(duration / SAMPLE_PERIOD) + 1)
+    for values in sample_blocks(duration, pattern_seconds) if columns.done == 0 else ():
         columns.write(columns.done, values)
     assert columns.done == columns.count
     return Recording(signals, columns, SAMPLE_PERIOD)
@@ -89,26 +89,31 @@ def recorded_sections() -> Sections:
 
 
 def section_run_of_recording(
-    folder: Path,
-    seconds: float,
+    run_folder: Path,
+    duration: float,
     pattern_seconds: float = 20.0,
     engine: str = "mujoco",
-    hold: AttitudeHold | None = None,
-    step: float | None = None,
+    attitude_hold: AttitudeHold | None = None,
+    time_step: float | None = None,
 ) -> SectionRunSettings:
     """A run that computes section forces from the long recording in this folder. The recording is created if it is
     missing."""
-    recording = long_recording(seconds, folder / "recording.f64", pattern_seconds)
-    return SectionRunSettings(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
+    recording = long_recording(duration, run_folder / "recording.f64", pattern_seconds)
+    return SectionRunSettings(r19(), recording, recorded_sections(), engine, attitude_hold or AttitudeHold(), time_step)
 
 
-def computed_channel_bytes(folder: Path, name: str = "run") -> bytes:
+def computed_channel_bytes(run_folder: Path, run_name: str = "run") -> bytes:
     """All computed channels of a finished run, as bytes."""
-    return (folder / name / "run.f64").read_bytes()
+    return (run_folder / run_name / "run.f64").read_bytes()
 
 
 def run_killed_process(
-    folder: Path, seconds: float, pattern_seconds: float, block: float, kill_count: int, kill_window: float = 1.0
+    run_folder: Path,
+    duration: float,
+    pattern_seconds: float,
+    block_duration: float,
+    kill_count: int,
+    kill_window: float = 1.0,
 ) -> int:
     """Do the run in a separate process that is killed (signal 9) ``kill_count`` times at random moments and restarted
     each time. Returns the number of starts.
@@ -120,7 +125,7 @@ def run_killed_process(
         sys.executable,
         "-m",
         "validation.measured.long_recording",
-        *map(str, (folder, seconds, pattern_seconds, block)),
+        *map(str, (run_folder, duration, pattern_seconds, block_duration)),
     ]
     while True:
         runs += 1
@@ -137,17 +142,17 @@ def run_killed_process(
                 raise RuntimeError(f"the run ended with {process.returncode}")
 
 
-def _main(folder: str, seconds: str, pattern_seconds: str, block: str, step: str = "") -> None:
+def _main(run_folder: str, duration: str, pattern_seconds: str, block_duration: str, time_step: str = "") -> None:
     """Start or continue a run. For every block, print the seconds completed, the peak memory (bytes) and the processor
     time (s)."""
 
-    def report_block(completed: float, total: float) -> None:
-        print(completed, peak_memory(), time.process_time(), flush=True)
+    def report_block(completed_seconds: float, total_seconds: float) -> None:
+        print(completed_seconds, peak_memory(), time.process_time(), flush=True)
 
     job = section_run_of_recording(
-        Path(folder), float(seconds), float(pattern_seconds), step=float(step) if step else None
+        Path(run_folder), float(duration), float(pattern_seconds), time_step=float(time_step) if time_step else None
     )
-    run(job, Path(folder) / "run", report_block, float(block))
+    run(job, Path(run_folder) / "run", report_block, float(block_duration))
 
 
 if __name__ == "__main__":

@@ -32,14 +32,14 @@ TELEPHONE_TO_CAR = np.array([1.0, -1.0, -1.0])
 """Signs that turn the telephone's axes (x forward, y right, z down) into the car's (x forward, y left, z up)."""
 
 
-def samples(path: Path) -> np.ndarray:
+def samples(recording_path: Path) -> np.ndarray:
     """Samples (n, channels) of the telephone's sensors, and of the roll and pitch angles from its camera, in SI units
     and ISO 8855 axes.
 
     Roll and pitch are angles to the vertical at the place of the car, which points away from the earth's centre.
     """
-    read_car = car.read_recording(path)
-    with np.load(path) as data:
+    read_car = car.read_recording(recording_path)
+    with np.load(recording_path) as data:
         begin, end = (side([data["gyro_t"][i], data["frame_t"][i]]) for side, i in ((max, 0), (min, -1)))
         clock = np.arange(begin, end, car.SAMPLE_PERIOD)
         felt = np.column_stack([np.interp(clock, data["acc_t"], column) for column in data["acc"].T])
@@ -58,10 +58,10 @@ def samples(path: Path) -> np.ndarray:
     )
 
 
-def phone_recording(values: np.ndarray, path: Path) -> Recording:
-    """A recording object for samples (n, channels). They are written to ``path``."""
-    columns = SampleFile(path, tuple(name for name, *_ in CHANNELS), len(values))
-    columns.write(0, values)
+def phone_recording(samples_of_phone: np.ndarray, output_path: Path) -> Recording:
+    """A recording object for samples (n, channels). They are written to ``output_path``."""
+    columns = SampleFile(output_path, tuple(name for name, *_ in CHANNELS), len(samples_of_phone))
+    columns.write(0, samples_of_phone)
     signals = tuple(
         MeasuredSignal(name, "", name, quantity, "body", component, "body", 1, "", 1.0)
         for name, quantity, component in CHANNELS
@@ -69,13 +69,13 @@ def phone_recording(values: np.ndarray, path: Path) -> Recording:
     return Recording(signals, columns, car.SAMPLE_PERIOD)
 
 
-def recording_scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
+def recording_scene(recording_path: Path, vehicle: CutVehicle, scene_folder: Path) -> MeasuredScene:
     """A scene made of the public recording, with three files that have different clocks.
 
     The signs in its channel table turn the telephone's axes (x forward, y right, z down) into those of ISO 8855.
     """
-    folder.mkdir(parents=True)
-    with np.load(path) as data:
+    scene_folder.mkdir(parents=True)
+    with np.load(recording_path) as data:
         start, count = data["acc_t"][0], int((data["acc_t"][-1] - data["acc_t"][0]) * 100)
         camera = Rotation.from_quat(data["frame_q"], scalar_first=True).as_matrix()
         downward = -data["frame_p"] / np.linalg.norm(data["frame_p"], axis=1, keepdims=True)
@@ -108,7 +108,12 @@ def recording_scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredSc
     for name, (clock_times, columns) in tables.items():
         header = ",".join(("time [s]", *(f"{row[0]} [{row[-1]}]" for row in rows[name])))
         np.savetxt(
-            folder / f"{name}.csv", np.column_stack([clock_times, *columns]), "%.9g", ",", header=header, comments=""
+            scene_folder / f"{name}.csv",
+            np.column_stack([clock_times, *columns]),
+            "%.9g",
+            ",",
+            header=header,
+            comments="",
         )
     files = [
         {"file": f"{name}.csv", "channels": [dict(zip(keys, row, strict=True)) for row in rows_of_file]}
@@ -124,5 +129,5 @@ def recording_scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredSc
             "files": files,
         },
         "scene.toml",
-        folder,
+        scene_folder,
     )

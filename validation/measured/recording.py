@@ -32,9 +32,9 @@ def find_recording() -> Path | None:
     return folder / RECORDING_FILE if folder and (folder / RECORDING_FILE).is_file() else None
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(recording_path: Path) -> Recording:
     """Rates and poses on a common clock. Rates are interpolated linearly, poses along the shortest rotation."""
-    with np.load(path) as data:
+    with np.load(recording_path) as data:
         gyro_times, frame_times = data["gyro_t"], data["frame_t"]
         clock = np.arange(max(gyro_times[0], frame_times[0]), min(gyro_times[-1], frame_times[-1]), SAMPLE_PERIOD)
         free = data["gyro"] - data["gyro_bias"]

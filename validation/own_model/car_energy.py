@@ -13,15 +13,17 @@ REVERSED_JOINTS = ("rl swing", "rr swing", "rl spin", "rr spin")
 """Joints of the file whose axes point along -y."""
 
 
-def largest_energy_difference(handling: Handling, state_count: int) -> float:
+def largest_energy_difference(handling_car: Handling, state_count: int) -> float:
     """Largest difference between MuJoCo's energies and twinrig's (kinetic, gravity and springs) at ``state_count``
     random states, divided by the largest energy.
 
     Equal energies at all states are equal equations of motion, but for dampers and tyres.
     """
-    draw, n = np.random.default_rng(1), len(handling.vehicle.coordinates())
+    draw, n = np.random.default_rng(1), len(handling_car.vehicle.coordinates())
     states = [(draw.uniform(-0.3, 0.3, n), draw.uniform(-3.0, 3.0, n)) for _ in range(state_count)]
-    pairs = np.array([(_energy_by_mujoco(handling, *each), _energy_by_description(handling, *each)) for each in states])
+    pairs = np.array(
+        [(_energy_by_mujoco(handling_car, *each), _energy_by_description(handling_car, *each)) for each in states]
+    )
     return float(np.abs(np.diff(pairs, axis=1)).max() / np.abs(pairs).max())
 
 
@@ -37,12 +39,12 @@ def _coordinate_names() -> dict[str, tuple[str, str]]:
     return places
 
 
-def _energy_by_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+def _energy_by_mujoco(handling_car: Handling, q: np.ndarray, v: np.ndarray) -> float:
     """Energy (J), kinetic, of gravity and of springs, by MuJoCo's own model of the file, at coordinates and rates
     (n,)."""
     model = mujoco.MjModel.from_xml_string(SALOON)
-    data, coordinates = mujoco.MjData(model), handling.vehicle.coordinates()
-    motion = SpatialReference(handling.vehicle).motions_of(q, v)["body"]
+    data, coordinates = mujoco.MjData(model), handling_car.vehicle.coordinates()
+    motion = SpatialReference(handling_car.vehicle).motions_of(q, v)["body"]
     arm, turning = motion.rotation @ model.body("body").ipos, motion.turn @ v
     data.qpos[:3], data.qvel[:3] = motion.centre - arm, motion.shift @ v - np.cross(turning, arm)
     mujoco.mju_mat2Quat(data.qpos[3:7], motion.rotation.ravel())
@@ -58,11 +60,11 @@ def _energy_by_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float
     return float(data.energy[0] + 0.5 * data.qvel @ mass @ data.qvel)
 
 
-def _energy_by_description(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+def _energy_by_description(handling_car: Handling, q: np.ndarray, v: np.ndarray) -> float:
     """Energy (J) of bodies and springs by twinrig's description of the vehicle, at coordinates and rates (n,); springs
     have no preload, as in MuJoCo's file."""
-    places, springs = handling.vehicle.coordinates(), 0.0
-    for e in handling.vehicle.joint_elements:
+    places, springs = handling_car.vehicle.coordinates(), 0.0
+    for e in handling_car.vehicle.joint_elements:
         travel = sum(k * q[places.index(at)] for at, k in zip(e.coordinates, e.factors, strict=True))
         springs += 0.5 * e.stiffness * travel**2
-    return bodies_energy(handling, q, v) + springs
+    return bodies_energy(handling_car, q, v) + springs

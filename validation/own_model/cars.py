@@ -6,32 +6,32 @@ RADIUS = 0.31
 """Height of the wheels' centres above the road, m."""
 
 
-def _front_strut_text(name: str, side_sign: int) -> str:
+def _front_strut_text(corner_name: str, side_sign: int) -> str:
     """MJCF text of a front strut with a steered upright and a spinning wheel; ``side_sign`` is 1 left and -1 right."""
-    x, y = CORNERS[name]
+    x, y = CORNERS[corner_name]
     return f"""
-  <body name="{name} strut" pos="{x} {y} {RADIUS - 0.55}">
-   <joint name="{name} travel" type="slide" axis="0 0 1" stiffness="24000" damping="1700" range="-.09 .1"/>
+  <body name="{corner_name} strut" pos="{x} {y} {RADIUS - 0.55}">
+   <joint name="{corner_name} travel" type="slide" axis="0 0 1" stiffness="24000" damping="1700" range="-.09 .1"/>
    <inertial pos="0 {-0.1 * side_sign} .03" mass="14" diaginertia=".2 .3 .25"/>
-   <body name="{name} upright"><joint name="{name} steer" axis="0 0 1" damping="5" armature=".1"/>
+   <body name="{corner_name} upright"><joint name="{corner_name} steer" axis="0 0 1" damping="5" armature=".1"/>
     <inertial pos="0 {-0.05 * side_sign} 0" mass="5" diaginertia=".05 .04 .05"/>
-    <body name="{name} wheel"><joint name="{name} spin" axis="0 1 0"/>
+    <body name="{corner_name} wheel"><joint name="{corner_name} spin" axis="0 1 0"/>
      <inertial pos="0 {0.02 * side_sign} 0" mass="17" diaginertia=".6 1.1 .6"/>
-     <geom name="{name} rim" type="cylinder" size="{RADIUS} .1" euler="90 0 0" mass="0"/>
-     <site name="tyre {name}" user="190000 150 62000"/></body></body></body>"""
+     <geom name="{corner_name} rim" type="cylinder" size="{RADIUS} .1" euler="90 0 0" mass="0"/>
+     <site name="tyre {corner_name}" user="190000 150 62000"/></body></body></body>"""
 
 
-def _rear_arm_text(name: str, side_sign: int) -> str:
+def _rear_arm_text(corner_name: str, side_sign: int) -> str:
     """MJCF text of a rear trailing arm with a sprung hinge and a spinning wheel; ``side_sign`` is 1 left and -1
     right."""
-    x, y = CORNERS[name]
+    x, y = CORNERS[corner_name]
     return f"""
-  <body name="{name} arm" pos="{x + 0.4} {y - 0.1 * side_sign} {RADIUS + 0.02 - 0.55}">
-   <joint name="{name} swing" axis="0 -1 0" stiffness="3900" damping="260" armature=".4" range="-.3 .3"/>
+  <body name="{corner_name} arm" pos="{x + 0.4} {y - 0.1 * side_sign} {RADIUS + 0.02 - 0.55}">
+   <joint name="{corner_name} swing" axis="0 -1 0" stiffness="3900" damping="260" armature=".4" range="-.3 .3"/>
    <inertial pos="-.2 {0.03 * side_sign} 0" mass="11" fullinertia=".1 .3 .32 .01 0 .004"/>
-   <body name="{name} wheel" pos="-.4 {0.1 * side_sign} -.02"><joint name="{name} spin" axis="0 -1 0"/>
+   <body name="{corner_name} wheel" pos="-.4 {0.1 * side_sign} -.02"><joint name="{corner_name} spin" axis="0 -1 0"/>
     <inertial pos="0 0 0" mass="18" diaginertia=".6 1.2 .6"/>
-    <site name="hub_{name}" user="185000 150 58000"/></body></body>"""
+    <site name="hub_{corner_name}" user="185000 150 58000"/></body></body>"""
 
 
 SALOON = f"""<mujoco model="saloon"><compiler angle="radian"/><option gravity="0 0 -9.81"/>

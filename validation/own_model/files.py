@@ -122,8 +122,8 @@ def random_chain(body_count: int, seed: int = 1) -> str:
     random."""
     draw = np.random.default_rng(seed)
 
-    def row(low: float, high: float, value_count: int) -> str:
-        return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, value_count))
+    def row(lower_limit: float, upper_limit: float, value_count: int) -> str:
+        return " ".join(f"{number:.4g}" for number in draw.uniform(lower_limit, upper_limit, value_count))
 
     text = ""
     for i in range(body_count):
@@ -147,26 +147,27 @@ def random_tree(body_count: int, seed: int) -> str:
     for i in range(1, body_count):
         children.setdefault(int(draw.integers(i)), []).append(i)
 
-    def row(low: float, high: float, value_count: int) -> str:
-        return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, value_count))
+    def row(lower_limit: float, upper_limit: float, value_count: int) -> str:
+        return " ".join(f"{number:.4g}" for number in draw.uniform(lower_limit, upper_limit, value_count))
 
-    def body(i: int) -> str:
-        kind = "free" if i == 0 else str(draw.choice(["hinge", "hinge", "slide", "ball"]))
+    def body(body_number: int) -> str:
+        kind = "free" if body_number == 0 else str(draw.choice(["hinge", "hinge", "slide", "ball"]))
         laws = f'damping="{row(0, 1, 1)}" stiffness="{row(0, 5, 1)}"' if kind in ("hinge", "slide") else ""
         return (
-            f'<body name="b{i}" pos="{row(-0.3, 0.3, 3)}" euler="{row(-90, 90, 3)}">'
-            f'<joint name="j{i}" type="{kind}" axis="{row(-1, 1, 3)}" pos="{"0 0 0" if i == 0 else row(-0.1, 0.1, 3)}" '
+            f'<body name="b{body_number}" pos="{row(-0.3, 0.3, 3)}" euler="{row(-90, 90, 3)}">'
+            f'<joint name="j{body_number}" type="{kind}" axis="{row(-1, 1, 3)}" '
+            f'pos="{"0 0 0" if body_number == 0 else row(-0.1, 0.1, 3)}" '
             f'{laws}/><inertial pos="{row(-0.1, 0.1, 3)}" quat="{row(-1, 1, 4)}" mass="{row(0.5, 2, 1)}" '
-            f'diaginertia="{row(0.1, 0.15, 3)}"/>{"".join(map(body, children.get(i, [])))}</body>'
+            f'diaginertia="{row(0.1, 0.15, 3)}"/>{"".join(map(body, children.get(body_number, [])))}</body>'
         )
 
     return f'<mujoco model="tree"><worldbody>{body(0)}</worldbody></mujoco>'
 
 
-def model_with_change(text: str, name: str, old_text: str, new_text: str) -> str:
+def model_with_change(model_text: str, element_name: str, old_text: str, new_text: str) -> str:
     """Text of a model file in which the first ``old_text`` after the name of an element is replaced by ``new_text``."""
-    there = text.index(old_text, text.index(f'"{name}"'))
-    return text[:there] + new_text + text[there + len(old_text) :]
+    there = model_text.index(old_text, model_text.index(f'"{element_name}"'))
+    return model_text[:there] + new_text + model_text[there + len(old_text) :]
 
 
 PLANTED_DIFFERENCES = [

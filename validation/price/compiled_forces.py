@@ -24,14 +24,17 @@ HEADER_LENGTH = 17
 
 def _compiled_callback(numeric_offset, passive_force_offset, time_offset, position_offset, velocity_offset):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def force_callback(model, case_data):
-        header = carray(array_at(model, numeric_offset), (HEADER_LENGTH,))
-        row = int(np.rint(carray(double_at(case_data, time_offset), (1,))[0] * header[0]))
+    def force_callback(mujoco_model, mujoco_data):
+        header = carray(array_at(mujoco_model, numeric_offset), (HEADER_LENGTH,))
+        row = int(np.rint(carray(double_at(mujoco_data, time_offset), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
             return
-        road = carray(array_at(model, numeric_offset), (HEADER_LENGTH + 4 * int(header[1]),))
-        q, v = carray(array_at(case_data, position_offset), (4,)), carray(array_at(case_data, velocity_offset), (4,))
-        force = carray(array_at(case_data, passive_force_offset), (4,))
+        road = carray(array_at(mujoco_model, numeric_offset), (HEADER_LENGTH + 4 * int(header[1]),))
+        q, v = (
+            carray(array_at(mujoco_data, position_offset), (4,)),
+            carray(array_at(mujoco_data, velocity_offset), (4,)),
+        )
+        force = carray(array_at(mujoco_data, passive_force_offset), (4,))
         road_index = HEADER_LENGTH + 4 * row
         a, b = header[2], header[3]
         sine, cosine = np.sin(q[3]), np.cos(q[3])
@@ -56,13 +59,13 @@ def force_callback() -> Any:
 class CompiledForces:
     """A vehicle on a road as a MuJoCo model of bodies without springs; one compiled callback computes all forces."""
 
-    def __init__(self, assembly: Assembly, settings: Settings) -> None:
-        self.assembly, self.settings = assembly, settings
+    def __init__(self, assembly: Assembly, run_settings: Settings) -> None:
+        self.assembly, self.settings = assembly, run_settings
         bare = replace(assembly.vehicle, struts=())
-        spec = adapter.specification(bare, settings)
+        spec = adapter.specification(bare, run_settings)
         assert assembly.input is not None
-        table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1)
-        header = [2.0 / settings.step, len(table), *assembly.parameters.array()]
+        table = assembly.input.sample(0.0, run_settings.step / 2, 2 * run_settings.steps + 1)
+        header = [2.0 / run_settings.step, len(table), *assembly.parameters.array()]
         content = np.concatenate((header, table.ravel()))
         spec.add_numeric(name="input", size=len(content), data=[0.0])
         self.model = spec.compile()

@@ -32,24 +32,24 @@ class ProcessCost(NamedTuple):
     seconds: float
 
 
-def write_table(path: Path, row_count: int) -> None:
+def write_table(table_path: Path, row_count: int) -> None:
     """Write a table (CSV) of contacts with creepages from rolling to sliding; row_count : a multiple of
     REPEATED_ROWS."""
     lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(REPEATED_ROWS))
     text = "".join(lines)
-    with path.open("w") as file:
+    with table_path.open("w") as file:
         file.write(HEADER)
         file.writelines(text for _ in range(row_count // REPEATED_ROWS))
 
 
-def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
+def cost_of_table(work_folder: Path, row_count: int) -> ProcessCost:
     """Compute a table of ``row_count`` contacts into ``forces.csv``, with few cells and without error estimates;
     returns the cost."""
-    write_table(folder / "cases.csv", row_count)
+    write_table(work_folder / "cases.csv", row_count)
     start_time = time.perf_counter()
     counts = solve_table(
-        folder / "cases.csv",
-        folder / "forces.csv",
+        work_folder / "cases.csv",
+        work_folder / "forces.csv",
         partial(Built, MaterialPair()),
         ContactMethod(cells=5),
         with_errors=False,
@@ -59,10 +59,10 @@ def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
     return ProcessCost(peak_memory(), time.perf_counter() - start_time)
 
 
-def in_fresh_process(function: Callable[[Path, int], ProcessCost], row_count: int) -> ProcessCost:
-    """Cost that function(folder, row_count) returns, computed in a new process."""
+def in_fresh_process(cost_function: Callable[[Path, int], ProcessCost], row_count: int) -> ProcessCost:
+    """Cost that cost_function(folder, row_count) returns, computed in a new process."""
     with TemporaryDirectory() as name, process_pool(1) as executor:
-        process_cost: ProcessCost = executor.submit(function, Path(name), row_count).result()
+        process_cost: ProcessCost = executor.submit(cost_function, Path(name), row_count).result()
         return process_cost
 
 

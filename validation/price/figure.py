@@ -114,9 +114,9 @@ def _curve_styles(measured_points: WorkPrecisionPoints) -> dict[str, Style]:
     return styles
 
 
-def _engine_colour(point: WorkPrecisionPoint, measured_points: WorkPrecisionPoints) -> str:
+def _engine_colour(measured_point: WorkPrecisionPoint, measured_points: WorkPrecisionPoints) -> str:
     """Colour of the engine of a measured point; engines that are not in COLOURS get one of FAMILY_COLOURS."""
-    engine = point.setting.engine
+    engine = measured_point.setting.engine
     other_engines = [
         name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS
     ]
@@ -124,59 +124,69 @@ def _engine_colour(point: WorkPrecisionPoint, measured_points: WorkPrecisionPoin
 
 
 def _plot_curve(
-    ax: Axes, measured_points: WorkPrecisionPoints, points: list[WorkPrecisionPoint], cost_kind: str, style: Style
+    panel: Axes,
+    measured_points: WorkPrecisionPoints,
+    curve_points: list[WorkPrecisionPoint],
+    cost_kind: str,
+    curve_style: Style,
 ) -> None:
     """Plot one curve. Points with errors below the accuracy of the reference are hollow; points timed once are
     small."""
-    point_positions = [(p.cost(cost_kind), measured_points.error(p)) for p in points]
-    ax.plot(*zip(*point_positions, strict=True), **{**style, "marker": "none"}, alpha=0.75)
+    point_positions = [(p.cost(cost_kind), measured_points.error(p)) for p in curve_points]
+    panel.plot(*zip(*point_positions, strict=True), **{**curve_style, "marker": "none"}, alpha=0.75)
     points_by_look = defaultdict(list)
-    for p, point_position in zip(points, point_positions, strict=True):
+    for p, point_position in zip(curve_points, point_positions, strict=True):
         points_by_look[
             point_position[1] < measured_points.judging_floor(), cost_kind == "seconds" and p.changed is None
         ].append(point_position)
     for (hollow, once), points_alike in points_by_look.items():
-        look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
-        face = "white" if hollow else style["color"]
-        ax.plot(*zip(*points_alike, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
-    for p, point_position in zip(points, point_positions, strict=True):
+        look = {
+            **curve_style,
+            "linestyle": "none",
+            "markersize": curve_style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0),
+        }
+        face = "white" if hollow else curve_style["color"]
+        panel.plot(*zip(*points_alike, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
+    for p, point_position in zip(curve_points, point_positions, strict=True):
         if p.broken:
-            ax.plot(*point_position, **BROKEN_STYLE)
+            panel.plot(*point_position, **BROKEN_STYLE)
 
 
-def _shade_floor(ax: Axes, measured_points: WorkPrecisionPoints) -> None:
+def _shade_floor(panel: Axes, measured_points: WorkPrecisionPoints) -> None:
     """Shade the range of errors below the accuracy of the reference solution."""
     known = measured_points.uncertainty[measured_points.quantity]
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.judging_floor(), 0.25)):
-        ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
+        panel.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
     floor_text = f"reference known to {known:.1g} {measured_points.unit} (dark);\nbelow ten times that: hollow"
-    ax.text(0.015, 0.012, floor_text, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
+    panel.text(
+        0.015, 0.012, floor_text, transform=panel.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY
+    )
 
 
-def _plot_front(ax: Axes, measured_points: WorkPrecisionPoints, cost_kind: str) -> None:
+def _plot_front(panel: Axes, measured_points: WorkPrecisionPoints, cost_kind: str) -> None:
     """Plot the Pareto front of error and cost as a broad pale line behind the curves."""
     front = measured_points.pareto_points(cost_kind)
     costs = [p.cost(cost_kind) for p in front]
-    ax.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
+    panel.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
 
 
-def _mark_defaults(ax: Axes, measured_points: WorkPrecisionPoints, cost_kind: str) -> None:
+def _mark_defaults(panel: Axes, measured_points: WorkPrecisionPoints, cost_kind: str) -> None:
     """Mark each engine's default setting with a ring, and label it where the panel has most space."""
-    taken_positions, names = _line_points(ax), list[np.ndarray]()
+    taken_positions, names = _line_points(panel), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured_points.defaults.items():
         if p.status != "ok":
             continue
         default_position = (p.cost(cost_kind), measured_points.error(p))
-        ax.plot(*default_position, "o", **ring, zorder=5)
-        around = _fractions_of_panel(ax, [default_position])[0]
+        panel.plot(*default_position, "o", **ring, zorder=5)
+        around = _fractions_of_panel(panel, [default_position])[0]
         corner = _emptiest_corner(taken_positions, around, names)
         names.append(corner + LABEL_SIZE * np.array([0.5, 0.0]))
         leader_line = around + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - around)
         taken_positions = np.vstack(
             [taken_positions, corner + LABEL_SIZE * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), leader_line]
         )
-        ax.annotate(
+        panel.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
             default_position,
             fontsize=SMALL_TEXT,
@@ -189,48 +199,52 @@ def _mark_defaults(ax: Axes, measured_points: WorkPrecisionPoints, cost_kind: st
         )
 
 
-def _fractions_of_panel(ax: Axes, data_positions: Any) -> np.ndarray:
+def _fractions_of_panel(panel: Axes, data_positions: Any) -> np.ndarray:
     """Positions (n, 2) as fractions of the panel, from positions (n, 2) in data units."""
-    return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(data_positions, float)))
+    return np.asarray((panel.transData - panel.transAxes).transform(np.asarray(data_positions, float)))
 
 
-def _line_points(ax: Axes) -> np.ndarray:
+def _line_points(panel: Axes) -> np.ndarray:
     """Points (n, 2) along all lines of a panel, as fractions of the panel."""
     points = [np.empty((0, 2))]
-    for line in ax.get_lines():
-        ends = _fractions_of_panel(ax, line.get_xydata())
+    for line in panel.get_lines():
+        ends = _fractions_of_panel(panel, line.get_xydata())
         points += [a + (b - a) * np.linspace(0.0, 1.0, 9)[:, None] for a, b in pairwise(ends)] + [ends]
     return np.vstack(points)
 
 
-def _emptiest_corner(taken_positions: np.ndarray, setting_position: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
+def _emptiest_corner(
+    taken_positions: np.ndarray, setting_position: np.ndarray, label_centres: list[np.ndarray]
+) -> np.ndarray:
     """Position (2,) of LABEL_POSITIONS at which a label covers no line; if several are free, one near its setting.
 
-    names : middles of labels already placed, which the leader line of this label shall not cross.
+    label_centres : middles of labels already placed, which the leader line of this label shall not cross.
     """
     middles = LABEL_POSITIONS + LABEL_SIZE * np.array([0.5, 0.0])
     distances = np.abs(middles[:, None] - taken_positions) / (0.5 * LABEL_SIZE)
     clear = np.minimum(distances.max(axis=2).min(axis=1), 1.8)
     far = np.hypot(*(middles - setting_position).T)
     leader_lines = setting_position + np.linspace(0.0, 1.0, 17)[:, None, None] * (middles - setting_position)
-    crossed = [(np.abs(leader_lines - name) < 0.55 * LABEL_SIZE).all(axis=2).any(axis=0) for name in names]
+    crossed = [(np.abs(leader_lines - name) < 0.55 * LABEL_SIZE).all(axis=2).any(axis=0) for name in label_centres]
     return np.asarray(LABEL_POSITIONS[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
-def _mark_failures(ax: Axes, measured_points: WorkPrecisionPoints, top: float) -> None:
+def _mark_failures(panel: Axes, measured_points: WorkPrecisionPoints, mark_height: float) -> None:
     """Mark each failed setting with a cross at the number of force calls that it would have needed, and list the
     failures."""
     failed = [p for p in measured_points.points if p.status != "ok"]
     for p in failed:
         if calls := _expected_calls(p, measured_points):
             size = 1.4 * MARKER_SIZES.get(p.setting.engine, 5)
-            ax.plot(calls, top, "x", color=_engine_colour(p, measured_points), markersize=size, markeredgewidth=1.6)
+            panel.plot(
+                calls, mark_height, "x", color=_engine_colour(p, measured_points), markersize=size, markeredgewidth=1.6
+            )
     if failed:
         text = "; ".join(
             f"{status}: {_methods_text(failed, status)}" for status in dict.fromkeys(p.status for p in failed)
         )
         text = wrapped_text(text, 0.42 * COLUMN_WIDTH, SMALL_TEXT)
-        ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
+        panel.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
 def _expected_calls(failed_point: WorkPrecisionPoint, measured_points: WorkPrecisionPoints) -> float:
@@ -246,13 +260,13 @@ def _expected_calls(failed_point: WorkPrecisionPoint, measured_points: WorkPreci
     )
 
 
-def _methods_text(failed: list[WorkPrecisionPoint], status: str) -> str:
+def _methods_text(failed_points: list[WorkPrecisionPoint], failure_status: str) -> str:
     """Text for the figure that names the methods whose settings failed with a status."""
-    failed_alike = [p for p in failed if p.status == status]
-    if status == "flagged":
+    failed_alike = [p for p in failed_points if p.status == failure_status]
+    if failure_status == "flagged":
         return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in failed_alike))
     unstable = sum(not p.setting.adaptive for p in failed_alike)
-    subject = "beyond stability, steps" if status == "refused" else "settings"
+    subject = "beyond stability, steps" if failure_status == "refused" else "settings"
     parts = [f"{subject}: {unstable} (crosses)"] if unstable else []
     parts += [
         f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
@@ -262,10 +276,10 @@ def _methods_text(failed: list[WorkPrecisionPoint], status: str) -> str:
     return ", ".join(parts)
 
 
-def _legend_handles(measured_points: WorkPrecisionPoints, styles: dict[str, Style]) -> list[Line2D]:
+def _legend_handles(measured_points: WorkPrecisionPoints, curve_styles: dict[str, Style]) -> list[Line2D]:
     """Handles of the legend: the curves, then the Pareto front and the marks of failed settings."""
-    names = sorted(styles, key=curve_name)
-    handles = [Line2D([], [], **styles[curve], label=curve_name(curve)) for curve in names]
+    names = sorted(curve_styles, key=curve_name)
+    handles = [Line2D([], [], **curve_styles[curve], label=curve_name(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT_STYLE, label="no other setting is better (Pareto)"))
     for text in dict.fromkeys(text for p in measured_points.points for text in p.broken):
         handles.append(Line2D([], [], **BROKEN_STYLE, label=fill(f"assumption broken: {text}", LONGEST_LABEL)))

@@ -39,19 +39,19 @@ def _counting_load_calls() -> Iterator[list[int]]:
         yield calls
 
 
-def _mujoco_calls(model: Any) -> int:
+def _mujoco_calls(mujoco_run: Any) -> int:
     """Number of force evaluations of a run, from MuJoCo's timers."""
     import mujoco
 
-    return int(model.data.timer[mujoco.mjtTimer.mjTIMER_ACTUATION].number)
+    return int(mujoco_run.data.timer[mujoco.mjtTimer.mjTIMER_ACTUATION].number)
 
 
-def counted_calls(engine: str, assembly: Assembly, settings: Settings) -> tuple[int, int]:
+def counted_calls(engine: str, assembly: Assembly, run_settings: Settings) -> tuple[int, int]:
     """Number of force calls of one run in Exudyn or MuJoCo: counted independently, and as twinrig reports it."""
     if engine == "mujoco":
-        model: Any = build(engine, assembly, settings)
+        model: Any = build(engine, assembly, run_settings)
         reported_calls = model.run().counts["force calls"]
         return _mujoco_calls(model), reported_calls
     with _counting_load_calls() as calls:
-        reported_calls = build(engine, assembly, settings).run().counts["force calls"]
-    return calls[0] - START_FORCE_CALLS.get(settings.integrator, 0), reported_calls
+        reported_calls = build(engine, assembly, run_settings).run().counts["force calls"]
+    return calls[0] - START_FORCE_CALLS.get(run_settings.integrator, 0), reported_calls

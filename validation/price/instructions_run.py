@@ -33,7 +33,7 @@ def linear_force_function(
 
 
 def exudyn_marches(
-    masses: list[float], force_function: Callable[[Any, Any], list[float]], methods: list[str]
+    masses: list[float], force_function: Callable[[Any, Any], list[float]], method_names: list[str]
 ) -> list[Any]:
     """For each integration method of Exudyn, a function that integrates a number of steps."""
     import exudyn as exu
@@ -60,15 +60,15 @@ def exudyn_marches(
     ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
     ti.verboseMode = 0
 
-    def march(method: str, steps: int) -> None:
-        ti.numberOfSteps, ti.endTime = steps, steps * STEP
-        mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, method))
+    def march(method_name: str, step_count: int) -> None:
+        ti.numberOfSteps, ti.endTime = step_count, step_count * STEP
+        mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, method_name))
 
-    return [lambda steps, method=method: march(method, steps) for method in methods]
+    return [lambda steps, method=method: march(method, steps) for method in method_names]
 
 
 def mujoco_marches(
-    masses: list[float], force_function: Callable[[Any, Any], list[float]], methods: list[str]
+    masses: list[float], force_function: Callable[[Any, Any], list[float]], method_names: list[str]
 ) -> list[Any]:
     """For each integration method of MuJoCo, a function that integrates a number of steps in MuJoCo's own loop."""
     import mujoco
@@ -83,33 +83,33 @@ def mujoco_marches(
     )
     data = mujoco.MjData(model)
 
-    def passive(model: Any, case_data: Any) -> None:
-        case_data.qfrc_passive[:] = force_function(case_data.qpos.tolist(), case_data.qvel.tolist())
+    def passive(mujoco_model: Any, mujoco_data: Any) -> None:
+        mujoco_data.qfrc_passive[:] = force_function(mujoco_data.qpos.tolist(), mujoco_data.qvel.tolist())
 
-    def march(method: str, steps: int) -> None:
-        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
+    def march(method_name: str, step_count: int) -> None:
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method_name.upper()}")
         data.qpos[:], data.qvel[:], data.time = 1e-3, 0.0, 0.0  # mj_resetData prints how long the last run took
-        mujoco.mj_step(model, data, steps)
+        mujoco.mj_step(model, data, step_count)
 
     mujoco.set_mjcb_passive(passive)
-    return [lambda steps, method=method: march(method, steps) for method in methods]
+    return [lambda steps, method=method: march(method, steps) for method in method_names]
 
 
-def main(settings: dict[str, Any]) -> None:
+def main(job_settings: dict[str, Any]) -> None:
     """Run the time integration of every method once to warm up, then count its instructions in two copies of the
     process."""
-    law = linear_force_function(settings["damping"], settings["stiffness"])
+    law = linear_force_function(job_settings["damping"], job_settings["stiffness"])
     marches = [
         march
         for engine, make in (("exudyn", exudyn_marches), ("mujoco", mujoco_marches))
-        for march in make(settings["masses"], law, settings["methods"][engine])
+        for march in make(job_settings["masses"], law, job_settings["methods"][engine])
     ]
     gc.disable()
     for march in marches:
-        march(settings["steps"][0])
+        march(job_settings["steps"][0])
     start_counting()
     for _ in range(2):
-        run_in_forked_copy(marches, settings["steps"])
+        run_in_forked_copy(marches, job_settings["steps"])
 
 
 def start_counting() -> None:

@@ -31,21 +31,21 @@ WORKERS = (2, 10, 100, 1000)
 
 @dataclass(frozen=True)
 class Ensemble:
-    """An ensemble that is computed in blocks. block: number of paths in each; thinning_factor: factor by which workers
-    thin the time rows that they send back."""
+    """An ensemble that is computed in blocks. paths_per_block: number of paths in each; thinning_factor: factor by
+    which workers thin the time rows that they send back."""
 
-    block: int = 50
+    paths_per_block: int = 50
     thinning_factor: int = 1
 
     @property
     def block_seconds(self) -> float:
         """Computing time (s) of a block on a worker."""
-        return self.block * PATH_SECONDS
+        return self.paths_per_block * PATH_SECONDS
 
     @property
     def result_bytes(self) -> float:
         """Size (bytes) of the result that a worker sends back for a block."""
-        return self.block * PATH_BYTES / self.thinning_factor
+        return self.paths_per_block * PATH_BYTES / self.thinning_factor
 
     @property
     def station_times(self) -> dict[str, float]:
@@ -78,22 +78,22 @@ class WorkerShares:
         return max(shares, key=lambda name: shares[name])
 
 
-def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
-    """Busy shares in a simulated run of ``blocks`` blocks by ``workers`` workers, from sending the first block to
-    saving the last."""
-    seconds = ensemble.block_seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
-    half, waiting, free = ensemble.station_times["command"] / 2.0, list[int](), workers
+def simulated_shares(ensemble: Ensemble, worker_count: int, block_count: int) -> WorkerShares:
+    """Busy shares in a simulated run of ``block_count`` blocks by ``worker_count`` workers, from sending the first
+    block to saving the last."""
+    seconds = ensemble.block_seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, block_count).clip(0.5, 1.5)
+    half, waiting, free = ensemble.station_times["command"] / 2.0, list[int](), worker_count
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
     saved_blocks, first, sent, current_time = set[int](), 0, 0, 0.0
-    blocks_ahead = max(BLOCKS_AHEAD, 2 * workers)
+    blocks_ahead = max(BLOCKS_AHEAD, 2 * worker_count)
 
-    def serve(station_name: str, service_seconds: float, next_station: str, block: int) -> None:
+    def serve(station_name: str, service_seconds: float, next_station: str, block_number: int) -> None:
         """Let a station serve a block as soon as it is idle."""
         idle[station_name] = max(idle[station_name], current_time) + service_seconds
-        heappush(events, (idle[station_name], next(order), next_station, block))
+        heappush(events, (idle[station_name], next(order), next_station, block_number))
 
-    while len(saved_blocks) < blocks:
-        while sent < min(blocks, first + blocks_ahead) and sent - len(saved_blocks) < blocks_ahead:
+    while len(saved_blocks) < block_count:
+        while sent < min(block_count, first + blocks_ahead) and sent - len(saved_blocks) < blocks_ahead:
             serve("command", half, "sent", sent)
             sent += 1
         current_time, _, event, block = heappop(events)
@@ -114,8 +114,8 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
             free -= 1
             start_time = waiting.pop(0)
             heappush(events, (current_time + float(seconds[start_time]), next(order), "computed", start_time))
-    busy = {name: blocks * takes / current_time for name, takes in ensemble.station_times.items()}
-    return WorkerShares(float(seconds.sum()) / (workers * current_time), busy, blocks / current_time)
+    busy = {name: block_count * takes / current_time for name, takes in ensemble.station_times.items()}
+    return WorkerShares(float(seconds.sum()) / (worker_count * current_time), busy, block_count / current_time)
 
 
 SETTINGS = {

@@ -51,8 +51,8 @@ class TwoBuilds:
     """A vehicle built twice: by its system's builder, and by the builder of free vehicles. ``sign`` : sign of the free
     vehicle's coordinates relative to those of the system."""
 
-    system: Any
-    free: FreeModel
+    system_model: Any
+    free_model: FreeModel
     sign: float = 1.0
 
     def gap(self, state_count: int) -> float:
@@ -60,9 +60,9 @@ class TwoBuilds:
         of the state."""
         rng, worst = np.random.default_rng(SEED), 0.0
         for _ in range(state_count):
-            q, v = rng.uniform(-0.05, 0.05, self.free.size), rng.uniform(-0.5, 0.5, self.free.size)
-            expected = self.system.acceleration(0.0, q, v)
-            free = self.sign * self.free.acceleration(0.0, self.sign * q, self.sign * v)
+            q, v = rng.uniform(-0.05, 0.05, self.free_model.size), rng.uniform(-0.5, 0.5, self.free_model.size)
+            expected = self.system_model.acceleration(0.0, q, v)
+            free = self.sign * self.free_model.acceleration(0.0, self.sign * q, self.sign * v)
             worst = max(worst, float(np.abs(free - expected).max() / np.abs(expected).max()))
         return worst
 
@@ -88,7 +88,7 @@ def pitch_plane_builds(engine: str) -> TwoBuilds:
     return TwoBuilds(in_plane(engine, assembly, settings), free, -1.0)
 
 
-def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
+def _vehicle_in_space(pitch_plane_vehicle: Vehicle) -> SpatialVehicle:
     """Description in space of a pitch-plane vehicle."""
     bodies = tuple(
         Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
@@ -96,9 +96,9 @@ def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
         else Body(
             body.name, body.mass, (0.0, 0.0, 0.0), ("z", "ry"), ((0, 0, 0), (0, body.pitch_inertia, 0), (0, 0, 0))
         )
-        for body in plane_vehicle.bodies
+        for body in pitch_plane_vehicle.bodies
     )
-    struts_between_bodies = [strut for strut in plane_vehicle.struts if strut.lower.body is not None]
+    struts_between_bodies = [strut for strut in pitch_plane_vehicle.struts if strut.lower.body is not None]
     springs = tuple(
         SpringDamper(
             s.name,
@@ -114,7 +114,7 @@ def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
     )
     tyres = tuple(
         Tyre(s.name, str(s.upper.body), (s.upper.x, 0.0, 0.0), i, s.stiffness, s.damping)
-        for i, s in enumerate(plane_vehicle.tyres)
+        for i, s in enumerate(pitch_plane_vehicle.tyres)
     )
     return SpatialVehicle("pitch plane", bodies, springs, tyres, (0.0,))
 
@@ -126,24 +126,24 @@ def driven_vehicle(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
     return Driven(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
 
 
-def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
+def _force_table(tree_vehicle: SpatialVehicle, force_vehicle: SpatialVehicle) -> np.ndarray:
     """Parameter table for the compiled forces; all spring axes are fixed in space, and tyres act against the ground."""
     springs = [
         _spring_element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
-        for s in vehicle.springs
+        for s in force_vehicle.springs
     ]
-    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UPWARD) for t in vehicle.tyres]
-    cut_vehicle = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
+    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UPWARD) for t in force_vehicle.tyres]
+    cut_vehicle = CutVehicle(force_vehicle.bodies[0].name, tree_vehicle, tree_vehicle, (*springs, *tyres), np.zeros(0))
     numbers = table(cut_vehicle, HubInputs(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = table_views(numbers)[3], -1.0
     rows[:, AXIS_JOINT] = -1.0
-    for row, tyre in zip(rows[len(springs) :], vehicle.tyres, strict=True):
+    for row, tyre in zip(rows[len(springs) :], force_vehicle.tyres, strict=True):
         row[FIRST_BODY], row[FIRST_POINT:SECOND_BODY] = -1.0, tyre.point
     return numbers
 
 
 def _spring_element(
-    name: str,
+    element_name: str,
     first_body: str,
     second_body: str,
     spring_or_tyre: SpringDamper | Tyre,
@@ -153,7 +153,14 @@ def _spring_element(
 ) -> Element:
     vectors = (np.array(start_point, float), np.array(end_point, float), np.array(axis, float))
     return Element(
-        name, first_body, second_body, *vectors, spring_or_tyre.stiffness, spring_or_tyre.damping, 0.0, second_body
+        element_name,
+        first_body,
+        second_body,
+        *vectors,
+        spring_or_tyre.stiffness,
+        spring_or_tyre.damping,
+        0.0,
+        second_body,
     )
 
 
@@ -171,10 +178,10 @@ def time_ratios(round_count: int, minimum_seconds: float) -> dict[str, tuple[flo
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
         for system, sides in (("ride", ride_builds(engine)), ("pitch plane", pitch_plane_builds(engine))):
-            jobs += [sides.system.run, sides.free.run]
+            jobs += [sides.system_model.run, sides.free_model.run]
             names.append(f"{system}, {engine}: the free builder to today's")
     with single_tree_context():
-        jobs += [ride_builds("exudyn").system.run]
+        jobs += [ride_builds("exudyn").system_model.run]
     seconds = interleave(jobs, round_count, minimum_seconds, clock=time.process_time)
     ratios = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
     return ratios | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}

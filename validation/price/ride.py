@@ -64,7 +64,7 @@ class PricedRide:
 
     vehicle: LinearVehicle
     roads: dict[str, Excitation]
-    truth: np.ndarray
+    true_deviations: np.ndarray
     uncertainty: float
 
     @property
@@ -72,9 +72,9 @@ class PricedRide:
         """The road in the paper's third case of correlation: two tracks, with a delay at the rear axle."""
         return self.roads["3"]
 
-    def errors(self, deviations: np.ndarray) -> dict[str, float]:
+    def errors(self, computed_deviations: np.ndarray) -> dict[str, float]:
         """Largest relative error of computed standard deviations (p,), by kind of output."""
-        relative_errors = np.abs(deviations / self.truth - 1.0)
+        relative_errors = np.abs(computed_deviations / self.true_deviations - 1.0)
         return {
             name: float(max(e for e, o in zip(relative_errors, self.vehicle.outputs, strict=True) if o.kind == kind))
             for name, kind in OUTPUT_KINDS.items()
@@ -89,51 +89,61 @@ def problem() -> PricedRide:
     return PricedRide(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
 
 
-def lyapunov_deviations(ride: PricedRide) -> np.ndarray:
+def lyapunov_deviations(priced_ride: PricedRide) -> np.ndarray:
     """Standard deviations (p,) of the outputs by a Lyapunov equation."""
-    return stationary_covariance(vehicle_with_road(ride.vehicle, ride.road, SPEED)).deviation
+    return stationary_covariance(vehicle_with_road(priced_ride.vehicle, priced_ride.road, SPEED)).deviation
 
 
-def swept_deviations(ride: PricedRide, speed_count: int) -> np.ndarray:
+def swept_deviations(priced_ride: PricedRide, speed_count: int) -> np.ndarray:
     """Standard deviations (p,) of the outputs at SPEED, from a sweep by eigenvectors over five cases of road
     correlation and ``speed_count`` speeds."""
     speeds = [*np.linspace(5.0, 50.0, speed_count - 1), SPEED]
-    return variance_sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
+    return variance_sweep(lambda speed: priced_ride.vehicle, priced_ride.roads, speeds).deviation[
+        list(priced_ride.roads).index("3"), -1
+    ]
 
 
 def deviations_on_grid(
-    ride: PricedRide, frequency_count: int, highest_frequency: float, evenly_spaced: bool = False
+    priced_ride: PricedRide, frequency_count: int, highest_frequency: float, is_evenly_spaced: bool = False
 ) -> np.ndarray:
     """Standard deviations (p,) of the outputs by the trapezoidal rule on a frequency grid up to ``highest_frequency``
-    (Hz), evenly spaced in frequency if ``evenly_spaced``, else in its logarithm."""
+    (Hz), evenly spaced in frequency if ``is_evenly_spaced``, else in its logarithm."""
     frequency = (
         np.linspace(highest_frequency / frequency_count, highest_frequency, frequency_count)
-        if evenly_spaced
+        if is_evenly_spaced
         else np.geomspace(LOWEST_FREQUENCY, highest_frequency, frequency_count)
     )
     omega = 2 * np.pi * frequency
-    return np.sqrt(2 * np.trapezoid(spectral_densities(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
+    return np.sqrt(
+        2 * np.trapezoid(spectral_densities(priced_ride.vehicle, priced_ride.road, SPEED, omega), omega, axis=0)
+    )
 
 
-def measure_routes(quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
+def measure_routes(is_quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
     """Rows and saved data of all methods; counts and errors are judged, times are not."""
     ride = problem()
-    swept = 3 if quick else SWEPT_SPEEDS
+    swept = 3 if is_quick else SWEPT_SPEEDS
     points = [_lyapunov_point(ride), _route_point_of_sweep(ride, swept)]
     jobs: list[Callable[[], Any]] = [partial(lyapunov_deviations, ride), partial(swept_deviations, ride, swept)]
-    for count, highest_frequency, even in (*((*net, False) for net in FREQUENCY_GRIDS[quick]), (*UNIFORM_GRID, True)):
+    for count, highest_frequency, even in (
+        *((*net, False) for net in FREQUENCY_GRIDS[is_quick]),
+        (*UNIFORM_GRID, True),
+    ):
         name = f"{'uniform' if even else 'logarithmic'} grid to {highest_frequency:g} Hz"
         start_time = time.perf_counter()
         errors = ride.errors(deviations_on_grid(ride, count, highest_frequency, even))
         points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - start_time))
         jobs.append(partial(deviations_on_grid, ride, count, highest_frequency, even))
-    for copies, lasting in COPY_COUNTS[quick]:
+    for copies, lasting in COPY_COUNTS[is_quick]:
         jobs.append(
             partial(variances_at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copy_count=copies, seed=SEED)
         )
         start_time = time.perf_counter()
         estimate: VarianceEstimate = jobs[-1]()
-        errors, z = ride.errors(np.sqrt(estimate.variance[0])), float(np.abs(estimate.z(ride.truth[None])).max())
+        errors, z = (
+            ride.errors(np.sqrt(estimate.variance[0])),
+            float(np.abs(estimate.z(ride.true_deviations[None])).max()),
+        )
         name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - start_time
         points.append(RoutePoint(name, "copies", copies, errors, seconds, z))
     quick_points = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
@@ -145,28 +155,32 @@ def measure_routes(quick: bool, round_count: int, minimum_seconds: float) -> tup
     return judging_rows(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
 
 
-def _lyapunov_point(ride: PricedRide) -> RoutePoint:
+def _lyapunov_point(priced_ride: PricedRide) -> RoutePoint:
     import control
 
     with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
-        deviations = lyapunov_deviations(ride)
-    return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
+        deviations = lyapunov_deviations(priced_ride)
+    return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, priced_ride.errors(deviations), 0.0)
 
 
-def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
+def _route_point_of_sweep(priced_ride: PricedRide, speed_count: int) -> RoutePoint:
     from models.ride import sweep as module
 
     with mock.patch.object(module, "modes_of_matrix", wraps=module.modes_of_matrix) as watched_modes:
-        deviations = swept_deviations(ride, speeds)
+        deviations = swept_deviations(priced_ride, speed_count)
     return RoutePoint(
-        f"sweep, one of {5 * speeds} points", "decompositions", watched_modes.call_count, ride.errors(deviations), 0.0
+        f"sweep, one of {5 * speed_count} points",
+        "decompositions",
+        watched_modes.call_count,
+        priced_ride.errors(deviations),
+        0.0,
     )
 
 
-def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
+def judging_rows(priced_ride: PricedRide, route_points: list[RoutePoint]) -> list[Row]:
     """Rows that judge the errors and the counts of work of all methods."""
-    exact = points[:2]
-    grids = [p for p in points if p.name.startswith("logarithmic")]
+    exact = route_points[:2]
+    grids = [p for p in route_points if p.name.startswith("logarithmic")]
     rows = [
         Observed(
             f"price.ride.error.{p.name.split(',')[0]}",
@@ -175,7 +189,7 @@ def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
             f"forces at {SPEED:g} m/s, {p.name}",
             max(p.errors.values()),
             "relative",
-        ).at_most(1e-9, f"quadrature knows its variances to {ride.uncertainty:.0e}", "closed form")
+        ).at_most(1e-9, f"quadrature knows its variances to {priced_ride.uncertainty:.0e}", "closed form")
         for p in exact
     ]
     rows += [
@@ -222,7 +236,7 @@ def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
             "statistics of few copies: the judged ones are in the case of varying speed",
             "none",
         )
-        for p in points
+        for p in route_points
         if p.unit == "copies"
     ]
     return rows

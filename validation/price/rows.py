@@ -18,61 +18,61 @@ INTERPOLATION_FACTOR = 1.25
 """Allowed error of an interpolated cheapest setting divided by the tolerance: curves bend between two settings."""
 
 
-def rows_of(problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints, quick: bool) -> list[Row]:
+def rows_of(priced_problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints, is_quick: bool) -> list[Row]:
     """All rows of one work-precision problem; the row on the number of tried settings is part of the full report
     only."""
     points, repeated = measured_points.points, [p for p in measured_points.points if p.changed is not None]
     return [
-        _reference_row(problem, measured_points),
+        _reference_row(priced_problem, measured_points),
         *_order_rows(measured_points),
         _offenders_row(
-            f"price.{problem.key}.silent",
+            f"price.{priced_problem.key}.silent",
             f"wrong answers without a word, of {len(points)} settings",
             [_setting_text(p) for p in points if p.status == "SILENT"],
-            f"an error that is not finite, or beyond {problem.bound:.3g} {measured_points.unit}, "
+            f"an error that is not finite, or beyond {priced_problem.bound:.3g} {measured_points.unit}, "
             "must come with an exception",
         ),
         _offenders_row(
-            f"price.{problem.key}.counts.said",
+            f"price.{priced_problem.key}.counts.said",
             "settings whose force calls are not stages times steps",
             measured_points.miscounted_methods(),
             "exact: stages from the methods' tableaux",
         ),
         _offenders_row(
-            f"price.{problem.key}.counts.repeat",
+            f"price.{priced_problem.key}.counts.repeat",
             f"settings that count or err otherwise in the last round, of {len(repeated)} that have rounds",
             [_setting_text(p) for p in repeated if p.changed],
             "exact: all counts, and errors to the last digit",
         ),
-        _cheapest_settings_row(problem, measured_points),
-        *([] if quick else [_sweep_row(measured_points)]),
+        _cheapest_settings_row(priced_problem, measured_points),
+        *([] if is_quick else [_sweep_row(measured_points)]),
         *_loss_rows(measured_points),
     ]
 
 
-def _setting_text(p: WorkPrecisionPoint) -> str:
-    return f"{p.setting.curve} {p.setting.label()}"
+def _setting_text(measured_point: WorkPrecisionPoint) -> str:
+    return f"{measured_point.setting.curve} {measured_point.setting.label()}"
 
 
-def _offenders_row(name: str, offence_text: str, offending_settings: list[str], tolerance_reason: str) -> Row:
+def _offenders_row(row_id: str, offence_text: str, offending_settings: list[str], tolerance_reason: str) -> Row:
     """Row that passes if the list of offending settings is empty; otherwise it names them."""
     offenders = f": {', '.join(offending_settings)}" if offending_settings else ""
-    return Observed(name, SYSTEM, offence_text + offenders, len(offending_settings), "settings").within(
+    return Observed(row_id, SYSTEM, offence_text + offenders, len(offending_settings), "settings").within(
         0, 0, tolerance_reason, "closed form"
     )
 
 
-def _reference_row(problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints) -> Row:
+def _reference_row(priced_problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints) -> Row:
     """Row: uncertainty of the reference solution, compared with a share of the finest tolerance."""
-    quantity, share = measured_points.quantity, getattr(problem, "uncertain_share", REFERENCE_SHARE)
+    quantity, share = measured_points.quantity, getattr(priced_problem, "uncertain_share", REFERENCE_SHARE)
     return Observed(
-        f"price.{problem.key}.reference",
+        f"price.{priced_problem.key}.reference",
         SYSTEM,
-        f"uncertainty of the reference ({problem.reference}) in the {quantity}",
-        problem.uncertainty[quantity],
+        f"uncertainty of the reference ({priced_problem.reference}) in the {quantity}",
+        priced_problem.uncertainty[quantity],
         measured_points.unit,
     ).at_most(
-        share * min(problem.tolerances),
+        share * min(priced_problem.tolerances),
         "what the reference states of itself or solvers of different "
         f"families differ by; {share:g} of the finest tolerance, so that curves stand clear",
         "closed form",
@@ -126,12 +126,12 @@ def _cheapest_settings_row(problem: WorkPrecisionProblem, measured_points: WorkP
 
 
 def _runnable_setting(
-    problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints, curve: str, cheapest: ToleranceCost
+    problem: WorkPrecisionProblem, measured_points: WorkPrecisionPoints, curve_name: str, cheapest_reach: ToleranceCost
 ) -> Setting:
     """The setting of a curve that the table of cheapest settings names; a fixed step is changed to the nearest one that
     divides the run."""
-    like = measured_points.curves()[curve][0].setting
-    value = cheapest.value if like.adaptive else problem.duration / round(problem.duration / cheapest.value)
+    like = measured_points.curves()[curve_name][0].setting
+    value = cheapest_reach.value if like.adaptive else problem.duration / round(problem.duration / cheapest_reach.value)
     return problem.setting(like.engine, like.method, value)
 
 

@@ -17,7 +17,7 @@ STEP = 1e-3
 
 
 def callback_cost(
-    road_assembly: Assembly, duration: float, integrator: str, round_count: int, minimum_seconds: float
+    road_assembly: Assembly, duration: float, integrator_name: str, round_count: int, minimum_seconds: float
 ) -> dict[str, Any]:
     """Ratios of computing time between variants of a MuJoCo model: bare; with native springs and dampers; on a road;
     with all forces in one callback.
@@ -28,7 +28,7 @@ def callback_cost(
     """
     flat = assembly_of_scene(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
     bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
-    settings = Settings(integrator, STEP, duration)
+    settings = Settings(integrator_name, STEP, duration)
     models = [build("mujoco", assembly, settings) for assembly in (bare, flat, road_assembly)]
     compiled = CompiledForces(road_assembly, settings)
     runs: list[Callable[[], Any]] = [model.run for model in models]

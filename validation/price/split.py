@@ -42,7 +42,7 @@ METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
 
 
 @njit(cache=True, error_model="numpy")
-def add_weak_damper(numbers, t, q, v, force_pointer):
+def add_weak_damper(damper_parameters, t, q, v, force_pointer):
     """Add the forces of a weak damper on four coordinates to ``force_pointer``; all arguments but the time ``t`` are
     pointers to doubles."""
     rate, force = carray(v, (4,)), carray(force_pointer, (4,))
@@ -51,12 +51,12 @@ def add_weak_damper(numbers, t, q, v, force_pointer):
 
 
 @njit(cache=True, error_model="numpy")
-def weak_damper_in_block(block, t, n):
+def weak_damper_in_block(block_address, t, coordinate_count):
     """Compute the forces of the weak damper in a block of doubles at an address: forces, coordinates and rates, (n,)
     each."""
-    f = at(block)
-    carray(f, (n,))[:] = 0.0
-    add_weak_damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
+    f = at(block_address)
+    carray(f, (coordinate_count,))[:] = 0.0
+    add_weak_damper(f, t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
 
 
 ZERO_FORCES = [0.0] * 4
@@ -118,9 +118,9 @@ def _wheels_steps_and_step() -> tuple[Wheels, int, float]:
     return Wheels(1, cells=wheelset.CONTACT_CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
 
 
-def _run_with_callback(callback: Any, run: Callable[[], Any]) -> None:
-    with installed(callback):
-        run()
+def _run_with_callback(force_callback: Any, run_model: Callable[[], Any]) -> None:
+    with installed(force_callback):
+        run_model()
 
 
 MARCHES_OF_PROBLEM = {
@@ -177,11 +177,11 @@ def _engine_text(timed_march: Saved) -> str:
     return f"{LABELS[timed_march['engine']]} {METHODS[timed_march['engine']]}"
 
 
-def table(case_data: list[Saved], problem: str) -> list[Table]:
+def table(case_data: list[Saved], problem_name: str) -> list[Table]:
     """Table of the parts of a step's time for a problem, in a list; an empty list if the step was not split."""
     lines = []
     for saved in case_data:
-        if saved["problem"] == problem:
+        if saved["problem"] == problem_name:
             _, low, high = bridge_share(saved)
             values = (f"{value:.2f}" for value in step_parts(saved))
             lines.append(
@@ -193,7 +193,7 @@ def table(case_data: list[Saved], problem: str) -> list[Table]:
                 )
             )
     note = (
-        f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "
+        f"Microseconds a step, median of all rounds, over {STEPS.get(problem_name, 0):,} steps; all forces in one "
         "callback, compiled in MuJoCo, from Python in Exudyn. Engine: with an empty callback; bridge: what one "
         "costs that is handed the state and hands back a damper's forces; kernel: what the real forces cost beyond "
         "that."

@@ -21,9 +21,10 @@ def tables(measured_points: WorkPrecisionPoints) -> list[Table]:
     return [make(measured_points) for make in (cheapest_table, loss_table, curve_table, outcome_table, failure_table)]
 
 
-def curve_name(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
-    """Name of a curve for readers, followed by the names of the curves in ``groups`` that coincide with it."""
-    coinciding = next((group for group in groups or [] if curve in group), (curve,))
+def curve_name(curve: str, coinciding_curves: list[tuple[str, ...]] | None = None) -> str:
+    """Name of a curve for readers, followed by the names of the curves in ``coinciding_curves`` that coincide with
+    it."""
+    coinciding = next((group for group in coinciding_curves or [] if curve in group), (curve,))
     return " = ".join(map(_plain_name, sorted(coinciding, key=lambda curve_key: curve_key != curve)))
 
 
@@ -58,9 +59,9 @@ def cheapest_table(measured_points: WorkPrecisionPoints) -> Table:
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
-def rounds_sentence(points: list[WorkPrecisionPoint]) -> str:
+def rounds_sentence(timed_points: list[WorkPrecisionPoint]) -> str:
     """Sentence on how many settings were timed in how many rounds, and how much the times scatter."""
-    answered = [p for p in points if p.status == "ok"]
+    answered = [p for p in timed_points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]
     numbers = Counter(map(len, in_rounds))
     rounds_text = " and ".join(
@@ -83,16 +84,16 @@ def _text_of_winner(
     measured_points: WorkPrecisionPoints,
     costs_at_tolerance: CostsAtTolerance,
     engine: str,
-    unit: str,
-    groups: list[tuple[str, ...]] | None = None,
+    cost_unit: str,
+    coinciding_curves: list[tuple[str, ...]] | None = None,
 ) -> str:
     best = runner.cheapest_curve(costs_at_tolerance, engine)
     if best is None:
         return "none of those tried"
     curve, cheapest = best
     label = replace(measured_points.curves()[curve][0].setting, value=cheapest.value).label() + _coarsest_text(cheapest)
-    paid = f"{1e3 * cheapest.cost:.3g} ms" if unit == "ms" else f"{cheapest.cost:,.0f} {unit}"
-    return f"{curve_name(curve, groups)}, {label}: {paid}"
+    paid = f"{1e3 * cheapest.cost:.3g} ms" if cost_unit == "ms" else f"{cheapest.cost:,.0f} {cost_unit}"
+    return f"{curve_name(curve, coinciding_curves)}, {label}: {paid}"
 
 
 def _coarsest_text(cheapest_reach: ToleranceCost) -> str:
@@ -141,15 +142,16 @@ def loss_table(measured_points: WorkPrecisionPoints) -> Table:
     )
 
 
-def _text_of_loss(loss: LossByDefault | None) -> str:
-    if loss is None:
+def _text_of_loss(loss_of_default: LossByDefault | None) -> str:
+    if loss_of_default is None:
         return "-"
     factor, low, high = (
-        f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.cost_ratio, loss.lower_limit, loss.upper_limit)
+        f"{x:,.0f}" if x >= 100 else f"{x:.3g}"
+        for x in (loss_of_default.cost_ratio, loss_of_default.lower_limit, loss_of_default.upper_limit)
     )
-    mark = "*" if loss.origin == "extrapolated" else ""
+    mark = "*" if loss_of_default.origin == "extrapolated" else ""
     interval_text = (
-        (f" [{low}, {high}]") if loss.lower_limit < loss.upper_limit else ""
+        (f" [{low}, {high}]") if loss_of_default.lower_limit < loss_of_default.upper_limit else ""
     )  # none of a count, or after too few rounds
     return f"{factor}{mark}{interval_text}"
 
@@ -200,12 +202,12 @@ def curve_table(measured_points: WorkPrecisionPoints) -> Table:
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
-def _mark_of_single_runs(points: list[WorkPrecisionPoint], cheapest_reach: ToleranceCost | None) -> str:
+def _mark_of_single_runs(curve_points: list[WorkPrecisionPoint], cheapest_reach: ToleranceCost | None) -> str:
     """Text "~" if an interpolated cost depends on a setting that was timed only once, else ""."""
     return (
         "~"
         if cheapest_reach is not None
-        and any(p.changed is None for p in runner.bracketing_points(points, cheapest_reach))
+        and any(p.changed is None for p in runner.bracketing_points(curve_points, cheapest_reach))
         else ""
     )
 

@@ -49,31 +49,33 @@ def ensemble_job(duration: float = 60.0) -> Any:
         return noise_paths(scene, np.linspace(0.0, duration, 121))
 
 
-def compute_blocks(job: Any, block_numbers: list[int]) -> None:
+def compute_blocks(noise_ensemble: Any, block_numbers: list[int]) -> None:
     """Compute the blocks with the given numbers of an ensemble one after the other in this process."""
     for number in block_numbers:
-        job(BLOCKS_OF_RUN.block(number, PATHS_PER_RUN))
+        noise_ensemble(BLOCKS_OF_RUN.block(number, PATHS_PER_RUN))
 
 
-def compute_in_two_processes(pools: list[Executor], job: Any) -> None:
+def compute_in_two_processes(process_pools: list[Executor], noise_ensemble: Any) -> None:
     """Compute an ensemble in two separate processes, each of which computes half of the blocks."""
     count = BLOCKS_OF_RUN.count(PATHS_PER_RUN)
-    wait([pool.submit(compute_blocks, job, list(range(i, count, 2))) for i, pool in enumerate(pools)])
+    wait(
+        [pool.submit(compute_blocks, noise_ensemble, list(range(i, count, 2))) for i, pool in enumerate(process_pools)]
+    )
 
 
 @dataclass(frozen=True)
 class Sender:
-    """Ensemble job that computes nothing and sends back ``numbers`` zeros per path."""
+    """Ensemble job that computes nothing and sends back ``numbers_per_path`` zeros per path."""
 
-    numbers: int
+    numbers_per_path: int
 
-    def __call__(self, paths: range) -> dict[str, np.ndarray]:
+    def __call__(self, path_range: range) -> dict[str, np.ndarray]:
         """Array "x" (paths, numbers) of zeros."""
-        return {"x": np.zeros((len(paths), self.numbers))}
+        return {"x": np.zeros((len(path_range), self.numbers_per_path))}
 
     def facts(self) -> dict[str, Any]:
         """Settings on which the result of a block depends."""
-        return {"numbers": self.numbers}
+        return {"numbers": self.numbers_per_path}
 
 
 def cost_of_blocks(executor: Executor) -> dict[int, float]:
@@ -101,15 +103,16 @@ def worker_pools() -> Iterator[dict[str, Executor]]:
         yield pools
 
 
-def measured_pools(round_count: int = TIMING_ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
+def measured_pools(round_count: int = TIMING_ROUNDS, noise_ensemble: Any = None) -> dict[str, dict[str, Any]]:
     """Measurement of each pool of workers: ``efficiency`` relative to two separate processes and ``seconds`` of a run,
     both with intervals; ``cost`` of a block (s)."""
-    job = ensemble_job() if job is None else job
+    noise_ensemble = ensemble_job() if noise_ensemble is None else noise_ensemble
     with ExitStack() as stack, worker_pools() as pools:
         single_pools: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
-        turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, single_pools, job)]
+        turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, single_pools, noise_ensemble)]
         turns += [
-            partial(run_paths, job, PATHS_PER_RUN, executor=pool, path_blocks=BLOCKS_OF_RUN) for pool in pools.values()
+            partial(run_paths, noise_ensemble, PATHS_PER_RUN, executor=pool, path_blocks=BLOCKS_OF_RUN)
+            for pool in pools.values()
         ]
         seconds = interleave(turns, round_count)
         return {
@@ -122,10 +125,10 @@ def measured_pools(round_count: int = TIMING_ROUNDS, job: Any = None) -> dict[st
         }
 
 
-def measurement_lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
+def measurement_lines(pool_measurements: dict[str, dict[str, Any]]) -> list[str]:
     """Lines of text on the measured efficiency and block costs of each pool of workers."""
     answer = []
-    for name, crew in measurement.items():
+    for name, crew in pool_measurements.items():
         ratio, low, high = crew["efficiency"]
         answer.append(
             f"{name}: efficiency {ratio:.3f} ({low:.3f} to {high:.3f}) of two lone processes, "

@@ -97,11 +97,11 @@ class Verdict:
         return max(first, larger_true) / min(first, larger_true) if min(first, larger_true) > 0.0 else math.inf
 
 
-def random_scene(scene_number: int, folder: Path) -> DrawnScene:
-    """The random scene with a number, which seeds it; its files are written to ``folder``."""
+def random_scene(scene_number: int, scene_folder: Path) -> DrawnScene:
+    """The random scene with a number, which seeds it; its files are written to ``scene_folder``."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
     kind = SCENE_KINDS[scene_number % len(SCENE_KINDS)]
-    name, effects, further_tables = kind(rng, folder, scene_number)
+    name, effects, further_tables = kind(rng, scene_folder, scene_number)
     override = {
         key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
         for key in map(str, rng.choice(CHANGED_PARAMETERS, 4, replace=False))
@@ -117,7 +117,7 @@ def random_scene(scene_number: int, folder: Path) -> DrawnScene:
     if "prescribed_pitch" not in effects:
         quantity = str(rng.choice(common if "wheel_forces" in effects else ["f1,f2", *common]))
     return DrawnScene(
-        build(table, "", folder), quantity, QUANTITY_SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS)
+        build(table, "", scene_folder), quantity, QUANTITY_SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS)
     )
 
 
@@ -126,7 +126,7 @@ Kind = tuple[str, dict[str, Any], dict[str, Any]]
 """Name, effects, and further tables of a random scene."""
 
 
-def _random_iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_iso_road(generator: Random, scene_folder: Path, scene_number: int) -> Kind:
     road = {
         "source": "iso8608",
         "road_class": str(generator.choice(list("ABCDE"))),
@@ -136,23 +136,23 @@ def _random_iso_road(generator: Random, folder: Path, scene_number: int) -> Kind
     return "rough road", {"road": road}, {}
 
 
-def _random_study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_study_road(generator: Random, scene_folder: Path, scene_number: int) -> Kind:
     source = str(generator.choice(["study", "hills"]))
     return f"{source} road", {"road": {"source": source, "speed": float(round(generator.uniform(5.0, 35.0), 1))}}, {}
 
 
-def _random_release(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_release(generator: Random, scene_folder: Path, scene_number: int) -> Kind:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
     start_values = {key: float(size * generator.uniform(-1, 1)) for key, size in start.items()}
     return "release", {}, {"start": start_values, "duration": float(generator.choice([0.2, 0.4, 2.5]))}
 
 
-def _random_measured_forces(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_measured_forces(generator: Random, scene_folder: Path, scene_number: int) -> Kind:
     interpolation, period = (
         str(generator.choice(["linear", "held", "smooth"])),
         float(generator.choice([1e-2, 5e-3, 2e-3])),
     )
-    file = _write_wheel_forces(generator, folder, scene_number, period)
+    file = _write_wheel_forces(generator, scene_folder, scene_number, period)
     return (
         f"{interpolation} forces",
         {"wheel_forces": {"file": file, "interpolation": interpolation}},
@@ -160,11 +160,11 @@ def _random_measured_forces(generator: Random, folder: Path, scene_number: int) 
     )
 
 
-def _random_guided_vehicle(generator: Random, folder: Path, scene_number: int) -> Kind:
-    file, pitch = _write_wheel_forces(generator, folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
+def _random_guided_vehicle(generator: Random, scene_folder: Path, scene_number: int) -> Kind:
+    file, pitch = _write_wheel_forces(generator, scene_folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
     sample_times = 5e-3 * np.arange(101)
     wave = generator.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * generator.uniform(0.5, 3.0) * sample_times))
-    write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
+    write_time_series(scene_folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
     effects = {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}}
     return "prescribed pitch", effects, {"duration": 0.2}
 
@@ -183,7 +183,7 @@ SCENE_KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
 )
 
 
-def _write_wheel_forces(generator: Random, folder: Path, scene_number: int, sample_period: float) -> str:
+def _write_wheel_forces(generator: Random, scene_folder: Path, scene_number: int, sample_period: float) -> str:
     """Write a random file of wheel forces: static load, a sine wave for each wheel, and noise on each sample; returns
     its name."""
     sample_times, name = sample_period * np.arange(round(0.5 / sample_period) + 1), f"forces{scene_number}.csv"
@@ -196,7 +196,7 @@ def _write_wheel_forces(generator: Random, folder: Path, scene_number: int, samp
         )
         for wheel in ("front", "rear")
     }
-    write_time_series(folder / name, forces, sample_period)
+    write_time_series(scene_folder / name, forces, sample_period)
     return name
 
 
@@ -234,41 +234,56 @@ def verdicts_on_scene(
     ]
 
 
-def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
+def true_errors(pitch_plane_scene: Any, tried_settings: list[Setting]) -> dict[Setting, float]:
     """Largest error of each setting over the complete run, against DOP853. All settings are compared at common times
     if their steps allow it."""
-    runs = {setting: scene.priced_run(scene.solve(setting, scene.full_duration)) for setting in settings}
-    parts = {setting: 1 if setting.adaptive else round(scene.base_step / setting.value) for setting in runs}
-    common = _fine_multiple(scene, math.lcm(*parts.values()))
-    if scene.base_step / common < FINE_SPACING:
-        parts = {setting: _fine_multiple(scene, n) for setting, n in parts.items()}
+    runs = {
+        setting: pitch_plane_scene.priced_run(pitch_plane_scene.solve(setting, pitch_plane_scene.full_duration))
+        for setting in tried_settings
+    }
+    parts = {setting: 1 if setting.adaptive else round(pitch_plane_scene.base_step / setting.value) for setting in runs}
+    common = _fine_multiple(pitch_plane_scene, math.lcm(*parts.values()))
+    if pitch_plane_scene.base_step / common < FINE_SPACING:
+        parts = {setting: _fine_multiple(pitch_plane_scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
     exact = {
-        n: ReferenceSolution(_accurate_solution(scene, scene.base_step / n), 0.0, "", 0, scene.kink_period)
+        n: ReferenceSolution(
+            _accurate_solution(pitch_plane_scene, pitch_plane_scene.base_step / n),
+            0.0,
+            "",
+            0,
+            pitch_plane_scene.kink_period,
+        )
         for n in set(parts.values())
     }
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
-def _fine_multiple(scene: PricedPitchPlane, part_count: int) -> int:
+def _fine_multiple(pitch_plane_scene: PricedPitchPlane, part_count: int) -> int:
     """Least multiple of ``part_count`` that divides ``scene.base_step`` (s) into parts of COARSE_SPACING (s) at
     most.
     """
-    return part_count * math.ceil(scene.base_step / part_count / COARSE_SPACING * (1 - 1e-9))
+    return part_count * math.ceil(pitch_plane_scene.base_step / part_count / COARSE_SPACING * (1 - 1e-9))
 
 
-def _accurate_solution(scene: PricedPitchPlane, spacing: float) -> PricedRun:
-    return scene.priced_run(scene.run("reference", Settings("DOP853", spacing, scene.full_duration, TRUTH_TOLERANCE)))
+def _accurate_solution(pitch_plane_scene: PricedPitchPlane, time_spacing: float) -> PricedRun:
+    return pitch_plane_scene.priced_run(
+        pitch_plane_scene.run(
+            "reference", Settings("DOP853", time_spacing, pitch_plane_scene.full_duration, TRUTH_TOLERANCE)
+        )
+    )
 
 
-def default_is_cheaper(recommendation: Recommendation, engine_and_kind: tuple[str, str], choice: SettingChoice) -> bool:
+def default_is_cheaper(
+    recommendation: Recommendation, engine_and_kind: tuple[str, str], setting_choice: SettingChoice
+) -> bool:
     """Whether an engine's default setting keeps the tolerance and is cheaper than the recommended setting."""
     engine, kind = engine_and_kind
     rivals = [attempt for attempt in _coarsest_defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
-        return any(rival.calls < choice.calls for rival in rivals)
-    return any(_is_slower_in_pairs(recommendation, choice, rival) for rival in rivals)
+        return any(rival.calls < setting_choice.calls for rival in rivals)
+    return any(_is_slower_in_pairs(recommendation, setting_choice, rival) for rival in rivals)
 
 
 def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
@@ -288,12 +303,17 @@ def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
     return list({tried.setting.curve: tried for tried in able}.values())
 
 
-def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival_setting: TriedSetting) -> bool:
-    if rival_setting.setting == choice.tried.setting or rival_setting.seconds > LARGEST_TIMED_RATIO * choice.seconds:
+def _is_slower_in_pairs(
+    recommendation: Recommendation, setting_choice: SettingChoice, rival_setting: TriedSetting
+) -> bool:
+    if (
+        rival_setting.setting == setting_choice.tried.setting
+        or rival_setting.seconds > LARGEST_TIMED_RATIO * setting_choice.seconds
+    ):
         return False
     jobs = [
         partial(recommendation.scene.solve, attempt.setting, recommendation.scene.searched_duration)
-        for attempt in (choice.tried, rival_setting)
+        for attempt in (setting_choice.tried, rival_setting)
     ]
     return all(
         paired_ratio(*interleave(jobs, rounds, SHORTEST_TURN, clock=time.process_time))[1] > SLOWER_SECONDS_RATIO

@@ -39,16 +39,16 @@ TablesAndQuantities = tuple[dict[str, Any], list[str]]
 """Tables of a random scene, and the quantities that a tolerance may be set on."""
 
 
-def drawn_scene_of_system(system: str, scene_number: int) -> DrawnScene:
+def drawn_scene_of_system(system_name: str, scene_number: int) -> DrawnScene:
     """The random scene of a system with a number, which seeds it, with a quantity and a tolerance."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
     table, quantities = {"wheelset": _random_wheelset, "handling": _random_handling, "braking": _random_braking}[
-        system
+        system_name
     ](rng)
-    table |= {"title": f"{system} {scene_number}", "system": system}
+    table |= {"title": f"{system_name} {scene_number}", "system": system_name}
     quantity = str(rng.choice(quantities))
     low, high = np.log(TOLERANCE_RANGES[quantity])
-    scene = import_module(SYSTEMS[system].scene).build(table, "", Path())
+    scene = import_module(SYSTEMS[system_name].scene).build(table, "", Path())
     return DrawnScene(scene, quantity, float(np.exp(rng.uniform(low, high))))
 
 
@@ -106,7 +106,7 @@ def verdicts_on_system(drawn_scene: DrawnScene) -> list[Verdict]:
     return verdicts_on_scene(drawn_scene, ENGINES[drawn_scene.scene.system], true_errors)
 
 
-def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
+def true_errors(recommendation: Recommendation, tried_settings: list[Setting]) -> dict[Setting, float]:
     """Largest error of each setting over the complete run, against a solution that is computed differently from the
     recommendation's reference."""
     scene: Any = recommendation.scene
@@ -115,18 +115,24 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
         ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / TRUTH_STEPS_RATIO, ladder.order
     )
 
-    def error(setting: Setting) -> float:
+    def error(tried_setting: Setting) -> float:
         exact = (
-            _accurate_solution(scene, setting)
+            _accurate_solution(scene, tried_setting)
             if isinstance(scene, MeshedScene)
             else scene.priced_run(scene.solve(finer, scene.full_duration))
         )
-        return ReferenceSolution(exact, 0.0, "", 0).error(scene.priced_run(scene.solve(setting, scene.full_duration)))
+        return ReferenceSolution(exact, 0.0, "", 0).error(
+            scene.priced_run(scene.solve(tried_setting, scene.full_duration))
+        )
 
-    return {setting: error(setting) for setting in settings}
+    return {setting: error(setting) for setting in tried_settings}
 
 
-def _accurate_solution(scene: MeshedScene, setting: Setting) -> PricedRun:
-    cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
-    step = min(scene.steps.values()) if scene.cells else setting.value
-    return scene.priced_run((cells, scene.exact_run(cells, step, scene.full_duration)))
+def _accurate_solution(meshed_scene: MeshedScene, tried_setting: Setting) -> PricedRun:
+    cells = (
+        min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / tried_setting.value)))
+        if meshed_scene.cells
+        else 0
+    )
+    step = min(meshed_scene.steps.values()) if meshed_scene.cells else tried_setting.value
+    return meshed_scene.priced_run((cells, meshed_scene.exact_run(cells, step, meshed_scene.full_duration)))

@@ -41,13 +41,13 @@ def main(command_words: list[str]) -> int:
     return _check_outputs(arguments)
 
 
-def _record_outputs(arguments: argparse.Namespace) -> int:
-    arguments.folder.mkdir(parents=True, exist_ok=True)
-    if not (arguments.folder / JOBS_FILE).exists():
-        write_jobs(arguments.folder, asked.replay_jobs(arguments.command))
-    left = [job for job in _selected_jobs(arguments) if load_output(arguments.folder, job.name) is None]
-    for job, current_answer in _outputs_of_jobs(left, arguments):
-        save_output(arguments.folder, job.name, current_answer)
+def _record_outputs(command_arguments: argparse.Namespace) -> int:
+    command_arguments.folder.mkdir(parents=True, exist_ok=True)
+    if not (command_arguments.folder / JOBS_FILE).exists():
+        write_jobs(command_arguments.folder, asked.replay_jobs(command_arguments.command))
+    left = [job for job in _selected_jobs(command_arguments) if load_output(command_arguments.folder, job.name) is None]
+    for job, current_answer in _outputs_of_jobs(left, command_arguments):
+        save_output(command_arguments.folder, job.name, current_answer)
         codes = ", ".join(map(str, current_answer.codes))
         print(
             f"{current_answer.seconds:7.1f} s  {len(current_answer.arrays):4} arrays  {job.name}: {codes}", flush=True
@@ -55,15 +55,15 @@ def _record_outputs(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _check_outputs(arguments: argparse.Namespace) -> int:
-    renamed = tomllib.loads(arguments.renamed.read_text()) if arguments.renamed else {}
+def _check_outputs(command_arguments: argparse.Namespace) -> int:
+    renamed = tomllib.loads(command_arguments.renamed.read_text()) if command_arguments.renamed else {}
     counts = {"same": 0, "differ": 0, "other words": 0}
-    for job, current_answer in _outputs_of_jobs(_selected_jobs(arguments), arguments):
-        recorded_answer = load_output(arguments.folder, job.name)
+    for job, current_answer in _outputs_of_jobs(_selected_jobs(command_arguments), command_arguments):
+        recorded_answer = load_output(command_arguments.folder, job.name)
         if recorded_answer is None:
             print(f"{job.name}: was not recorded")
             continue
-        difference = output_difference(recorded_answer, current_answer, arguments.bound, renamed)
+        difference = output_difference(recorded_answer, current_answer, command_arguments.bound, renamed)
         counts["differ" if difference.wrong else "other words" if difference.tolerated else "same"] += 1
         for text in (difference.wrong or difference.tolerated)[:5]:
             print(f"{job.name}: {'DIFFERS: ' if difference.wrong else ''}{text}", flush=True)
@@ -71,20 +71,26 @@ def _check_outputs(arguments: argparse.Namespace) -> int:
     return 1 if counts["differ"] else 0
 
 
-def _selected_jobs(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
-    return [job for job in read_jobs(arguments.folder)[:: arguments.every] if fnmatch.fnmatch(job.name, arguments.only)]
+def _selected_jobs(command_arguments: argparse.Namespace) -> list[asked.ReplayJob]:
+    return [
+        job
+        for job in read_jobs(command_arguments.folder)[:: command_arguments.every]
+        if fnmatch.fnmatch(job.name, command_arguments.only)
+    ]
 
 
 def _outputs_of_jobs(
-    jobs: list[asked.ReplayJob], arguments: argparse.Namespace
+    selected_jobs: list[asked.ReplayJob], command_arguments: argparse.Namespace
 ) -> Iterator[tuple[asked.ReplayJob, CommandOutput]]:
     """Yield each job with the outputs of its commands, in the order of the jobs; several jobs run at a time."""
     folder = Path(tempfile.mkdtemp(prefix="replay-"))
 
     try:
-        with ThreadPoolExecutor(arguments.workers) as pool:
+        with ThreadPoolExecutor(command_arguments.workers) as pool:
             yield from zip(
-                jobs, pool.map(lambda job: output_of_job(job, arguments.command, folder / job.name), jobs), strict=True
+                selected_jobs,
+                pool.map(lambda job: output_of_job(job, command_arguments.command, folder / job.name), selected_jobs),
+                strict=True,
             )
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -41,44 +41,44 @@ class CommandOutput:
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-def output_of_job(job: ReplayJob, command: str, folder: Path) -> CommandOutput:
+def output_of_job(replay_job: ReplayJob, executable: str, work_folder: Path) -> CommandOutput:
     """Output of a job's commands, which run in a new folder that is deleted afterwards."""
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    shutil.rmtree(work_folder, ignore_errors=True)
+    work_folder.mkdir(parents=True)
     for file in BASE_SCENES.glob("*.[!t]*"):
-        shutil.copy(file, folder)
-    (folder / "scene.toml").write_text(job.scene)
-    input_files = {path.name for path in folder.iterdir()}
+        shutil.copy(file, work_folder)
+    (work_folder / "scene.toml").write_text(replay_job.scene)
+    input_files = {path.name for path in work_folder.iterdir()}
     job_answer = CommandOutput([], "", 0.0)
-    for words in job.commands:
-        _run_command([command, *words], folder, job_answer)
-    job_answer.arrays |= dict(_arrays_of_files(folder, input_files))
-    shutil.rmtree(folder)
+    for words in replay_job.commands:
+        _run_command([executable, *words], work_folder, job_answer)
+    job_answer.arrays |= dict(_arrays_of_files(work_folder, input_files))
+    shutil.rmtree(work_folder)
     return job_answer
 
 
-def _run_command(command_words: list[str], folder: Path, job_answer: CommandOutput) -> None:
+def _run_command(command_words: list[str], work_folder: Path, job_output: CommandOutput) -> None:
     """Run one command, and add its exit code, message and printed tables to the job's output."""
     start_time = time.monotonic()
-    code, printed_output, wrong = _process_output(command_words, folder)
-    job_answer.seconds += time.monotonic() - start_time
+    code, printed_output, wrong = _process_output(command_words, work_folder)
+    job_output.seconds += time.monotonic() - start_time
     printed = _parsed_json(printed_output)
     if printed is not None:
-        job_answer.arrays |= {
-            f": {len(job_answer.codes)}{path_in_table}": np.array(value)
+        job_output.arrays |= {
+            f": {len(job_output.codes)}{path_in_table}": np.array(value)
             for path_in_table, value in _values_with_paths(printed)
         }
         printed_output = ""
-    job_answer.codes.append(code)
-    job_answer.message += _masked_message(printed_output + wrong)
+    job_output.codes.append(code)
+    job_output.message += _masked_message(printed_output + wrong)
 
 
-def _process_output(command_words: list[str], folder: Path) -> tuple[int, str, str]:
+def _process_output(command_words: list[str], work_folder: Path) -> tuple[int, str, str]:
     surroundings = os.environ | {"COLUMNS": "200", "NO_COLOR": "1", "MPLBACKEND": "agg"}
     try:
         completed_process = subprocess.run(
             command_words,
-            cwd=folder,
+            cwd=work_folder,
             env=surroundings,
             capture_output=True,
             text=True,
@@ -91,9 +91,9 @@ def _process_output(command_words: list[str], folder: Path) -> tuple[int, str, s
     return completed_process.returncode, completed_process.stdout, completed_process.stderr
 
 
-def _parsed_json(text: str) -> Any:
+def _parsed_json(printed_text: str) -> Any:
     try:
-        return json.loads(text)
+        return json.loads(printed_text)
     except ValueError:
         return None
 
@@ -110,25 +110,25 @@ def _values_with_paths(nested_value: Any, path_in_table: str = "") -> Iterator[t
         yield path_in_table, _masked_message(str(nested_value))
 
 
-def _masked_message(text: str) -> str:
+def _masked_message(message_text: str) -> str:
     for pattern, mask in MESSAGE_MASKS:
-        text = re.sub(pattern, mask, text)
-    return text
+        message_text = re.sub(pattern, mask, message_text)
+    return message_text
 
 
-def _arrays_of_files(folder: Path, input_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
+def _arrays_of_files(work_folder: Path, input_file_names: set[str]) -> Iterator[tuple[str, np.ndarray]]:
     """Yield name ("file: channel") and values of each array in the files that a job's commands wrote into the
     folder."""
-    for path in sorted(folder.rglob("*")):
+    for path in sorted(work_folder.rglob("*")):
         read = {".nc": _netcdf_channels, ".csv": _csv_columns}.get(path.suffix)
-        if read is not None and path.name not in input_files:
-            yield from ((f"{path.relative_to(folder)}: {name}", array) for name, array in read(path))
+        if read is not None and path.name not in input_file_names:
+            yield from ((f"{path.relative_to(work_folder)}: {name}", array) for name, array in read(path))
 
 
-def _netcdf_channels(path: Path) -> Iterator[tuple[str, np.ndarray]]:
+def _netcdf_channels(file_path: Path) -> Iterator[tuple[str, np.ndarray]]:
     import h5py
 
-    with h5py.File(path) as file:
+    with h5py.File(file_path) as file:
         sets: dict[str, np.ndarray] = {}
         file.visititems(lambda name, item: sets.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
     for name, values in sets.items():
@@ -136,53 +136,53 @@ def _netcdf_channels(path: Path) -> Iterator[tuple[str, np.ndarray]]:
         yield name, array if array.dtype.kind in "fiub" else array.astype(str)
 
 
-def _csv_columns(path: Path) -> Iterator[tuple[str, np.ndarray]]:
+def _csv_columns(file_path: Path) -> Iterator[tuple[str, np.ndarray]]:
     """Yield name and values of each column of a CSV file, whose first line holds the names."""
-    with path.open(newline="") as file:
+    with file_path.open(newline="") as file:
         lines = [line for line in csv.reader(file) if line]
     if lines:
         for name, *cells in zip(*[line + [""] * (len(lines[0]) - len(line)) for line in lines], strict=False):
             yield name, _column_values(cells)
 
 
-def _column_values(cells: list[str]) -> np.ndarray:
+def _column_values(cell_texts: list[str]) -> np.ndarray:
     try:
-        return np.array([float(cell) for cell in cells])
+        return np.array([float(cell) for cell in cell_texts])
     except ValueError:
-        return np.array([_masked_message(cell) for cell in cells])
+        return np.array([_masked_message(cell) for cell in cell_texts])
 
 
-def write_jobs(folder: Path, jobs: list[ReplayJob]) -> None:
+def write_jobs(recording_folder: Path, replay_jobs: list[ReplayJob]) -> None:
     """Save the jobs in the folder of a recording, so that a later version runs the same jobs."""
-    (folder / JOBS_FILE).write_text(json.dumps([asdict(job) for job in jobs], indent=1))
+    (recording_folder / JOBS_FILE).write_text(json.dumps([asdict(job) for job in replay_jobs], indent=1))
 
 
-def read_jobs(folder: Path) -> list[ReplayJob]:
+def read_jobs(recording_folder: Path) -> list[ReplayJob]:
     """The jobs that are saved in the folder of a recording."""
     return [
         ReplayJob(job_table["name"], tuple(map(tuple, job_table["commands"])), job_table["scene"])
-        for job_table in json.loads((folder / JOBS_FILE).read_text())
+        for job_table in json.loads((recording_folder / JOBS_FILE).read_text())
     ]
 
 
-def save_output(folder: Path, name: str, job_answer: CommandOutput) -> None:
+def save_output(recording_folder: Path, job_name: str, job_output: CommandOutput) -> None:
     """Save the output of a job; its summary file is written last, as a mark that the output is complete."""
-    arrays = {str(i): array for i, array in enumerate(job_answer.arrays.values())}
-    np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
+    arrays = {str(i): array for i, array in enumerate(job_output.arrays.values())}
+    np.savez_compressed(recording_folder / f"{job_name}.npz", allow_pickle=False, **arrays)
     note = {
-        "codes": job_answer.codes,
-        "message": job_answer.message,
-        "seconds": job_answer.seconds,
-        "arrays": list(job_answer.arrays),
+        "codes": job_output.codes,
+        "message": job_output.message,
+        "seconds": job_output.seconds,
+        "arrays": list(job_output.arrays),
     }
-    (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
+    (recording_folder / f"{job_name}.json").write_text(json.dumps(note, indent=1))
 
 
-def load_output(folder: Path, name: str) -> CommandOutput | None:
+def load_output(recording_folder: Path, job_name: str) -> CommandOutput | None:
     """The saved output of a job; None if it is missing or incomplete."""
     try:
-        note = json.loads((folder / f"{name}.json").read_text())
-        with np.load(folder / f"{name}.npz") as file:
+        note = json.loads((recording_folder / f"{job_name}.json").read_text())
+        with np.load(recording_folder / f"{job_name}.npz") as file:
             arrays = {key: file[str(i)] for i, key in enumerate(note["arrays"])}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
@@ -199,47 +199,53 @@ class OutputDifference:
 
 
 def output_difference(
-    recorded_output: CommandOutput, current_answer: CommandOutput, bound: float, renamed_channels: Mapping[str, str]
+    recorded_output: CommandOutput,
+    current_output: CommandOutput,
+    relative_bound: float,
+    renamed_channels: Mapping[str, str],
 ) -> OutputDifference:
     """Differences of a job's output from the recorded output.
 
-    bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed_channels :
-    earlier names of channels to later ones; a channel that is in another file now is looked for by its name.
+    relative_bound : largest change of a number by the largest one of its channel; 0 asks for the same bits.
+    renamed_channels : earlier names of channels to later ones; a channel that is in another file now is looked for by
+    its name.
     """
     difference = OutputDifference()
-    if recorded_output.codes != current_answer.codes:
+    if recorded_output.codes != current_output.codes:
         difference.wrong.append(
-            f"exit codes {recorded_output.codes} are {current_answer.codes}: {current_answer.message.strip()[-200:]}"
+            f"exit codes {recorded_output.codes} are {current_output.codes}: {current_output.message.strip()[-200:]}"
         )
-    if recorded_output.message != current_answer.message:
+    if recorded_output.message != current_output.message:
         difference.tolerated.append(
-            f"message {recorded_output.message.strip()[:200]!r} is {current_answer.message.strip()[:200]!r}"
+            f"message {recorded_output.message.strip()[:200]!r} is {current_output.message.strip()[:200]!r}"
         )
     matched = set()
     for name, array in recorded_output.arrays.items():
         if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED_KEYS):
             continue
-        if (later := _renamed_channel(name, current_answer.arrays, renamed_channels)) is None:
+        if (later := _renamed_channel(name, current_output.arrays, renamed_channels)) is None:
             difference.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
-        if text := _change_text(array, current_answer.arrays[later], bound):
+        if text := _change_text(array, current_output.arrays[later], relative_bound):
             (difference.tolerated if array.dtype.kind == "U" else difference.wrong).append(f"{name}: {text}")
-    difference.tolerated += [f"{name} is new" for name in current_answer.arrays if name not in matched]
+    difference.tolerated += [f"{name} is new" for name in current_output.arrays if name not in matched]
     return difference
 
 
-def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed_channels: Mapping[str, str]) -> str | None:
+def _renamed_channel(
+    recorded_name: str, later_arrays: Mapping[str, np.ndarray], renamed_channels: Mapping[str, str]
+) -> str | None:
     """Name of a recorded channel in later arrays: unchanged, renamed, or in another file if only one file has this
     channel; None if it is missing."""
-    if (name_then := renamed_channels.get(name, name)) in arrays:
+    if (name_then := renamed_channels.get(recorded_name, recorded_name)) in later_arrays:
         return name_then
     channel = name_then.partition(": ")[2]
-    other_names = [other_name for other_name in arrays if other_name.partition(": ")[2] == channel]
+    other_names = [other_name for other_name in later_arrays if other_name.partition(": ")[2] == channel]
     return other_names[0] if len(other_names) == 1 else None
 
 
-def _change_text(recorded_values: np.ndarray, current_values: np.ndarray, bound: float) -> str:
+def _change_text(recorded_values: np.ndarray, current_values: np.ndarray, relative_bound: float) -> str:
     """Sentence part on how an array changed; "" if no change exceeds the bound, relative to its largest number."""
     if (
         recorded_values.dtype.kind == current_values.dtype.kind == "U"
@@ -250,7 +256,7 @@ def _change_text(recorded_values: np.ndarray, current_values: np.ndarray, bound:
         return f"{recorded_values.dtype} {recorded_values.shape} is {current_values.dtype} {current_values.shape}"
     if recorded_values.tobytes() == current_values.tobytes():
         return ""
-    if recorded_values.dtype.kind != "f" or not bound:
+    if recorded_values.dtype.kind != "f" or not relative_bound:
         return "other values" if recorded_values.size > 1 else f"{recorded_values} is {current_values}"
     known = np.isfinite(recorded_values)
     if (
@@ -261,4 +267,4 @@ def _change_text(recorded_values: np.ndarray, current_values: np.ndarray, bound:
     share = abs(recorded_values - current_values)[known].max(initial=0.0) / max(
         abs(recorded_values)[known].max(initial=0.0), 1e-300
     )
-    return "" if share <= bound else f"a number changed by {share:.2g} of the largest"
+    return "" if share <= relative_bound else f"a number changed by {share:.2g} of the largest"

@@ -38,15 +38,21 @@ class ReplayJob:
     scene: str = ""
 
 
-def replay_jobs(command: str) -> list[ReplayJob]:
-    """All jobs of a replay; ``command``: the twinrig executable that lists the shipped scenes."""
-    return [ReplayJob("list", (("list",),)), *_shipped_jobs(command), *_listed_jobs(), *_base_jobs(), *_varied_jobs()]
+def replay_jobs(executable: str) -> list[ReplayJob]:
+    """All jobs of a replay; ``executable``: the twinrig executable that lists the shipped scenes."""
+    return [
+        ReplayJob("list", (("list",),)),
+        *_shipped_jobs(executable),
+        *_listed_jobs(),
+        *_base_jobs(),
+        *_varied_jobs(),
+    ]
 
 
-def _shipped_jobs(command: str) -> Iterator[ReplayJob]:
+def _shipped_jobs(executable: str) -> Iterator[ReplayJob]:
     """Yield a job for every shipped scene, which shows the scene and runs it in a shortened form."""
     shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
-    listing = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run([executable, "list"], capture_output=True, text=True, check=True).stdout
     for line in listing.splitlines()[1:]:
         if not line.startswith("  "):
             return
@@ -85,25 +91,25 @@ def _varied_jobs() -> Iterator[ReplayJob]:
         yield _random_job(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), generator)
 
 
-def _random_job(name: str, scene: Table, generator: np.random.Generator) -> ReplayJob:
+def _random_job(job_name: str, scene_table: Table, generator: np.random.Generator) -> ReplayJob:
     """Job that runs a random variant of a base scene: tables removed, numbers changed, a random engine, and sometimes a
     mistake."""
     from tomli_w import dumps
 
-    engines = scene.pop("engines_asked", ENGINES)
+    engines = scene_table.pop("engines_asked", ENGINES)
     engine = str(generator.choice(engines)) if engines else ""
-    _drop_random_tables(scene, generator)
+    _drop_random_tables(scene_table, generator)
     if generator.random() < CHANGED_CHANCE:
-        for number_path in generator.permutation(list(_paths_of_numbers(scene)))[:3]:
-            _change_number(scene, str(number_path), float(generator.uniform(*FACTOR_RANGE)))
+        for number_path in generator.permutation(list(_paths_of_numbers(scene_table)))[:3]:
+            _change_number(scene_table, str(number_path), float(generator.uniform(*FACTOR_RANGE)))
     if generator.random() < MISTAKE_CHANCE:
-        engine = _make_mistake(scene, engine, generator)
-    return ReplayJob(name, (_run_command(engine),), dumps(scene))
+        engine = _make_mistake(scene_table, engine, generator)
+    return ReplayJob(job_name, (_run_command(engine),), dumps(scene_table))
 
 
-def _drop_random_tables(scene: Table, generator: np.random.Generator) -> None:
-    effects = scene.get("effects")
-    for table in (scene, effects if isinstance(effects, dict) else {}):
+def _drop_random_tables(scene_table: Table, generator: np.random.Generator) -> None:
+    effects = scene_table.get("effects")
+    for table in (scene_table, effects if isinstance(effects, dict) else {}):
         for key in list(table):
             if (
                 isinstance(table[key], dict)
@@ -113,37 +119,37 @@ def _drop_random_tables(scene: Table, generator: np.random.Generator) -> None:
                 del table[key]
 
 
-def _paths_of_numbers(table: Table, path_prefix: str = "") -> Iterator[str]:
+def _paths_of_numbers(scene_table: Table, key_path_prefix: str = "") -> Iterator[str]:
     """Yield the paths (keys joined by /) of all floating-point numbers of a table."""
-    for key, value in table.items():
+    for key, value in scene_table.items():
         if isinstance(value, dict):
-            yield from _paths_of_numbers(value, f"{path_prefix}{key}/")
+            yield from _paths_of_numbers(value, f"{key_path_prefix}{key}/")
         elif isinstance(value, float):
-            yield f"{path_prefix}{key}"
+            yield f"{key_path_prefix}{key}"
 
 
-def _table_and_key(scene: Table, number_path: str) -> tuple[Table, str]:
-    *parent_keys, key = number_path.split("/")
+def _table_and_key(scene_table: Table, key_path: str) -> tuple[Table, str]:
+    *parent_keys, key = key_path.split("/")
     for parent_key in parent_keys:
-        scene = scene[parent_key]
-    return scene, key
+        scene_table = scene_table[parent_key]
+    return scene_table, key
 
 
-def _change_number(scene: Table, number_path: str, factor: float) -> None:
-    table, key = _table_and_key(scene, number_path)
-    table[key] = float(f"{factor * table[key]:.4g}")
+def _change_number(scene_table: Table, key_path: str, number_factor: float) -> None:
+    table, key = _table_and_key(scene_table, key_path)
+    table[key] = float(f"{number_factor * table[key]:.4g}")
 
 
-def _make_mistake(scene: Table, engine: str, generator: np.random.Generator) -> str:
+def _make_mistake(scene_table: Table, engine: str, generator: np.random.Generator) -> str:
     """Put a typical user's mistake into a scene; returns the name of the engine to run, which may be the mistake."""
-    original_scene = copy.deepcopy(scene)
+    original_scene = copy.deepcopy(scene_table)
     number_paths = sorted(_paths_of_numbers(original_scene))
     kind = int(generator.integers(5))
     if kind == 0 or not number_paths:
-        scene["vehicel"] = {}
+        scene_table["vehicel"] = {}
     elif kind == 4:
         return "exodyn"
     else:
-        table, key = _table_and_key(scene, str(generator.choice(number_paths)))
+        table, key = _table_and_key(scene_table, str(generator.choice(number_paths)))
         table[key] = {1: "a text", 2: -abs(table[key]) - 1.0, 3: float("nan")}[kind]
     return engine

@@ -12,13 +12,13 @@ SHOWN_IDS = 3
 """Number of row ids and of tests that a line of the section names; further ones are only counted."""
 
 
-def blind_spots(path: Path = TABLE_FILE) -> Saved:
+def blind_spots(table_path: Path = TABLE_FILE) -> Saved:
     """Content of the report's section on blind spots: lines of the saved table, counts by module, commits, and
     functions that no independent check covers, by the reason.
 
     A compiled function that the sources share now and that has no line is not covered: it was not audited.
     """
-    lines = read_table(path)
+    lines = read_table(table_path)
     names = dict.fromkeys((*(line.function for line in lines), *compiled_functions()))
     return {
         "lines": [_function_record(line) for line in lines],

@@ -12,9 +12,9 @@ PLAIN_MAGNITUDES = (1e-3, 1e5)
 """Range of magnitudes that are written without a power of ten."""
 
 
-def number_markup(table_value: Any, digits: int = 4) -> Markup:
-    """Text of a number with ``digits`` significant digits, such as ``0.0123`` or ``8.9e-16``; text stays as it is, None
-    becomes a dash."""
+def number_markup(table_value: Any, digit_count: int = 4) -> Markup:
+    """Text of a number with ``digit_count`` significant digits, such as ``0.0123`` or ``8.9e-16``; text stays as it is,
+    None becomes a dash."""
     if table_value is None or table_value == "":
         return Markup("–")
     if isinstance(table_value, bool) or not isinstance(table_value, int | float):
@@ -28,8 +28,8 @@ def number_markup(table_value: Any, digits: int = 4) -> Markup:
     if isinstance(table_value, int) and abs(table_value) < 10**7:
         return Markup(table_value)
     if table_value == 0 or PLAIN_MAGNITUDES[0] <= abs(table_value) < PLAIN_MAGNITUDES[1]:
-        return Markup(_significant(table_value, digits))
-    return Markup(_scientific_text(table_value, digits))
+        return Markup(_significant(table_value, digit_count))
+    return Markup(_scientific_text(table_value, digit_count))
 
 
 def error_markup(table_value: Any) -> Markup:
@@ -38,22 +38,22 @@ def error_markup(table_value: Any) -> Markup:
     return number_markup(table_value, 4 if plain else 2)
 
 
-def _scientific_text(number: float, digits: int) -> str:
+def _scientific_text(number: float, digit_count: int) -> str:
     """Text of a number in scientific notation such as ``8.9e-16``, without leading zeros in the exponent."""
-    mantissa, power = f"{number:.{digits - 1}e}".split("e")
+    mantissa, power = f"{number:.{digit_count - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(power)}"
 
 
-def _significant(number: float, digits: int) -> str:
-    """Text of a number in fixed notation with ``digits`` significant digits, without trailing zeros."""
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)))) if number else 0
+def _significant(number: float, digit_count: int) -> str:
+    """Text of a number in fixed notation with ``digit_count`` significant digits, without trailing zeros."""
+    decimals = max(0, digit_count - 1 - math.floor(math.log10(abs(number)))) if number else 0
     text = f"{number:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def margin_of_row(row: dict[str, Any]) -> float | None:
+def margin_of_row(report_row: dict[str, Any]) -> float | None:
     """Ratio of |value - expected| of a row to its tolerance; None if a number is missing or the tolerance is zero."""
-    value, expected, tolerance = row["value"], row["expected"], row["tolerance"]
+    value, expected, tolerance = report_row["value"], report_row["expected"], report_row["tolerance"]
     numeric = all(isinstance(x, int | float) and not isinstance(x, bool) for x in (value, expected, tolerance))
     if not numeric or tolerance <= 0:
         return None
@@ -85,21 +85,23 @@ NUMERIC_PATTERN = re.compile(
 """Pattern of a table cell that holds a number, or a word for a missing number."""
 
 
-def powers_markup(cell: Any) -> Markup:
+def powers_markup(table_cell: Any) -> Markup:
     """Text in which numbers such as 2e-06 are written ``2e-6``, and numbers up to a few thousand without a power of
     ten."""
 
-    def written(match: re.Match[str]) -> str:
-        power = int(match[2])
-        return f"{float(match[0]):g}" if power in range(4) else f"{match[1]}e{power}"
+    def written(number_match: re.Match[str]) -> str:
+        power = int(number_match[2])
+        return f"{float(number_match[0]):g}" if power in range(4) else f"{number_match[1]}e{power}"
 
-    return Markup(POWER_OF_TEN.sub(written, str(escape(cell))))
+    return Markup(POWER_OF_TEN.sub(written, str(escape(table_cell))))
 
 
-def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
-    """For each column of a table, at least ``count``, whether it holds numbers and is aligned right; False for the
-    first column."""
-    columns = [[str(cell).strip() for cell in column] for column in zip_longest([""] * count, *rows, fillvalue="")]
+def numeric_columns(table_rows: Sequence[Sequence[Any]], column_count: int) -> list[bool]:
+    """For each column of a table, at least ``column_count``, whether it holds numbers and is aligned right; False for
+    the first column."""
+    columns = [
+        [str(cell).strip() for cell in column] for column in zip_longest([""] * column_count, *table_rows, fillvalue="")
+    ]
     right = [
         all(map(NUMERIC_PATTERN.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column)
         for column in columns
@@ -107,7 +109,7 @@ def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
     return [False, *right[1:]]
 
 
-def docstring_markup(text: str) -> Markup:
+def docstring_markup(docstring: str) -> Markup:
     """HTML of a docstring, with its **strong** and ``code`` marks."""
-    strong = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(text)))
+    strong = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(docstring)))
     return Markup(re.sub(r"``(.+?)``", r"<code>\1</code>", strong))

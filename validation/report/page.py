@@ -49,71 +49,78 @@ INDEPENDENCE_TEXTS = {
 assert set(INDEPENDENCE_TEXTS) == set(get_args(Independence))
 
 
-def report_verdict(results: Saved) -> Saved:
+def report_verdict(validation_results: Saved) -> Saved:
     """Verdict of the report: number of rows by status, warnings on their source, the tightest passed row, and the
     computing time."""
-    rows = results["rows"]
+    rows = validation_results["rows"]
     of = {status: [row for row in rows if row["status"] == status] for status in STATUSES}
     margins = [(ratio, row) for row in of["passed"] if (ratio := margin_of_row(row)) is not None]
     return {
         "count": len(rows),
         "of": of,
         "worst": max(margins, key=lambda pair: pair[0], default=None),
-        "seconds": results["provenance"]["wall"],
-        "source": _source_lines(results["provenance"]),
+        "seconds": validation_results["provenance"]["wall"],
+        "source": _source_lines(validation_results["provenance"]),
     }
 
 
-def _source_lines(provenance: Saved) -> list[tuple[str, str]]:
+def _source_lines(report_provenance: Saved) -> list[tuple[str, str]]:
     """Version, commit, date, machine and data of a report, as pairs of name and value."""
     known = {"version": "twinrig", "commit": "commit", "date": "date", "machine": "machine", "data": "data"}
-    return [(name, str(provenance.get(key) or "not saved")) for name, key in known.items()]
+    return [(name, str(report_provenance.get(key) or "not saved")) for name, key in known.items()]
 
 
-def silent_systems(rows: list[Saved]) -> list[str]:
+def silent_systems(report_rows: list[Saved]) -> list[str]:
     """Names of the systems of which no row was run."""
-    run = {row["system"] for row in rows if row["status"] != "not run"}
+    run = {row["system"] for row in report_rows if row["status"] != "not run"}
     return [system for system in get_args(System) if system not in run]
 
 
-def rows_by_system(results: Saved, page_content: dict[str, Saved]) -> list[Saved]:
-    """Rows grouped by system and, within it, by case, in the order of the report; page_content : title, tables and
+def rows_by_system(validation_results: Saved, content_of_case: dict[str, Saved]) -> list[Saved]:
+    """Rows grouped by system and, within it, by case, in the order of the report; content_of_case : title, tables and
     figures of each case."""
-    order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
-    by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
+    order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in validation_results["rows"]))))
+    by_system = sorted(validation_results["rows"], key=lambda row: order.index(row["system"]))
     return [
-        {"name": system, "cases": list(_cases_of_system(list(rows), results["provenance"]["seconds"], page_content))}
+        {
+            "name": system,
+            "cases": list(_cases_of_system(list(rows), validation_results["provenance"]["seconds"], content_of_case)),
+        }
         for system, rows in groupby(by_system, key=lambda row: row["system"])
     ]
 
 
-def _cases_of_system(rows: list[Saved], seconds: dict[str, float], page_content: dict[str, Saved]) -> Iterator[Saved]:
-    for name in dict.fromkeys(map(case_of_row, rows)):
-        of_case = [row for row in rows if case_of_row(row) == name]
+def _cases_of_system(
+    report_rows: list[Saved], seconds_of_case: dict[str, float], content_of_case: dict[str, Saved]
+) -> Iterator[Saved]:
+    for name in dict.fromkeys(map(case_of_row, report_rows)):
+        of_case = [row for row in report_rows if case_of_row(row) == name]
         groups: dict[str, list[Saved]] = {}
         for row in of_case:
             groups.setdefault(row["why"], []).append(row)
         statuses = [row["status"] for row in of_case]
         yield {
             "name": name,
-            "seconds": seconds.get(name),
+            "seconds": seconds_of_case.get(name),
             "groups": [{"why": why, "rows": alike} for why, alike in groups.items()],
             "count": len(of_case),
             "failed": statuses.count("failed"),
             "missed": statuses.count("missed"),
-            **page_content[name],
+            **content_of_case[name],
         }
 
 
-def independence_counts(results: Saved, page_content: dict[str, Saved]) -> Saved:
-    """Number of rows of each case for each kind of independence of the two compared sides; page_content : title, tables
-    and figures of each case."""
+def independence_counts(validation_results: Saved, content_of_case: dict[str, Saved]) -> Saved:
+    """Number of rows of each case for each kind of independence of the two compared sides; content_of_case : title,
+    tables and figures of each case."""
     lines = []
-    for name in dict.fromkeys(map(case_of_row, results["rows"])):
+    for name in dict.fromkeys(map(case_of_row, validation_results["rows"])):
         kinds = [
-            row["independence"] for row in results["rows"] if case_of_row(row) == name and row["status"] != "not run"
+            row["independence"]
+            for row in validation_results["rows"]
+            if case_of_row(row) == name and row["status"] != "not run"
         ]
-        lines.append((name, page_content[name]["title"], [kinds.count(kind) for kind in INDEPENDENCE_TEXTS]))
+        lines.append((name, content_of_case[name]["title"], [kinds.count(kind) for kind in INDEPENDENCE_TEXTS]))
     return {
         "kinds": INDEPENDENCE_TEXTS,
         "lines": lines,
@@ -121,10 +128,10 @@ def independence_counts(results: Saved, page_content: dict[str, Saved]) -> Saved
     }
 
 
-def evidence_counts(rows: list[Saved]) -> list[tuple[str, list[int]]]:
+def evidence_counts(report_rows: list[Saved]) -> list[tuple[str, list[int]]]:
     """For each system, its name and the numbers of rows by the independence of the two compared sides, in the order of
     INDEPENDENCE_TEXTS; rows that were not run are left out."""
-    ran = [row for row in rows if row["status"] != "not run"]
+    ran = [row for row in report_rows if row["status"] != "not run"]
     names = dict.fromkeys(row["system"] for row in ran)
     kinds = {name: [row["independence"] for row in ran if row["system"] == name] for name in names}
     return [(name, [each.count(kind) for kind in INDEPENDENCE_TEXTS]) for name, each in kinds.items()]
@@ -134,10 +141,10 @@ NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
 """Pattern of the text parts in which allowed broken assumptions of similar runs of a case differ."""
 
 
-def allowed_assumptions(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
+def allowed_assumptions(report_rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
     """Each allowed broken assumption, similar ones merged, with the rows that rest on it."""
     alike_rows: dict[tuple[str, str], list[Saved]] = {}
-    for row in rows:
+    for row in report_rows:
         if row["allowed"]:
             alike_rows.setdefault((case_of_row(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
     return [(alike[0]["allowed"], alike) for alike in alike_rows.values()]
@@ -184,33 +191,33 @@ def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
             yield name, module
 
 
-def write(folder: Path, map_cases: Callable[..., Iterable[Any]] = map) -> Path:
-    """Write ``folder/report.html`` from ``results.json`` and ``data/CASE.json``; returns the path of the page.
+def write(report_folder: Path, map_cases: Callable[..., Iterable[Any]] = map) -> Path:
+    """Write ``report_folder/report.html`` from ``results.json`` and ``data/CASE.json``; returns the path of the page.
 
     map_cases : maps the function that draws a case over all cases, such as the map of a pool of processes.
     """
-    results = read(folder / "results.json")
-    path = folder / "report.html"
-    write_whole(path, page_text(results, folder / "data", map_cases))
+    results = read(report_folder / "results.json")
+    path = report_folder / "report.html"
+    write_whole(path, page_text(results, report_folder / "data", map_cases))
     return path
 
 
-def read(path: Path) -> Saved:
+def read(results_path: Path) -> Saved:
     """Saved results of a validation; raises InputError if the file holds none."""
     try:
-        results = json.loads(path.read_text(encoding="utf-8"))
+        results = json.loads(results_path.read_text(encoding="utf-8"))
         return {
             "provenance": {**BLANK_PROVENANCE, **results["provenance"]},
             "rows": [row_of_saved(row) for row in results["rows"]],
             "against": results.get("against"),
         }
     except FileNotFoundError:
-        raise InputError(path, "", None, "no such file: `twinrig validate` writes it") from None
+        raise InputError(results_path, "", None, "no such file: `twinrig validate` writes it") from None
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(path, "", None, f"not the results of a validation: {error}") from None
+        raise InputError(results_path, "", None, f"not the results of a validation: {error}") from None
 
 
-def page_text(results: Saved, case_data: Path, map_cases: Callable[..., Iterable[Any]] = map) -> str:
+def page_text(validation_results: Saved, case_data_folder: Path, map_cases: Callable[..., Iterable[Any]] = map) -> str:
     """HTML text of the report's page."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {
@@ -223,20 +230,22 @@ def page_text(results: Saved, case_data: Path, map_cases: Callable[..., Iterable
         "numeric_columns": numeric_columns,
     }
     environment.globals |= {"margin": margin_of_row}
-    names = list(dict.fromkeys(map(case_of_row, results["rows"])))
-    drawn = dict(zip(names, map_cases(partial(case_on_page, case_data), names), strict=True))
+    names = list(dict.fromkeys(map(case_of_row, validation_results["rows"])))
+    drawn = dict(zip(names, map_cases(partial(case_on_page, case_data_folder), names), strict=True))
     return environment.get_template(PAGE_TEMPLATE).render(
-        verdict=report_verdict(results),
-        against=results.get("against"),
-        systems=rows_by_system(results, drawn),
-        silent=silent_systems(results["rows"]),
-        shares=report_sizes_of_systems(results),
-        independence=independence_counts(results, drawn),
-        evidence=evidence_counts(results["rows"]),
-        measured_rows=sum(row["independence"] == "measured" and row["status"] != "not run" for row in results["rows"]),
-        allowances=allowed_assumptions(results["rows"]),
+        verdict=report_verdict(validation_results),
+        against=validation_results.get("against"),
+        systems=rows_by_system(validation_results, drawn),
+        silent=silent_systems(validation_results["rows"]),
+        shares=report_sizes_of_systems(validation_results),
+        independence=independence_counts(validation_results, drawn),
+        evidence=evidence_counts(validation_results["rows"]),
+        measured_rows=sum(
+            row["independence"] == "measured" and row["status"] != "not run" for row in validation_results["rows"]
+        ),
+        allowances=allowed_assumptions(validation_results["rows"]),
         blind=blind_spots(),
         conventions=conventions(),
         parameters=parameter_tables(),
-        provenance=results["provenance"],
+        provenance=validation_results["provenance"],
     )

@@ -43,39 +43,42 @@ def full_report_data() -> dict[str, Saved]:
     return kept
 
 
-def case_of_row(row: Saved) -> str:
+def case_of_row(report_row: Saved) -> str:
     """Name of the case that a row belongs to: the row's id begins with it, or with one of its words."""
-    first = row["id"].partition(".")[0]
+    first = report_row["id"].partition(".")[0]
     return first if first in CASES else next((case for case in CASES if first in case.split("_")), first)
 
 
-def report_sizes_of_systems(results: Saved) -> list[Saved]:
+def report_sizes_of_systems(validation_results: Saved) -> list[Saved]:
     """For each system, the numbers of cases and rows that were measured, computing times, and the same for the last
     full report.
 
     A case counts to the system of most of its rows. What is not known of some case of a system is None.
     """
-    counted = _row_counts(results["rows"])
+    counted = _row_counts(validation_results["rows"])
     main = {case: systems.most_common(1)[0][0] for case, systems in counted.items()}
     return [
-        _sizes_of_system(system, counted, main, results["provenance"]["seconds"])
+        _sizes_of_system(system, counted, main, validation_results["provenance"]["seconds"])
         for system in QUICK_SECONDS
         if any(system in systems for systems in counted.values())
     ]
 
 
 def _sizes_of_system(
-    system: str, row_counts: dict[str, Counter[str]], main_system_of_case: dict[str, str], seconds: dict[str, float]
+    system_name: str,
+    row_counts: dict[str, Counter[str]],
+    main_system_of_case: dict[str, str],
+    seconds_of_case: dict[str, float],
 ) -> Saved:
-    main_cases = [case for case in row_counts if main_system_of_case[case] == system]
-    shared = [case for case in row_counts if system in row_counts[case]]
+    main_cases = [case for case in row_counts if main_system_of_case[case] == system_name]
+    shared = [case for case in row_counts if system_name in row_counts[case]]
     return {
-        "name": system,
+        "name": system_name,
         "cases": len(main_cases),
-        "rows": sum(row_counts[case][system] for case in shared),
-        "seconds": sum(seconds.get(case, 0.0) for case in main_cases),
-        "stated": QUICK_SECONDS[system],
-        "full_rows": sum(full_report_data()[case]["rows"].get(system, 0) for case in shared)
+        "rows": sum(row_counts[case][system_name] for case in shared),
+        "seconds": sum(seconds_of_case.get(case, 0.0) for case in main_cases),
+        "stated": QUICK_SECONDS[system_name],
+        "full_rows": sum(full_report_data()[case]["rows"].get(system_name, 0) for case in shared)
         if full_report_data().keys() >= set(shared)
         else None,
         "full_seconds": sum(full_report_data()[case]["seconds"] for case in main_cases)
@@ -84,23 +87,23 @@ def _sizes_of_system(
     }
 
 
-def _row_counts(rows: list[Saved]) -> dict[str, Counter[str]]:
+def _row_counts(report_rows: list[Saved]) -> dict[str, Counter[str]]:
     """Numbers of rows by system, for each case."""
     counted: dict[str, Counter[str]] = {}
-    for row in rows:
+    for row in report_rows:
         counted.setdefault(case_of_row(row), Counter())[row["system"]] += 1
     return counted
 
 
-def save_full_report(folder: Path) -> None:
+def save_full_report(report_folder: Path) -> None:
     """Save the number of rows and the seconds of each case of a full report in ``full_report.json``; raises InputError
     for a quick report."""
     from validation.report.page import read
 
-    results = read(folder / "results.json")
+    results = read(report_folder / "results.json")
     source = results["provenance"]
     if source["quick"]:
-        raise InputError(folder / "results.json", "provenance.quick", True, "the results of a full report")
+        raise InputError(report_folder / "results.json", "provenance.quick", True, "the results of a full report")
     new = {
         case: {"rows": dict(systems), "seconds": round(source["seconds"][case], 1), "commit": source["commit"]}
         for case, systems in _row_counts(results["rows"]).items()

@@ -44,9 +44,9 @@ class NonlinearRide:
     quantities: tuple[str, ...]
     tolerance: float
 
-    def prepared_in_time(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
-        """The random scene prepared for runs in time, with ``copies`` Monte Carlo copies."""
-        options = {"copies": copies, "lasting": RUN_DURATION, "seed": seed}
+    def prepared_in_time(self, copy_count: int = COPIES, seed: int = 1) -> CopiesInTime:
+        """The random scene prepared for runs in time, with ``copy_count`` Monte Carlo copies."""
+        options = {"copies": copy_count, "lasting": RUN_DURATION, "seed": seed}
         return in_time(replace(self.scene, ride_scene=self.scene.ride_scene.model_copy(update={"options": options})))
 
 
@@ -56,21 +56,21 @@ class RandomNumbers:
     def __init__(self, seed: int | list[int]) -> None:
         self.random = np.random.default_rng(seed)
 
-    def log_uniform(self, low: float, high: float) -> float:
+    def log_uniform(self, lower_limit: float, upper_limit: float) -> float:
         """Random number between two positive limits, uniform in its logarithm."""
-        return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
+        return float(np.exp(self.random.uniform(np.log(lower_limit), np.log(upper_limit))))
 
 
-def random_linear_ride(seed: int, tolerance: float | None = None, detailed: bool = True) -> LinearRide:
+def random_linear_ride(seed: int, tolerance: float | None = None, with_details: bool = True) -> LinearRide:
     """The random linear ride scene of a seed; the tolerance is random from 0.5 to 10 % by default.
 
-    detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
-    else each of them in about half of the scenes, and soft at times.
+    with_details : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff
+    mounts; else each of them in about half of the scenes, and soft at times.
     """
     draw = RandomNumbers(seed)
     rng = draw.random
     name = str(rng.choice(VEHICLES))
-    vehicle = _random_vehicle(changed_vehicle(_load_vehicle(name), seed), draw, detailed)
+    vehicle = _random_vehicle(changed_vehicle(_load_vehicle(name), seed), draw, with_details)
     cutoff = draw.log_uniform(20.0, 200.0) if rng.random() < 0.4 else None
     speed = float(rng.uniform(8.0, 40.0))
     scene = _ride_scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
@@ -84,36 +84,44 @@ def random_linear_ride(seed: int, tolerance: float | None = None, detailed: bool
     return LinearRide(scene, speed, drawn_quantities, tolerance or draw.log_uniform(0.005, 0.1))
 
 
-def _ride_scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
-    table = {"title": title, "system": "ride", "vehicle": {"file": file}, "road": road, "speeds": {"values": [speed]}}
+def _ride_scene(
+    scene_title: str, vehicle_file: str, road_table: dict[str, float], speed: float, vehicle: SpatialVehicle
+) -> ReducedScene:
+    table = {
+        "title": scene_title,
+        "system": "ride",
+        "vehicle": {"file": vehicle_file},
+        "road": road_table,
+        "speeds": {"values": [speed]},
+    }
     return ReducedScene(build(table, "drawn"), vehicle)
 
 
-def _random_vehicle(vehicle: SpatialVehicle, generator: RandomNumbers, detailed: bool) -> SpatialVehicle:
+def _random_vehicle(vehicle: SpatialVehicle, random_numbers: RandomNumbers, with_details: bool) -> SpatialVehicle:
     """Random variant of a vehicle: changed wheel masses and dampers, damped tyres in three of five variants, sometimes
     a stiff fore-aft bushing at each wheel and a small body on a mount."""
-    rng, log_uniform, wheels = generator.random, generator.log_uniform, wheels_of(vehicle)
+    rng, log_uniform, wheels = random_numbers.random, random_numbers.log_uniform, wheels_of(vehicle)
     light, firm = log_uniform(0.15, 1.2), log_uniform(0.5, 4.0)
     damping = log_uniform(30.0, 400.0) if rng.random() < 0.6 else 0.0
     bodies = [replace(b, mass=light * b.mass) if b.name in wheels else b for b in vehicle.bodies]
     springs = [replace(s, damping=firm * s.damping) for s in vehicle.springs]
     outputs = list(vehicle.outputs)
-    if detailed or rng.random() < 0.4:
-        k, lean = log_uniform(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
+    if with_details or rng.random() < 0.4:
+        k, lean = log_uniform(1e6 if with_details else 3e5, 2e7), rng.uniform(0.02, 0.15)
         axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
         for i, body in enumerate(bodies):
             if body.name in wheels:
                 bodies[i], position = replace(body, freedoms=("x", "z")), body.position
                 c = 0.1 * float(np.sqrt(k * body.mass))
                 springs.append(SpringDamper(f"{body.name} bush", "body", body.name, position, position, axis, k, c))
-    if detailed or rng.random() < 0.6:
+    if with_details or rng.random() < 0.6:
         chassis = next(b for b in bodies if b.name == "body")
-        m = chassis.mass * log_uniform(0.002, 0.02 if detailed else 0.15)
+        m = chassis.mass * log_uniform(0.002, 0.02 if with_details else 0.15)
         position = (chassis.position[0] + float(rng.uniform(-1, 1)), *chassis.position[1:])
-        k = m * (2 * np.pi * log_uniform(20.0 if detailed else 3.0, 200.0)) ** 2
+        k = m * (2 * np.pi * log_uniform(20.0 if with_details else 3.0, 200.0)) ** 2
         bodies.append(Body("part", m, position, ("z",)))
         springs.append(SpringDamper("part", "part", "body", position, position, UPWARD, k, 0.2 * float(np.sqrt(k * m))))
-        if not detailed:
+        if not with_details:
             outputs.append(PointOutput("part", "acceleration", "part", position, UPWARD))
     tyres = tuple(replace(tyre, damping=damping) for tyre in vehicle.tyres)
     return replace(vehicle, bodies=tuple(bodies), springs=tuple(springs), tyres=tyres, outputs=tuple(outputs))
@@ -131,18 +139,18 @@ def random_nonlinear_ride(scene_number: int) -> NonlinearRide:
     return NonlinearRide(scene, tuple(map(str, drawn_quantities)), TOLERANCES[scene_number % len(TOLERANCES)])
 
 
-def _nonlinear_spring(spring: SpringDamper, generator: RandomNumbers) -> SpringDamper:
+def _nonlinear_spring(spring: SpringDamper, random_numbers: RandomNumbers) -> SpringDamper:
     """The spring with a digressive damper that is harder in rebound, two bump stops, and friction, each with high
     probability."""
-    c, rebound, digressive = spring.damping, generator.log_uniform(1.0, 2.5), generator.log_uniform(0.3, 1.0)
+    c, rebound, digressive = spring.damping, random_numbers.log_uniform(1.0, 2.5), random_numbers.log_uniform(0.3, 1.0)
     curve = Curve(
         (-1.0, -0.2, 0.0, 0.2, 1.0),
         (-c * rebound * (0.2 + 0.8 * digressive), -0.2 * c * rebound, 0.0, 0.2 * c, c * (0.2 + 0.8 * digressive)),
     )
-    gap, hard = generator.log_uniform(0.02, 0.08), generator.log_uniform(2e4, 2e5)
+    gap, hard = random_numbers.log_uniform(0.02, 0.08), random_numbers.log_uniform(2e4, 2e5)
     stops = Curve((-gap - 0.05, -gap, gap, gap + 0.05), (-0.05 * hard, 0.0, 0.0, 0.05 * hard))
-    friction = generator.log_uniform(5.0, 80.0)
-    bent, stopped, dry = generator.random.random(3) < (0.8, 0.7, 0.7)
+    friction = random_numbers.log_uniform(5.0, 80.0)
+    bent, stopped, dry = random_numbers.random.random(3) < (0.8, 0.7, 0.7)
     bent = bent or not (stopped or dry)
     return replace(
         spring,

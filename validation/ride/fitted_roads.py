@@ -27,21 +27,21 @@ MEASURED_SECTIONS = {"belgian_block.crg": (None, None), COURSE_FILE: (100.0, 404
 """Files of measured roads, and first and last station (m) of the section that is fitted."""
 
 
-def generated_road_rows(length: float) -> tuple[list[Row], dict[str, Any]]:
+def generated_road_rows(road_length: float) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data: parameters of the mean and roll process fitted to a road that is generated from them, divided by
-    their true values; length : of the road, m."""
+    their true values; road_length : of the road, m."""
     road, step = road_of_level(HALF_TRACK), 0.05
-    noise = normal_samples(SEED, 0, round(length / step), 2)
+    noise = normal_samples(SEED, 0, round(road_length / step), 2)
     mean, roll = (_first_order_samples(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
     tracks = MeasuredTracks(mean + HALF_TRACK * roll, mean - HALF_TRACK * roll, step, HALF_TRACK, "made")
-    fitted = fit_road(tracks, min(200.0, length / 4.5))
+    fitted = fit_road(tracks, min(200.0, road_length / 4.5))
     if fitted.roll is None:
         raise RuntimeError("a roll process that was put in was not found")
     rows = [
         Observed(
             f"ride_road.fit.{name}.{filter_parameter}",
             SYSTEM,
-            f"ratio of {filter_parameter} of the {name} process fitted to {length / 1e3:g} km of made road to the "
+            f"ratio of {filter_parameter} of the {name} process fitted to {road_length / 1e3:g} km of made road to the "
             "true value",
             getattr(process.filter, filter_parameter) / getattr(true, filter_parameter),
             "",
@@ -57,9 +57,10 @@ def generated_road_rows(length: float) -> tuple[list[Row], dict[str, Any]]:
     return rows, _figure_numbers(tracks, fitted)
 
 
-def _first_order_samples(shape_filter: ShapeFilter, unit_noise: np.ndarray, step: float) -> np.ndarray:
-    """Samples (n,) of a stationary first-order process at stations ``step`` m apart, from unit noise (n,); exact."""
-    decay = math.exp(-shape_filter.corner * step)
+def _first_order_samples(shape_filter: ShapeFilter, unit_noise: np.ndarray, station_spacing: float) -> np.ndarray:
+    """Samples (n,) of a stationary first-order process at stations ``station_spacing`` m apart, from unit noise (n,);
+    exact."""
+    decay = math.exp(-shape_filter.corner * station_spacing)
     driven = unit_noise * math.sqrt((1.0 - decay**2) * shape_filter.intensity / (2.0 * shape_filter.corner))
     driven[0] = unit_noise[0] * math.sqrt(shape_filter.intensity / (2.0 * shape_filter.corner))
     return lfilter([1.0], [1.0, -decay], driven)
@@ -98,7 +99,7 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
     return rows, shown
 
 
-def _figure_numbers(tracks: MeasuredTracks, fitted_road: FittedRoad) -> dict[str, Any]:
+def _figure_numbers(measured_tracks: MeasuredTracks, fitted_road: FittedRoad) -> dict[str, Any]:
     """Numbers of a fitted road that are saved for the figure and the table."""
     spectra = fitted_road.spectra
     drawn_rows = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
@@ -115,9 +116,9 @@ def _figure_numbers(tracks: MeasuredTracks, fitted_road: FittedRoad) -> dict[str
         for fit in (fitted_road.mean, fitted_road.roll)
     ]
     return {
-        "name": tracks.name,
-        "length": tracks.length,
-        "half_track": tracks.half_track,
+        "name": measured_tracks.name,
+        "length": measured_tracks.length,
+        "half_track": measured_tracks.half_track,
         "fits": fits,
         **{key: getattr(spectra, key)[drawn_rows].tolist() for key in ("wavenumber", "left", "coherency")},
         "chance": spectra.chance_coherency(),
@@ -125,16 +126,16 @@ def _figure_numbers(tracks: MeasuredTracks, fitted_road: FittedRoad) -> dict[str
     }
 
 
-def _verdict_text(is_resolved: bool, residual: float) -> str:
-    if residual > math.log(2.0):
+def _verdict_text(is_resolved: bool, relative_residual: float) -> str:
+    if relative_residual > math.log(2.0):
         return "not of first order"
     return "first order" if is_resolved else "a level only"
 
 
-def fits_table(roads: list[dict[str, Any]]) -> Table:
+def fits_table(fitted_roads: list[dict[str, Any]]) -> Table:
     """Table of the fitted mean and roll process of every road, with standard errors."""
     rows = []
-    for road in roads:
+    for road in fitted_roads:
         for process, unit, values in zip(("mean", "roll"), ("m", "1/m"), road["fits"], strict=True):
             columns = ["none", "none", "", "same heights twice"]
             if values is not None:
@@ -197,6 +198,6 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     return caption, figure
 
 
-def _road_label(road: dict[str, Any]) -> str:
-    name, length = road["name"].removesuffix(".crg").replace("_", " "), road["length"]
+def _road_label(fitted_road: dict[str, Any]) -> str:
+    name, length = fitted_road["name"].removesuffix(".crg").replace("_", " "), fitted_road["length"]
     return f"{name}, {length:.3g} m" if length < 999 else f"{name}, {length / 1e3:.3g} km"

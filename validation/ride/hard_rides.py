@@ -30,18 +30,22 @@ def linear_equations(vehicle: SpatialVehicle, implementation: str, speed: float 
     return linear_vehicle(vehicle, implementation)(speed)
 
 
-def closed_form_error(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
+def closed_form_error(
+    corner_wavenumber: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **quarter_car_parameters: float
+) -> Callable[..., float]:
     """Hard case: a quarter car with some parameters changed. Returns its error function: the relative error of the
     variances of acceleration and travel against the closed form."""
-    exact = replace(QuarterCar(*QUARTER_CAR_NUMBERS), **car)
+    exact = replace(QuarterCar(*QUARTER_CAR_NUMBERS), **quarter_car_parameters)
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(implementation: str, work_folder: Path) -> float:
         worst, vehicle = 0.0, quarter_car(*vars(exact).values())
         for speed in speeds:
             covariance = stationary_covariance(
-                vehicle_with_road(linear_equations(vehicle, implementation), one_track((0.0,), corner), speed)
+                vehicle_with_road(
+                    linear_equations(vehicle, implementation), one_track((0.0,), corner_wavenumber), speed
+                )
             )
-            q, w = ROAD_INTENSITY * speed, corner * speed
+            q, w = ROAD_INTENSITY * speed, corner_wavenumber * speed
             worst = max(
                 worst,
                 largest_relative_error(
@@ -54,13 +58,25 @@ def closed_form_error(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,),
     return error
 
 
-def quarter_car(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
-    """A quarter car with masses m_s, m_u (kg), spring k, damper c, tyre k_t and tyre damping c_t (N/m, N s/m); outputs:
+def quarter_car(
+    sprung_mass: float,
+    unsprung_mass: float,
+    spring_stiffness: float,
+    damping: float,
+    tyre_stiffness: float,
+    tyre_damping: float = 0.0,
+) -> SpatialVehicle:
+    """A quarter car (kg, N/m, N s/m); outputs:
     acceleration of the body, suspension travel, and force of the tyre."""
     car = replace(load_vehicle("quarter_car"), name="quarter")
-    bodies = tuple(replace(body, mass=m) for body, m in zip(car.bodies, (m_s, m_u), strict=True))
-    springs = (replace(car.springs[0], stiffness=k, damping=c),)
-    return replace(car, bodies=bodies, springs=springs, tyres=(replace(car.tyres[0], stiffness=k_t, damping=c_t),))
+    bodies = tuple(replace(body, mass=m) for body, m in zip(car.bodies, (sprung_mass, unsprung_mass), strict=True))
+    springs = (replace(car.springs[0], stiffness=spring_stiffness, damping=damping),)
+    return replace(
+        car,
+        bodies=bodies,
+        springs=springs,
+        tyres=(replace(car.tyres[0], stiffness=tyre_stiffness, damping=tyre_damping),),
+    )
 
 
 def single_body(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
@@ -92,14 +108,14 @@ def roll_steered_vehicle() -> SpatialVehicle:
     return replace(vehicle, outputs=outputs)
 
 
-def variances_after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
+def variances_after_hours(delayed_system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
     """Variances (p,) of the outputs 1 and 2 hours after rest on independent axle inputs, by a van Loan discretisation
     over 3 ms that is doubled repeatedly."""
-    n, Q, step = len(system.A), sum(b @ b.T for b in system.B), 3600.0 / 2**20
-    block = expm(np.block([[-system.A, Q], [np.zeros((n, n)), system.A.T]]) * step)
+    n, Q, step = len(delayed_system.A), sum(b @ b.T for b in delayed_system.B), 3600.0 / 2**20
+    block = expm(np.block([[-delayed_system.A, Q], [np.zeros((n, n)), delayed_system.A.T]]) * step)
     E, P = block[n:, n:].T, block[n:, n:].T @ block[:n, n:]
     variances = []
     for _ in range(22):
-        variances.append(np.einsum("pi,ij,pj->p", system.C, P, system.C))
+        variances.append(np.einsum("pi,ij,pj->p", delayed_system.C, P, delayed_system.C))
         E, P = E @ E, P + E @ P @ E.T
     return variances[-2], variances[-1]

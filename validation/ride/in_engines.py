@@ -34,16 +34,16 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 
 @cache
 def vehicle_and_road(
-    name: str, level_factor: float = 1.0, gravity: float = GRAVITY
+    vehicle_name: str, level_factor: float = 1.0, gravity: float = GRAVITY
 ) -> tuple[SpatialVehicle, Excitation]:
     """A shipped vehicle, and a road with ``level_factor`` times the paper's level; a vehicle without a track width has
     one track.
     """
-    vehicle = replace(load_vehicle(name), gravity=gravity)
+    vehicle = replace(load_vehicle(vehicle_name), gravity=gravity)
     return vehicle, paper_road(wheels(vehicle), level_factor=level_factor * TRACK_DENSITY_LEVEL)
 
 
-def nonlinear_engine_rows(quick: bool) -> list[Row]:
+def nonlinear_engine_rows(is_quick: bool) -> list[Row]:
     """Rows on the nonlinear quarter car under gravity: difference of the engines' trajectories, mean travel, which the
     asymmetric damper shifts, and mean tyre force."""
     vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE)
@@ -53,17 +53,19 @@ def nonlinear_engine_rows(quick: bool) -> list[Row]:
             engine,
             vehicle,
             road,
-            NONLINEAR_DURATIONS[not quick],
+            NONLINEAR_DURATIONS[not is_quick],
             road_seed=SEED,
-            skipped_time=SKIPPED_SECONDS * (not quick),
+            skipped_time=SKIPPED_SECONDS * (not is_quick),
             steps_per_output=5,
         )
         for engine in ENGINES
     }
     rows = [
-        _engine_difference_row("bent", f"{NONLINEAR_VEHICLE} under gravity, {NONLINEAR_DURATIONS[not quick]:g} s", runs)
+        _engine_difference_row(
+            "bent", f"{NONLINEAR_VEHICLE} under gravity, {NONLINEAR_DURATIONS[not is_quick]:g} s", runs
+        )
     ]
-    if quick:
+    if is_quick:
         return rows
     linear = statistically_linear(vehicle, excitation_, SPEED)
     travel, force = (linear.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
@@ -94,11 +96,11 @@ def nonlinear_engine_rows(quick: bool) -> list[Row]:
     return rows
 
 
-def _engine_difference_row(id: str, run_description: str, runs: dict[str, EngineRide]) -> Row:
-    first, other_run = (runs[engine].run for engine in ENGINES)
+def _engine_difference_row(row_id: str, run_description: str, runs_by_engine: dict[str, EngineRide]) -> Row:
+    first, other_run = (runs_by_engine[engine].run for engine in ENGINES)
     gap = max(np.abs(first.positions - other_run.positions).max(), np.abs(first.rates - other_run.rates).max())
     return Observed(
-        f"ride_nonlinear.path.{id}",
+        f"ride_nonlinear.path.{row_id}",
         SYSTEM,
         f"largest difference of all states between Exudyn and MuJoCo, {run_description} on the same random road",
         float(gap),
@@ -146,13 +148,13 @@ def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
 
 
 def _spectral_densities(
-    runs: dict[str, EngineRide], linear_vehicle: LinearVehicle, excitation: Excitation
+    runs_by_engine: dict[str, EngineRide], linear_vehicle: LinearVehicle, road_excitation: Excitation
 ) -> dict[str, Any]:
     """One-sided spectral densities (1/Hz) of SHOWN_OUTPUTS: of the linear vehicle in closed form, and by Welch's method
     of each engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)
-    sides = {"own": (frequency, one_sided_densities(linear_vehicle, excitation, SPEED, frequency))}
-    sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
+    sides = {"own": (frequency, one_sided_densities(linear_vehicle, road_excitation, SPEED, frequency))}
+    sides |= {engine: run.densities(frequency[-1]) for engine, run in runs_by_engine.items()}
     return {
         side: {
             "frequency": f.tolist(),

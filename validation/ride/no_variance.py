@@ -145,7 +145,7 @@ def _free_rows() -> list[Row]:
     ]
 
 
-def _with_slycot(system: DelayedSystem) -> np.ndarray:
+def _with_slycot(delayed_system: DelayedSystem) -> np.ndarray:
     """Variances (p,) computed while python-control takes the package slycot as installed, whose routines would fail."""
     import control.exception as installed
     import control.mateqn as solvers
@@ -153,7 +153,7 @@ def _with_slycot(system: DelayedSystem) -> np.ndarray:
     original_routines = installed.slycot_installed, solvers.sb03md, solvers.sb04md
     installed.slycot_installed, solvers.sb03md, solvers.sb04md = True, None, None
     try:
-        return stationary_covariance(system).variance
+        return stationary_covariance(delayed_system).variance
     finally:
         installed.slycot_installed, solvers.sb03md, solvers.sb04md = original_routines
 

@@ -77,54 +77,62 @@ STANDARD_WEIGHTINGS = (
 """ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
 
 
-def largest_relative_error(computed: ArrayLike, expected: ArrayLike) -> float:
+def largest_relative_error(computed_values: ArrayLike, expected_values: ArrayLike) -> float:
     """Largest relative error of computed values (n,) against expected ones (n,)."""
-    return float(np.abs(np.asarray(computed) / np.asarray(expected) - 1.0).max())
+    return float(np.abs(np.asarray(computed_values) / np.asarray(expected_values) - 1.0).max())
 
 
-def one_track(axle_positions: tuple[float, ...], corner: float = 0.0) -> Excitation:
+def one_track(axle_positions: tuple[float, ...], corner_wavenumber: float = 0.0) -> Excitation:
     """Road of a single track under axles at ``axle_positions`` (m); its height z over the distance obeys
-    z' = -corner z + w with white noise w; corner in 1/m.
+    z' = -corner_wavenumber z + w with white noise w; corner_wavenumber in 1/m.
     """
     heights = tuple(np.eye(len(axle_positions))[:, [i]] for i in range(len(axle_positions)))
-    filter_ = np.array([[-corner]]), np.array([[ROAD_INTENSITY**0.5]])
+    filter_ = np.array([[-corner_wavenumber]]), np.array([[ROAD_INTENSITY**0.5]])
     return Excitation(*filter_, heights, tuple(axle_positions[0] - x for x in axle_positions))
 
 
 def paper_road(
-    wheels: Sequence[WheelPosition],
+    wheel_positions: Sequence[WheelPosition],
     *correlation_words: str,
     level_factor: float = TRACK_DENSITY_LEVEL,
-    cutoff: float | None = None,
+    cutoff_wavenumber: float | None = None,
 ) -> Excitation:
     """The paper's road of two tracks under wheels, with the named kinds of correlation; one track for wheels without a
     track width."""
-    y = half_track(wheels)
-    placed = wheels if y else wheels_on_track(wheels, 1.0)
-    return road_excitation(road_of_level(y or 1.0, level_factor, cutoff_wavenumber=cutoff), placed, *correlation_words)
+    y = half_track(wheel_positions)
+    placed = wheel_positions if y else wheels_on_track(wheel_positions, 1.0)
+    return road_excitation(
+        road_of_level(y or 1.0, level_factor, cutoff_wavenumber=cutoff_wavenumber), placed, *correlation_words
+    )
 
 
-def five_correlation_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
+def five_correlation_cases(
+    wheel_positions: Sequence[WheelPosition], given_road: TwoTrackRoad | None = None
+) -> dict[str, Excitation]:
     """The paper's road, or a given road, in the paper's five cases of correlation, by the number of the case."""
-    road = road or road_of_level(half_track(wheels))
-    return {str(number): road_excitation(road, wheels, *case) for number, case in CORRELATION_CASES.items()}
+    given_road = given_road or road_of_level(half_track(wheel_positions))
+    return {
+        str(number): road_excitation(given_road, wheel_positions, *case) for number, case in CORRELATION_CASES.items()
+    }
 
 
 def quarter_car_vehicle(
-    corner_positions: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
+    quarter_cars_at_axles: Sequence[tuple[float, QuarterCar]],
+    body_mass_matrix: np.ndarray | None = None,
+    tyre_damping: float = 0.0,
 ) -> LinearVehicle:
-    """Linear vehicle of a body on quarter-car corners (x in m, quarter car), one per axle; ``mass`` is the body's mass
-    matrix in heave, or in heave and pitch.
+    """Linear vehicle of a body on quarter-car corners (x in m, quarter car), one per axle; ``body_mass_matrix`` is the
+    body's mass matrix in heave, or in heave and pitch.
 
     tyre_damping in N s/m. Outputs: body acceleration; travel, tyre deflection, body height; load and acceleration of
     the first wheel.
     """
-    body = np.array([[corner_positions[0][1].m_s]]) if mass is None else mass
-    b, w = len(body), len(corner_positions)
+    body = np.array([[quarter_cars_at_axles[0][1].m_s]]) if body_mass_matrix is None else body_mass_matrix
+    b, w = len(body), len(quarter_cars_at_axles)
     n = b + w
-    M = np.diag([*np.diag(body), *(corner.m_u for _, corner in corner_positions)])
+    M = np.diag([*np.diag(body), *(corner.m_u for _, corner in quarter_cars_at_axles)])
     D, K, R, S = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, w)), np.zeros((n, w))
-    for i, (x, corner) in enumerate(corner_positions):
+    for i, (x, corner) in enumerate(quarter_cars_at_axles):
         travel = np.array([*[1.0, -x][:b], *(-np.eye(w)[i])])
         K += corner.k * np.outer(travel, travel)
         D += corner.c * np.outer(travel, travel)
@@ -141,7 +149,7 @@ def quarter_car_vehicle(
         Output("load", "N", "force", no, -c_t * unit[b], -k_t * unit[b], k_t * first, c_t * first),
         Output("wheel", "m/s2", "acceleration", unit[b], no, no, no_heights, no_heights),
     )
-    wheels = tuple(WheelPosition(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(corner_positions))
+    wheels = tuple(WheelPosition(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(quarter_cars_at_axles))
     return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)
 
 

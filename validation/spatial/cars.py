@@ -65,11 +65,11 @@ def rough_car() -> CutVehicle:
     return cut(replace(full_vehicle, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
-def static_forces(vehicle: CutVehicle, row_count: int, frame: str = "hub") -> HubInputs:
+def static_forces(vehicle: CutVehicle, row_count: int, force_frame: str = "hub") -> HubInputs:
     """Hub input of ``row_count`` equal rows: the vertical hub forces that carry the vehicle at rest."""
     forces = np.zeros((row_count, WRENCH * len(vehicle.hubs)))
     forces[:, 2::WRENCH] = vehicle.loads
-    return HubInputs(forces, frame)
+    return HubInputs(forces, force_frame)
 
 
 def random_states(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -81,18 +81,20 @@ def random_states(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarra
     return q, v
 
 
-def random_wrenches(vehicle: CutVehicle, frame: str, has_guide: bool) -> HubInputs:
+def random_wrenches(vehicle: CutVehicle, force_frame: str, has_guide: bool) -> HubInputs:
     """Hub input with random forces and moments on every hub; ``has_guide`` : with a prescribed random chassis
     motion."""
     rng = np.random.default_rng(SEED)
-    hub_inputs = static_forces(vehicle, 3, frame)
+    hub_inputs = static_forces(vehicle, 3, force_frame)
     hubs = hub_inputs.hubs + rng.normal(0, 500.0, hub_inputs.hubs.shape[1])
     return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if has_guide else None)
 
 
-def hub_forces_by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
-    """Generalised forces (n,) of forces and moments (6 h,) at h hubs, by MuJoCo's Jacobians; ``frame`` : their axes, of
-    the hubs or "inertial"."""
+def hub_forces_by_jacobians(
+    hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, force_frame: str = "hub"
+) -> np.ndarray:
+    """Generalised forces (n,) of forces and moments (6 h,) at h hubs, by MuJoCo's Jacobians; ``force_frame`` : their
+    axes, of the hubs or "inertial"."""
     assert isinstance(hub_model.model, FreeMujoco)
     model, names = hub_model.model.model, [body.name for body in hub_model.vehicle.tree.bodies]
     data, forces = mujoco.MjData(model), np.zeros(hub_model.size)
@@ -101,35 +103,38 @@ def hub_forces_by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.nda
     mujoco.mj_comPos(model, data)
     for tyre, wrench in zip(hub_model.vehicle.uncut.tyres, wrenches.reshape(-1, 2, 3), strict=True):
         body = int(model.body(str(names.index(tyre.body))).id)
-        force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
+        force, moment = wrench if force_frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
         mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, forces)
     return forces
 
 
-def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
+def cornering_error(handling_car: Handling, slip_angle: float = 1e-7) -> float:
     """Largest relative error of the tyres' cornering stiffnesses at their static loads: from the brush tyres of a
     handling car, against those of the vehicle file."""
-    wanted, worst = {force.name: force.stiffness for force in handling.given.side_forces}, 0.0
-    for i, tyre in enumerate(handling.vehicle.tyres):
-        n = handling.tyre_numbers(i)
+    wanted, worst = {force.name: force.stiffness for force in handling_car.given.side_forces}, 0.0
+    for i, tyre in enumerate(handling_car.vehicle.tyres):
+        n = handling_car.tyre_numbers(i)
         half = np.sqrt(n[at.RADIUS] * n[at.STATIC] / n[at.VERTICAL])
-        slides = np.array([[0, slip, 0, 1.0]])
+        slides = np.array([[0, slip_angle, 0, 1.0]])
         force = brush_forces(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], slides)[0, 1]
-        worst = max(worst, abs(float(-force / slip) / wanted[tyre.name] - 1.0))
+        worst = max(worst, abs(float(-force / slip_angle) / wanted[tyre.name] - 1.0))
     return worst
 
 
-def mirrored_coordinates(handling: Handling, values: np.ndarray) -> np.ndarray:
+def mirrored_coordinates(handling_car: Handling, coordinate_values: np.ndarray) -> np.ndarray:
     """Coordinates, or their rates, (..., n) of the mirror image of a car, with left and right exchanged."""
-    coordinates = handling.vehicle.coordinates()
+    coordinates = handling_car.vehicle.coordinates()
     swap = [coordinates.index((_opposite_body(name), freedom)) for name, freedom in coordinates]
-    return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in coordinates]) * values[..., swap]
+    return (
+        np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in coordinates])
+        * coordinate_values[..., swap]
+    )
 
 
-def _opposite_body(name: str) -> str:
+def _opposite_body(body_name: str) -> str:
     """Name of the corresponding body on the opposite side of the car."""
     for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
         for side, opposite in ((left, right), (right, left)):
-            if name.startswith(side):
-                return name.replace(side, opposite, 1)
-    return name
+            if body_name.startswith(side):
+                return body_name.replace(side, opposite, 1)
+    return body_name

@@ -28,9 +28,9 @@ ADAPTIVE_METHODS = QUICK_METHODS | {"DOP853": "reference"}
 SYSTEM: System = "drift"
 
 
-def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
+def rows(vehicle: CutVehicle, is_quick: bool) -> list[Row]:
     """Rows on the interpolation of hub forces on a vehicle: held forces in every engine, and adaptive integrators."""
-    methods = QUICK_METHODS if quick else ADAPTIVE_METHODS
+    methods = QUICK_METHODS if is_quick else ADAPTIVE_METHODS
     names = " and ".join(methods)
     return [
         Observed(
@@ -71,9 +71,9 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
     ]
 
 
-def settings(integrator: str = FIXED_STEP_METHOD) -> Settings:
+def settings(integrator_name: str = FIXED_STEP_METHOD) -> Settings:
     """Settings of a run over all force samples with an integrator."""
-    return Settings(integrator, STEP, (SAMPLE_COUNT - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
+    return Settings(integrator_name, STEP, (SAMPLE_COUNT - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
 
 def samples(vehicle: CutVehicle) -> HubForces:
@@ -84,31 +84,31 @@ def samples(vehicle: CutVehicle) -> HubForces:
 
 
 def centre_of_mass_error(
-    vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED_STEP_METHOD
+    vehicle: CutVehicle, engine: str, interpolation: str, integrator_name: str = FIXED_STEP_METHOD
 ) -> float:
     """Largest error (m) of a coordinate of the vehicle's centre of mass at the sample times, against the closed
     form."""
-    forces, run_settings = samples(vehicle), settings(integrator)
+    forces, run_settings = samples(vehicle), settings(integrator_name)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, run_settings.steps, interpolation), run_settings).run()  # type: ignore[arg-type]
     centre_path = centres_of_mass(vehicle, run.positions[::STEPS_PER_SAMPLE])
     return float(np.abs(centre_path - centre_path[0] - _falling_path(vehicle, forces, interpolation == "held")).max())
 
 
-def centres_of_mass(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
+def centres_of_mass(vehicle: CutVehicle, coordinate_rows: np.ndarray) -> np.ndarray:
     """Centre of mass of all bodies (m, 3) in m, for m rows of coordinates (m, n)."""
     bodies, tree = vehicle.tree.bodies, Bodies(vehicle.tree)
     points, masses = tree.points([(body.name, body.position) for body in bodies]), [body.mass for body in bodies]
-    point_positions = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in positions]
+    point_positions = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in coordinate_rows]
     return np.array([np.average(positions_of_row, axis=0, weights=masses) for positions_of_row in point_positions])
 
 
-def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
+def _falling_path(vehicle: CutVehicle, hub_forces: HubForces, are_samples_held: bool) -> np.ndarray:
     """Path (samples, 3) in m, from rest, of a point mass with the vehicle's mass under weight and the sum of all hub
     forces."""
-    mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
-    hubs = forces.samples.reshape(SAMPLE_COUNT, -1, WRENCH)[:, :, :3].sum(axis=1)
+    mass, period = sum(body.mass for body in vehicle.tree.bodies), hub_forces.period
+    hubs = hub_forces.samples.reshape(SAMPLE_COUNT, -1, WRENCH)[:, :, :3].sum(axis=1)
     begin = hubs[:-1] / mass - [0.0, 0.0, GRAVITY]
-    end = begin if hold_samples else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
+    end = begin if are_samples_held else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
     speeds = np.vstack([np.zeros(3), np.cumsum(period / 2.0 * (begin + end), axis=0)])
     steps = period * speeds[:-1] + period**2 / 6.0 * (2.0 * begin + end)
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
@@ -132,10 +132,10 @@ def acceleration_difference_between_rows(vehicle: CutVehicle, state_count: int) 
     return worst
 
 
-def trajectory_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
+def trajectory_gap(vehicle: CutVehicle, engine: str, integrator_name: str) -> float:
     """Largest difference of any coordinate or rate between a run by an adaptive integrator and a run by Runge-Kutta 4
     with an eighth of the step; hub forces are linear between their samples."""
-    forces, run_settings = samples(vehicle), settings(integrator)
+    forces, run_settings = samples(vehicle), settings(integrator_name)
     fine = Settings(FIXED_STEP_METHOD, STEP / 8.0, run_settings.duration)
     hub_inputs, finer = (
         forces.hub_inputs(settings_of_run.step, settings_of_run.steps) for settings_of_run in (run_settings, fine)

@@ -22,16 +22,16 @@ MULTIPLIER_SIGNS = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Signs that turn Exudyn's multipliers of a generic joint into forces and moments on its second body."""
 
 
-def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
+def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, hub_wrenches: np.ndarray) -> np.ndarray:
     """Force and moment (guides, 6) on each guided body by MuJoCo's sensors, in the body's axes, at coordinates and
     rates (n,).
 
-    wrenches (h, 6) : at the hubs, in the axes of what they carry.
+    hub_wrenches (h, 6) : at the hubs, in the axes of what they carry.
     """
-    return _LoadedModel(vehicle, q, v, wrenches).data.sensordata.reshape(-1, 6).copy()
+    return _LoadedModel(vehicle, q, v, hub_wrenches).data.sensordata.reshape(-1, 6).copy()
 
 
-def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
+def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, hub_wrenches: np.ndarray) -> np.ndarray:
     """Force and moment (guides, 6) on each guided body at rest by Exudyn's constraints, in the axes of the carrying
     body; exact if at most one angle is free."""
     import exudyn as exu
@@ -39,7 +39,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
 
     from models.engines.exudyn_system import KINDS, items
 
-    loaded, container = _LoadedModel(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
+    loaded, container = _LoadedModel(vehicle, q, 0 * q, hub_wrenches), exu.SystemContainer()
     mbs: Any = container.AddSystem()
     objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
     for body in vehicle.uncut.bodies:
@@ -82,7 +82,7 @@ class _LoadedModel:
     """MuJoCo model of a cut vehicle at coordinates and rates (n,), with the forces of hubs and elements as loads on its
     bodies."""
 
-    def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
+    def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, hub_wrenches: np.ndarray) -> None:
         self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
         names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
         for number in (names[name] for name in guided_bodies(vehicle)):
@@ -96,26 +96,28 @@ class _LoadedModel:
             self.ids = {name: int(self.model.body(number).id) for name, number in names.items()}
             self.data.qpos[:], self.data.qvel[:] = q, v
             mujoco.mj_forward(self.model, self.data)
-            self._load_hubs(wrenches)
+            self._load_hubs(hub_wrenches)
             self._load_elements()
             mujoco.mj_forward(self.model, self.data)
 
-    def _point(self, body: str, design_position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _point(self, body_name: str, design_position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position (m) and velocity (m/s) in space of a point fixed to a body, given by its design position (m)."""
-        number, jacobian = self.ids[body], np.zeros((3, self.model.nv))
-        arm = design_position - np.array(self.vehicle.tree.body(body).position)
+        number, jacobian = self.ids[body_name], np.zeros((3, self.model.nv))
+        arm = design_position - np.array(self.vehicle.tree.body(body_name).position)
         position = self.data.xpos[number] + self.data.xmat[number].reshape(3, 3) @ arm
         mujoco.mj_jac(self.model, self.data, jacobian, None, position, number)
         return position, jacobian @ self.data.qvel
 
-    def _add_load(self, body: str, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
+    def _add_load(
+        self, body_name: str, force_point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0
+    ) -> None:
         """Add a force (N) at a point and a moment (N m), both in axes of space, to the loads of a body."""
-        number = self.ids[body]
+        number = self.ids[body_name]
         self.data.xfrc_applied[number, :3] += force
-        self.data.xfrc_applied[number, 3:] += moment + np.cross(point - self.data.xpos[number], force)
+        self.data.xfrc_applied[number, 3:] += moment + np.cross(force_point - self.data.xpos[number], force)
 
-    def _load_hubs(self, wrenches: np.ndarray) -> None:
-        for tyre, wrench in zip(self.vehicle.uncut.tyres, wrenches, strict=True):
+    def _load_hubs(self, hub_wrenches: np.ndarray) -> None:
+        for tyre, wrench in zip(self.vehicle.uncut.tyres, hub_wrenches, strict=True):
             turn = self.data.xmat[self.ids[tyre.body]].reshape(3, 3)
             position, _ = self._point(tyre.body, np.array(tyre.point))
             self._add_load(tyre.body, position, turn @ wrench[:3], turn @ wrench[3:])

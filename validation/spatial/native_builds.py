@@ -36,9 +36,10 @@ def random_hub_input(vehicle: CutVehicle, row_count: int) -> HubInputs:
     )
 
 
-def hub_model(engine: str, vehicle: CutVehicle, route: ForceRoute, steps: int = 1) -> HubModel:
-    """A cut vehicle with random hub forces in an engine, with native springs or with compiled forces (``route``)."""
-    return build(engine, vehicle, random_hub_input(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
+def hub_model(engine: str, vehicle: CutVehicle, force_route: ForceRoute, step_count: int = 1) -> HubModel:
+    """A cut vehicle with random hub forces in an engine, with native springs or with compiled forces
+    (``force_route``)."""
+    return build(engine, vehicle, random_hub_input(vehicle, 2 * step_count + 1), STEP, step_count * STEP, force_route)
 
 
 def native_acceleration_difference(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
@@ -72,14 +73,14 @@ def hand_written_equations(vehicle: CutVehicle) -> SpatialReference:
     return equations
 
 
-def trajectory_difference(engine: str, vehicle: CutVehicle, steps: int) -> float:
+def trajectory_difference(engine: str, vehicle: CutVehicle, step_count: int) -> float:
     """Largest difference (m, rad, m/s, rad/s) between the states of runs with native springs and with compiled
     forces."""
-    native = hub_model(engine, vehicle, "native", steps).run()
-    compiled = hub_model("mujoco", vehicle, "compiled", steps).run()
+    native = hub_model(engine, vehicle, "native", step_count).run()
+    compiled = hub_model("mujoco", vehicle, "compiled", step_count).run()
     return float(np.abs(native.states - compiled.states).max())
 
 
-def _relative_difference(rows: list[list[np.ndarray]]) -> float:
-    computed, wanted = map(np.array, rows)
+def _relative_difference(value_pairs: list[list[np.ndarray]]) -> float:
+    computed, wanted = map(np.array, value_pairs)
     return float((np.abs(computed - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())

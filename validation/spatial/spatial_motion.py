@@ -57,30 +57,30 @@ def rigid_body_motion(sample_count: int = 2001, sample_period: float = 1e-3) -> 
     return RigidBodyMotion(alpha, rates, orientation, accelerations, positions, BodyStartState(*rows), sample_period)
 
 
-def _sine_waves(t: np.ndarray, wave_shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sine_waves(times: np.ndarray, wave_shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Three sine waves (n, 3) at times (n,) in s and their first two derivatives; wave_shapes (3, 3) : rows of
     amplitude, angular frequency (rad/s) and phase (rad)."""
     size, speed, phase = wave_shapes.T
-    angle = np.outer(t, speed) + phase
+    angle = np.outer(times, speed) + phase
     return size * np.sin(angle), size * speed * np.cos(angle), -size * speed**2 * np.sin(angle)
 
 
 PATH = rigid_body_motion()
 
 
-def sensor_readings(sensor_positions: np.ndarray, motion: RigidBodyMotion = PATH) -> np.ndarray:
+def sensor_readings(sensor_positions: np.ndarray, body_motion: RigidBodyMotion = PATH) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2 that accelerometers at local positions (sensors, 3) in m read, by eqs
     (16) and (17)."""
-    lever = skew_matrix(motion.alpha) + skew_matrix(motion.rates) @ skew_matrix(motion.rates)
-    felt = np.einsum("nji,nj->ni", rotation_matrix(motion.orientation), motion.acceleration - GRAVITY)
+    lever = skew_matrix(body_motion.alpha) + skew_matrix(body_motion.rates) @ skew_matrix(body_motion.rates)
+    felt = np.einsum("nji,nj->ni", rotation_matrix(body_motion.orientation), body_motion.acceleration - GRAVITY)
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def tilted_sensors(height: float, rotation: np.ndarray) -> SensorPositions:
-    """Positions (m) of five accelerometers, rotated: four at the corners of a floor of 2 m by 1.2 m, and one ``height``
-    m above its middle."""
-    floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
-    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ rotation.T)}
+def tilted_sensors(top_sensor_height: float, floor_rotation: np.ndarray) -> SensorPositions:
+    """Positions (m) of five accelerometers, rotated: four at the corners of a floor of 2 m by 1.2 m, and one
+    ``top_sensor_height`` m above its middle."""
+    floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -top_sensor_height]])
+    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ floor_rotation.T)}
 
 
 TILT_ROTATION = rotation_matrix(quaternion_from_cardan(0.3, 0.4, 0.5))

@@ -62,9 +62,17 @@ def _bodies() -> tuple[Body, ...]:
 
 
 def _twin_spring(
-    name: str, from_body: str, second_body: str, point: Vector, axis: Vector, k: float, c: float
+    spring_name: str,
+    first_body: str,
+    second_body: str,
+    attachment_point: Vector,
+    spring_axis: Vector,
+    stiffness: float,
+    damping: float,
 ) -> SpringDamper:
-    return SpringDamper(name, from_body, second_body, point, point, axis, k, c)
+    return SpringDamper(
+        spring_name, first_body, second_body, attachment_point, attachment_point, spring_axis, stiffness, damping
+    )
 
 
 def _twin_springs() -> tuple[SpringDamper, ...]:

@@ -37,13 +37,13 @@ def static_load_error() -> float:
     return max(abs(load / lever - 1.0) for load, lever in zip(loads, static_loads(car), strict=True))
 
 
-def static_loads(car: Handling) -> list[float]:
+def static_loads(towing_car: Handling) -> list[float]:
     """Loads (N) of a car's front and rear axle, of the caravan's axle and of the ball, by the balance of moments.
 
     About the ball for the caravan; about the front axle for the car, with the caravan's load on the ball.
     """
-    free, (towed,) = car.vehicle, car.vehicle.towed
-    front, rear, axle = car.given.axles
+    free, (towed,) = towing_car.vehicle, towing_car.vehicle.towed
+    front, rear, axle = towing_car.given.axles
     weights = np.array(
         [(body.mass * GRAVITY, body.position[0], towed in free.chain(body.name)) for body in free.bodies]
     )
@@ -56,34 +56,32 @@ def static_loads(car: Handling) -> list[float]:
 
 
 def towed_turn(
-    vehicle: SpatialVehicle,
-    speed: float,
-    change_handling: Callable[[Handling], None] | None = None,
-    duration: float = 8.0,
+    vehicle: SpatialVehicle, speed: float, change_car: Callable[[Handling], None] | None = None, duration: float = 8.0
 ) -> TurnErrors:
     """Errors of a steady turn with small slip at a speed (m/s) in MuJoCo, against the closed form.
 
-    One to the left less one to the right: a vehicle without symmetry pulls. change_handling : plants a fault in the
+    One to the left less one to the right: a vehicle without symmetry pulls. change_car : plants a fault in the
     table; duration : s.
     """
     turns = []
     for steer in (SMALL_STEER, -SMALL_STEER):
         car = Handling(replace(vehicle, drags=()), controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
         wanted = steady_turn_gains(car, speed)
-        if change_handling is not None:
-            change_handling(car)
+        if change_car is not None:
+            change_car(car)
         turns.append(drive_run("mujoco", car, speed, duration))
     left, right = (np.array([turn.velocity()[-1, 2], *final_headings(turn)]) for turn in turns)
     yaw, *towed = (left - right) / (2.0 * SMALL_STEER)
     return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.towed_headings)
 
 
-def final_headings(drive: SimulatedDrive) -> list[float]:
+def final_headings(manoeuvre: SimulatedDrive) -> list[float]:
     """Final heading (rad) of each towed body relative to the car: the sum of the yaw angles of the hitches between
     them."""
-    free = drive.handling.vehicle
+    free = manoeuvre.handling.vehicle
     yaws = {
-        name: float(drive.run.positions[-1, free.coordinates().index((hitch_of(name), "rz"))]) for name in free.towed
+        name: float(manoeuvre.run.positions[-1, free.coordinates().index((hitch_of(name), "rz"))])
+        for name in free.towed
     }
     return [sum(yaws[body_name] for body_name in free.chain(name) if body_name in yaws) for name in free.towed]
 
@@ -104,7 +102,7 @@ def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
     return -angle / wanted - 1.0
 
 
-def give_towed_wheels_car_heading(car: Handling) -> None:
+def give_towed_wheels_car_heading(handling_car: Handling) -> None:
     """Plant a fault: the tyres of towed bodies take the heading of the car."""
-    for i in range(len(car.vehicle.tyres)):
-        car.tyre_numbers(i)[at.TOWED] = 0.0
+    for i in range(len(handling_car.vehicle.tyres)):
+        handling_car.tyre_numbers(i)[at.TOWED] = 0.0

@@ -177,11 +177,11 @@ def inner_force_difference(vehicle: CutVehicle, state_count: int) -> float:
     return worst
 
 
-def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, rough_road: bool) -> float:
+def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, on_rough_road: bool) -> float:
     """Largest difference of a cut vehicle's coordinates and rates between runs by an engine and by the plain equations,
     on a rough road or with noisy hub forces."""
     steps = round(duration / STEP)
-    if rough_road:
+    if on_rough_road:
         left, right = (iso8608_road("C", seed) for seed in (1, 2))
         hub_inputs = road_under_wheels(vehicle, left, right, SPEED, STEP, steps)
     else:

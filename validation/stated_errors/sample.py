@@ -37,15 +37,15 @@ class Sample:
 
 
 def random_samples(
-    sample_count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
+    sample_count: int, seed: int | Sequence[int], draw_sample: Callable[[np.random.Generator], Sample | None]
 ) -> Iterator[Sample]:
-    """Yield ``sample_count`` samples made by ``draw`` from a random generator; ``draw`` is called again if a scene is
-    refused, a run fails, or it returns None.
+    """Yield ``sample_count`` samples made by ``draw_sample`` from a random generator; ``draw_sample`` is called again
+    if a scene is refused, a run fails, or it returns None.
     """
     generator, samples_made = np.random.default_rng(seed), 0
     while samples_made < sample_count:
         try:
-            sample = draw(generator)
+            sample = draw_sample(generator)
         except (InputError, RunFailed):
             continue
         if sample is not None:

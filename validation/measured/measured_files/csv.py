@@ -24,28 +24,30 @@ from validation.measured.measured_files.odd import (
 HEADER = "time [s],Fz [N],Fx [N]"
 
 
-def csv_rows(separator: str = ",", line_end: str = "\n") -> list[str]:
+def csv_rows(separator: str = ",", line_ending: str = "\n") -> list[str]:
     """Rows of the usual file, as text."""
     return [
-        separator.join(map(repr, row)) + line_end
+        separator.join(map(repr, row)) + line_ending
         for row in zip(SAMPLE_TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)
     ]
 
 
-def csv_file(header: str = HEADER, body: list[str] | None = None, encoding: str = "utf-8") -> FileMaker:
+def csv_file(header_line: str = HEADER, body_rows: list[str] | None = None, text_encoding: str = "utf-8") -> FileMaker:
     """Make a CSV file from a header and rows (by default those of the usual file)."""
-    return file_of_bytes((header + "\n" + "".join(csv_rows() if body is None else body)).encode(encoding))
+    return file_of_bytes(
+        (header_line + "\n" + "".join(csv_rows() if body_rows is None else body_rows)).encode(text_encoding)
+    )
 
 
-def changed_rows(index: int, row: str) -> list[str]:
+def changed_rows(row_index: int, new_row: str) -> list[str]:
     """Rows of the usual file, with one of them replaced."""
-    return [*csv_rows()[:index], row + "\n", *csv_rows()[index + 1 :]]
+    return [*csv_rows()[:row_index], new_row + "\n", *csv_rows()[row_index + 1 :]]
 
 
-def folder_named_like_file(folder: Path) -> Path:
+def folder_named_like_file(parent_folder: Path) -> Path:
     """Make a folder that has the name of a CSV file."""
-    (folder / "odd.csv").mkdir()
-    return folder / "odd.csv"
+    (parent_folder / "odd.csv").mkdir()
+    return parent_folder / "odd.csv"
 
 
 def truth_with_gap() -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -72,7 +74,7 @@ UMLAUTS = {"Kraft Räder": (SAMPLE_TIMES, FZ), "Größe": (SAMPLE_TIMES, FX)}
 REFUSED: Files = {
     "CSV of no byte": ("there is nothing to read", file_of_bytes(b""), "empty"),
     "folder called odd.csv": ("opening it is an error of the system", folder_named_like_file, "not a file"),
-    "CSV without rows": ("a header alone looks well", csv_file(body=[]), "rows of numbers"),
+    "CSV without rows": ("a header alone looks well", csv_file(body_rows=[]), "rows of numbers"),
     "CSV of random bytes": ("no text at all", file_of_bytes(bytes(range(128, 255)) * 40), "header"),
     "CSV with binary bytes in a row": (
         "a disk error in the middle",
@@ -104,25 +106,29 @@ REFUSED: Files = {
         csv_file(HEADER.replace(",", ";"), GERMAN * 100 + csv_rows(";")),
         "decimal sign",
     ),
-    "CSV with a short row": ("a reader fills it up with NaN", csv_file(body=changed_rows(30, "0.3,1000.5")), "line 32"),
+    "CSV with a short row": (
+        "a reader fills it up with NaN",
+        csv_file(body_rows=changed_rows(30, "0.3,1000.5")),
+        "line 32",
+    ),
     "CSV with a long row": (
         "a reader shifts the columns",
-        csv_file(body=changed_rows(30, "0.3,1.0,2.0,3.0")),
+        csv_file(body_rows=changed_rows(30, "0.3,1.0,2.0,3.0")),
         "3 values are needed, found 4",
     ),
     "CSV with inf": (
         "it passes every comparison with a bound",
-        csv_file(body=changed_rows(30, "0.3,inf,1.0")),
+        csv_file(body_rows=changed_rows(30, "0.3,inf,1.0")),
         "channel 'Fz', sample 30",
     ),
     "CSV with a word in a cell": (
         "a reader makes a column of texts",
-        csv_file(body=changed_rows(30, "0.3,overload,1.0")),
+        csv_file(body_rows=changed_rows(30, "0.3,overload,1.0")),
         "line 32",
     ),
     "CSV with a letter of a number in a cell": (
         "e and n are letters of numbers",
-        csv_file(body=changed_rows(30, "0.3,1e,1.0")),
+        csv_file(body_rows=changed_rows(30, "0.3,1e,1.0")),
         "line 32, column 'Fz [N]'",
     ),
     "CSV without a clock": ("rows have no times", csv_file("a [s],Fz [N],Fx [N]"), "time [s]"),
@@ -163,7 +169,7 @@ NAMED: Files = {
     ),
     "CSV with umlauts of Windows": (
         "the bytes are no UTF-8",
-        csv_file("time [s],Kraft Räder [N],Größe [N]", encoding="cp1252"),
+        csv_file("time [s],Kraft Räder [N],Größe [N]", text_encoding="cp1252"),
         "Windows-1252",
         UMLAUTS,
     ),
@@ -199,10 +205,10 @@ RIGHT: Files = {
     "CSV with umlauts": ("names beyond ASCII", csv_file("time [s],Kraft Räder [N],Größe [N]"), UMLAUTS),
     "CSV in UTF-16": ("every second byte is zero", file_of_bytes(usual_text().encode("utf-16"))),
     "CSV of 300 channels": ("long lines", file_of_300_channels(".csv"), MANY_CHANNELS),
-    "CSV with empty cells and nan": ("nothing was measured for ten samples", csv_file(body=GAP), truth_with_gap()),
+    "CSV with empty cells and nan": ("nothing was measured for ten samples", csv_file(body_rows=GAP), truth_with_gap()),
     "CSV whose clock goes back": (
         "sorting would hide it",
-        csv_file(body=BACKWARDS),
+        csv_file(body_rows=BACKWARDS),
         {"Fz": (BACK, FZ), "Fx": (BACK, FX)},
     ),
     "CSV with milliseconds": (
@@ -217,4 +223,4 @@ RIGHT: Files = {
     ),
 }
 GREEDY = ("CSV of one endless line",)
-FILES = odd_files(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)
+FILES = odd_files(refused_files=REFUSED, files_with_message=NAMED, readable_files=RIGHT, greedy_names=GREEDY)

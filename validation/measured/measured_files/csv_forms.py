@@ -58,26 +58,29 @@ class Form:
         lines = (*self.lines_above, self.line(self.headings), *self.lines_below_headings, *rows, *self.last_lines)
         return "".join(line + self.end for line in lines)
 
-    def row(self, i: int) -> str:
-        """Row ``i`` of numbers, as text."""
+    def row(self, row_index: int) -> str:
+        """Row ``row_index`` of numbers, as text."""
         time, force, drag = (
             cell if ":" in cell else cell.replace(".", self.decimal)
-            for cell in (self.times[i], repr(float(FZ[i])), repr(float(FX[i])))
+            for cell in (self.times[row_index], repr(float(FZ[row_index])), repr(float(FX[row_index])))
         )
-        return self.line((time, force if self.gap is None or i not in HOLE else self.gap, drag, *self.last_cells))
+        return self.line(
+            (time, force if self.gap is None or row_index not in HOLE else self.gap, drag, *self.last_cells)
+        )
 
-    def line(self, cells: Sequence[str]) -> str:
+    def line(self, cell_texts: Sequence[str]) -> str:
         """Join cells to one line."""
-        return self.separator.join(f'"{cell}"' if self.quoted else cell for cell in cells) + self.trailing
+        return self.separator.join(f'"{cell}"' if self.quoted else cell for cell in cell_texts) + self.trailing
 
-    def make(self, folder: Path) -> Path:
+    def make(self, output_folder: Path) -> Path:
         """Write the file into a folder and return its path."""
-        return file_of_bytes(self.text().encode(self.encoding))(folder)
+        return file_of_bytes(self.text().encode(self.encoding))(output_folder)
 
 
-def time_texts(notation: Callable[[datetime], str], start: datetime = BEGAN) -> tuple[str, ...]:
-    """Times of all samples as texts. ``notation`` turns a date and time into text; the first sample is at ``start``."""
-    return tuple(notation(start + timedelta(milliseconds=10 * i)) for i in range(len(SAMPLE_TIMES)))
+def time_texts(text_of_time: Callable[[datetime], str], start_time: datetime = BEGAN) -> tuple[str, ...]:
+    """Times of all samples as texts. ``text_of_time`` turns a date and time into text; the first sample is at
+    ``start_time``."""
+    return tuple(text_of_time(start_time + timedelta(milliseconds=10 * i)) for i in range(len(SAMPLE_TIMES)))
 
 
 def clock_text(time_stamp: datetime) -> str:

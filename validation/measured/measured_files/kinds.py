@@ -11,14 +11,14 @@ TEXT = b"no table at all\n"
 BINARY = bytes(range(32)) * 8
 
 
-def zip_archive(name: str, *members: str) -> FileMaker:
+def zip_archive(archive_name: str, *member_names: str) -> FileMaker:
     """Make a zip archive of files with these names; each contains the usual CSV text."""
 
-    def make(folder: Path) -> Path:
-        with zipfile.ZipFile(folder / name, "w") as file:
-            for member in members:
+    def make(output_folder: Path) -> Path:
+        with zipfile.ZipFile(output_folder / archive_name, "w") as file:
+            for member in member_names:
                 file.writestr(member, usual_text())
-        return folder / name
+        return output_folder / archive_name
 
     return make
 

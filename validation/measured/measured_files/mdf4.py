@@ -37,30 +37,30 @@ DATA = 24
 
 
 def mdf_file(
-    *groups: dict[str, Any],
-    version: str = "4.10",
+    *channels_by_group: dict[str, Any],
+    mdf_version: str = "4.10",
     compression: Literal[0, 2] = 0,
     start_date: datetime | None = None,
-    times: np.ndarray = SAMPLE_TIMES,
-    families: tuple[str, ...] = (),
+    sample_times: np.ndarray = SAMPLE_TIMES,
+    group_names: tuple[str, ...] = (),
 ) -> FileMaker:
-    """Make an MDF file. Each group maps channel names to samples or to keywords of asammdf's ``Signal``; ``families``
-    are the names of the groups."""
+    """Make an MDF file. Each group maps channel names to samples or to keywords of asammdf's ``Signal``;
+    ``group_names`` are the names of the groups."""
 
-    def make(folder: Path) -> Path:
+    def make(output_folder: Path) -> Path:
         from asammdf import MDF, Signal
 
-        path = folder / ("odd.mdf" if version < "4" else "odd.mf4")
-        file = MDF(version=version)
+        path = output_folder / ("odd.mdf" if mdf_version < "4" else "odd.mf4")
+        file = MDF(version=mdf_version)
         if start_date is not None:
             file.header.start_time = start_date
-        for group, family in zip(groups, families or [""] * len(groups), strict=True):
+        for group, family in zip(channels_by_group, group_names or [""] * len(channels_by_group), strict=True):
             signal_settings = {
                 name: data if isinstance(data, dict) else {"samples": data} for name, data in group.items()
             }
             file.append(
                 [
-                    Signal(name=name, timestamps=times[: len(data["samples"])], **data)
+                    Signal(name=name, timestamps=sample_times[: len(data["samples"])], **data)
                     for name, data in signal_settings.items()
                 ],
                 acq_name=family,
@@ -76,17 +76,17 @@ def mdf_file(
 
 
 USUAL_CHANNELS = {"Fz": FZ, "Fx": FX}
-MDF4, MDF3 = usual_file(".mf4"), mdf_file(USUAL_CHANNELS, version="3.30")
+MDF4, MDF3 = usual_file(".mf4"), mdf_file(USUAL_CHANNELS, mdf_version="3.30")
 
 
-def first_block_offset(raw_bytes: bytes, block_kind: bytes) -> int:
+def first_block_offset(raw_bytes: bytes, block_type: bytes) -> int:
     """Offset (bytes) of the first block of a kind."""
-    return next(i for i in range(0, len(raw_bytes), 8) if raw_bytes[i : i + 4] == block_kind)
+    return next(i for i in range(0, len(raw_bytes), 8) if raw_bytes[i : i + 4] == block_type)
 
 
-def with_block_data(raw_bytes: bytes, block_kind: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
+def with_block_data(raw_bytes: bytes, block_type: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
     """Bytes of a file with the data of a block replaced from an offset on. The data come after the block's links."""
-    block_start = first_block_offset(raw_bytes, block_kind)
+    block_start = first_block_offset(raw_bytes, block_type)
     return patched_bytes(
         raw_bytes,
         block_start + DATA + 8 * struct.unpack_from("<Q", raw_bytes, block_start + 16)[0] + byte_offset,
@@ -94,27 +94,27 @@ def with_block_data(raw_bytes: bytes, block_kind: bytes, byte_offset: int, new_b
     )
 
 
-def with_changed_block(block_kind: bytes, byte_offset: int, new_bytes: bytes, make_file: FileMaker = MDF4) -> FileMaker:
+def with_changed_block(block_type: bytes, byte_offset: int, new_bytes: bytes, make_file: FileMaker = MDF4) -> FileMaker:
     """Make a file with some bytes in a block's data replaced."""
-    return altered_file_maker(make_file, lambda data: with_block_data(data, block_kind, byte_offset, new_bytes))
+    return altered_file_maker(make_file, lambda data: with_block_data(data, block_type, byte_offset, new_bytes))
 
 
-def with_block_number(block_kind: bytes, byte_offset: int, new_number: int) -> FileMaker:
+def with_block_number(block_type: bytes, byte_offset: int, new_number: int) -> FileMaker:
     """Make the usual file with a number replaced in the head or the links of a block."""
     return altered_file_maker(
         MDF4,
         lambda data: patched_bytes(
-            data, first_block_offset(data, block_kind) + byte_offset, struct.pack("<Q", new_number)
+            data, first_block_offset(data, block_type) + byte_offset, struct.pack("<Q", new_number)
         ),
     )
 
 
-def with_looped_block(block_kind: bytes) -> FileMaker:
+def with_looped_block(block_type: bytes) -> FileMaker:
     """Make the usual file with a block that links to itself as the next one."""
     return altered_file_maker(
         MDF4,
         lambda data: patched_bytes(
-            data, first_block_offset(data, block_kind) + DATA, struct.pack("<Q", first_block_offset(data, block_kind))
+            data, first_block_offset(data, block_type) + DATA, struct.pack("<Q", first_block_offset(data, block_type))
         ),
     )
 
@@ -132,14 +132,14 @@ def with_other_clock(byte_offset: int, new_bytes: bytes) -> FileMaker:
     return altered_file_maker(MDF4, change)
 
 
-def with_other_head(byte_offset: int, new_bytes: bytes, length: int | None = None) -> FileMaker:
+def with_other_head(byte_offset: int, new_bytes: bytes, byte_count: int | None = None) -> FileMaker:
     """Make the usual file with bytes near its beginning replaced, and optionally only its first bytes."""
-    return altered_file_maker(MDF4, lambda data: patched_bytes(data, byte_offset, new_bytes)[:length])
+    return altered_file_maker(MDF4, lambda data: patched_bytes(data, byte_offset, new_bytes)[:byte_count])
 
 
-def truth_of_channel(name: str, values: np.ndarray, times: np.ndarray = SAMPLE_TIMES) -> Truth:
+def truth_of_channel(channel_name: str, expected_values: np.ndarray, sample_times: np.ndarray = SAMPLE_TIMES) -> Truth:
     """Expected values of a file with a single channel."""
-    return {name: (times, values)}
+    return {channel_name: (sample_times, expected_values)}
 
 
 WHOLE_NUMBERS = np.arange(SAMPLE_COUNT, dtype="i2")
@@ -237,7 +237,11 @@ REFUSED: Files = {
         mdf_file({"Fz": np.where(FX < -50.0, np.inf, FZ)}),
         "channel 'Fz', sample 21",
     ),
-    "MDF 4 with a clock of nan": ("a time is no time", mdf_file({"Fz": FZ}, times=STOPPED), "channel 'time', sample 9"),
+    "MDF 4 with a clock of nan": (
+        "a time is no time",
+        mdf_file({"Fz": FZ}, sample_times=STOPPED),
+        "channel 'time', sample 9",
+    ),
 }
 NAMED: Files = {
     "MDF 4 of fewer records than there are": (
@@ -267,7 +271,7 @@ NAMED: Files = {
 RIGHT: Files = {
     "MDF 3": (
         "another layout, the same samples",
-        mdf_file(USUAL_CHANNELS, version="3.30", start_date=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
+        mdf_file(USUAL_CHANNELS, mdf_version="3.30", start_date=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
     ),
     "MDF 4 packed": ("samples are deflated", mdf_file(USUAL_CHANNELS, compression=2)),
     "MDF 4 of two rates": ("a common clock does not exist", file_of_two_rates(".mf4"), TWO_RATES),
@@ -294,7 +298,7 @@ RIGHT: Files = {
     ),
     "MDF 4 whose clock goes back": (
         "sorting would hide it",
-        mdf_file({"Fz": FZ}, times=BACK),
+        mdf_file({"Fz": FZ}, sample_times=BACK),
         truth_of_channel("Fz", FZ, BACK),
     ),
 }
@@ -310,12 +314,12 @@ GREEDY = (
     "MDF 4 that claims to be a terabyte when unpacked",
 )
 FILES = (
-    *odd_files(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY),
+    *odd_files(refused_files=REFUSED, files_with_message=NAMED, readable_files=RIGHT, greedy_names=GREEDY),
     *(
         OddFile(
             f"MDF {version[0]} whose groups are wheels",
             "every wheel has an Fz",
-            mdf_file({"Fz": FZ}, {"Fz": FX}, version=version, families=("WFT VL", "WFT HR")),
+            mdf_file({"Fz": FZ}, {"Fz": FX}, mdf_version=version, group_names=("WFT VL", "WFT HR")),
             "named",
             "'WFT HR/Fz'",
             {"WFT VL/Fz": (SAMPLE_TIMES, FZ), "WFT HR/Fz": (SAMPLE_TIMES, FX)},

@@ -43,9 +43,9 @@ MEMORY, SECONDS = 5e7, 10.0
 """Memory (bytes) and time (s) that reading a small file may take at most, whatever size the file states."""
 
 
-def usual_truth(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def usual_truth(**changed_values: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Expected times and values of the usual file's two channels. Keywords replace the values of a channel."""
-    return {name: (SAMPLE_TIMES, changed.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
+    return {name: (SAMPLE_TIMES, changed_values.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class OddFile:
     """A damaged or unusual file, and what reading it must give.
 
     difficulty : why it is hard to read. make : function that writes it. expected_outcome : see ``ExpectedOutcome``.
-    expected_text : phrase that the refusal or the message must contain. truth : for each channel, times and values; a
-    file whose outcome is "named" may give only the first of them. greedy : whether the file states a huge size, for
-    which no memory may be allocated.
+    expected_text : phrase that the refusal or the message must contain. expected_channels : for each channel, times and
+    values; a file whose outcome is "named" may give only the first of them. is_greedy : whether the file states a huge
+    size, for which no memory may be allocated.
     """
 
     name: str
@@ -63,16 +63,16 @@ class OddFile:
     make: FileMaker
     expected_outcome: ExpectedOutcome
     expected_text: str = ""
-    truth: Truth = field(default_factory=usual_truth)
-    greedy: bool = False
+    expected_channels: Truth = field(default_factory=usual_truth)
+    is_greedy: bool = False
 
-    def error(self, folder: Path) -> float:
+    def error(self, work_folder: Path) -> float:
         """Largest difference between the values read and the expected ones; infinite if a channel or a sample is
         missing. If the file is refused, the reader's exception is raised. AssertionError is raised if the refusal does
         not give the reason, if the folder was changed, or if reading took too much time or memory."""
-        folder.mkdir(parents=True, exist_ok=True)
-        path = self.make(folder)
-        state_before = _file_digests(folder)
+        work_folder.mkdir(parents=True, exist_ok=True)
+        path = self.make(work_folder)
+        state_before = _file_digests(work_folder)
         try:
             return self._measured(path)
         except InputError as refusal:
@@ -80,20 +80,24 @@ class OddFile:
                 raise AssertionError(f"{self.name}: {refusal} does not say {self.expected_text!r}") from refusal
             raise
         finally:
-            if _file_digests(folder) != state_before:
+            if _file_digests(work_folder) != state_before:
                 raise AssertionError(f"{self.name}: something was written beside {path} or into it")
 
-    def _measured(self, path: Path) -> float:
+    def _measured(self, file_path: Path) -> float:
         """Error of the values read. For a greedy file, time and memory are limited to those of a small file."""
-        if not self.greedy:
+        if not self.is_greedy:
             return reading_error(
-                open_source(path), self.truth, self.expected_text if self.expected_outcome == "named" else ""
+                open_source(file_path),
+                self.expected_channels,
+                self.expected_text if self.expected_outcome == "named" else "",
             )
         tracemalloc.start()
         began = time.perf_counter()
         try:
             return reading_error(
-                open_source(path), self.truth, self.expected_text if self.expected_outcome == "named" else ""
+                open_source(file_path),
+                self.expected_channels,
+                self.expected_text if self.expected_outcome == "named" else "",
             )
         finally:
             peak = tracemalloc.get_traced_memory()[1]
@@ -103,17 +107,17 @@ class OddFile:
 
 
 def odd_files(
-    refused: Files | None = None,
-    named_files: Files | None = None,
-    right_files: Files | None = None,
-    greedy: Sequence[str] = (),
+    refused_files: Files | None = None,
+    files_with_message: Files | None = None,
+    readable_files: Files | None = None,
+    greedy_names: Sequence[str] = (),
 ) -> tuple[OddFile, ...]:
-    """All files of the three tables. ``greedy``: names of the files that state a huge size, for which no memory may be
-    allocated."""
+    """All files of the three tables. ``greedy_names``: names of the files that state a huge size, for which no memory
+    may be allocated."""
     tables: tuple[tuple[ExpectedOutcome, Files], ...] = (
-        ("refused", refused or {}),
-        ("named", named_files or {}),
-        ("right", right_files or {}),
+        ("refused", refused_files or {}),
+        ("named", files_with_message or {}),
+        ("right", readable_files or {}),
     )
     collected_files = list[OddFile]()
     for expected_outcome, files in tables:
@@ -127,15 +131,17 @@ def odd_files(
                     expected_outcome,
                     expected_text,
                     truth[0] if truth else usual_truth(),
-                    name in greedy,
+                    name in greedy_names,
                 )
             )
     return tuple(collected_files)
 
 
-def _file_digests(folder: Path) -> dict[str, str]:
+def _file_digests(checked_folder: Path) -> dict[str, str]:
     """Digest of every file below a folder. It shows whether a file was changed."""
-    return {str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
+    return {
+        str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(checked_folder.rglob("*")) if p.is_file()
+    }
 
 
 def read_channels(measurement_source: MeasurementSource) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -152,29 +158,37 @@ def read_channels(measurement_source: MeasurementSource) -> dict[str, tuple[np.n
     return channels
 
 
-def reading_error(measurement_source: MeasurementSource, truth: Truth, expected_text: str) -> float:
+def reading_error(measurement_source: MeasurementSource, expected_channels: Truth, expected_text: str) -> float:
     """Largest difference between what is read from a file and the expected values; infinite if a channel, a sample or
     the reader's message is missing."""
     channels, finding_texts = (
         read_channels(measurement_source),
         [finding.text for finding in measurement_source.findings if finding.weight != "note" or expected_text],
     )
-    if set(channels) != set(truth) or not (
+    if set(channels) != set(expected_channels) or not (
         any(expected_text in text for text in finding_texts) if expected_text else not finding_texts
     ):
         return np.inf
-    return max(_largest_difference(channels[name], truth[name], bool(expected_text)) for name in truth)
+    return max(
+        _largest_difference(channels[name], expected_channels[name], bool(expected_text)) for name in expected_channels
+    )
 
 
 def _largest_difference(
-    read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], partial_allowed: bool
+    read_channel: tuple[np.ndarray, np.ndarray],
+    expected_channels: tuple[np.ndarray, np.ndarray],
+    is_partial_allowed: bool,
 ) -> float:
-    """Largest difference of times and values of a channel. With ``partial_allowed``, it is enough that the first
+    """Largest difference of times and values of a channel. With ``is_partial_allowed``, it is enough that the first
     samples were read."""
     count = len(read_channel[0])
-    if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not partial_allowed):
+    if (
+        count == 0
+        or count > len(expected_channels[0])
+        or (count < len(expected_channels[0]) and not is_partial_allowed)
+    ):
         return np.inf
-    true_times, values = truth[0][:count], truth[1][:count]
+    true_times, values = expected_channels[0][:count], expected_channels[1][:count]
     if not np.array_equal(np.isnan(read_channel[1]), np.isnan(values)):
         return np.inf
     return float(
@@ -182,19 +196,23 @@ def _largest_difference(
     )
 
 
-def write_usual_file(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
-    """Write channels (by default those of the usual file) in the format given by the extension of ``path``."""
-    table = np.column_stack((FZ, FX)) if values is None else values
-    group = ChannelGroup(names, ("N",) * len(names), ("",) * len(names), SAMPLE_PERIOD, len(table), [table])
-    return write(path, [group])
+def write_usual_file(
+    file_path: Path, channel_names: tuple[str, ...] = ("Fz", "Fx"), channel_values: np.ndarray | None = None
+) -> Path:
+    """Write channels (by default those of the usual file) in the format given by the extension of ``file_path``."""
+    table = np.column_stack((FZ, FX)) if channel_values is None else channel_values
+    group = ChannelGroup(
+        channel_names, ("N",) * len(channel_names), ("",) * len(channel_names), SAMPLE_PERIOD, len(table), [table]
+    )
+    return write(file_path, [group])
 
 
-def file_of_bytes(raw_bytes: bytes, name: str = "odd.csv") -> FileMaker:
+def file_of_bytes(raw_bytes: bytes, file_name: str = "odd.csv") -> FileMaker:
     """Make a file with this content."""
 
-    def make(folder: Path) -> Path:
-        (folder / name).write_bytes(raw_bytes)
-        return folder / name
+    def make(output_folder: Path) -> Path:
+        (output_folder / file_name).write_bytes(raw_bytes)
+        return output_folder / file_name
 
     return make
 
@@ -210,13 +228,13 @@ def file_of_300_channels(file_extension: str) -> FileMaker:
     return lambda folder: write_usual_file(folder / f"odd{file_extension}", tuple(MANY_CHANNELS), table)
 
 
-def altered_file_maker(make_file: FileMaker, change: Callable[[bytes], bytes], name: str = "") -> FileMaker:
+def altered_file_maker(make_file: FileMaker, change_bytes: Callable[[bytes], bytes], file_name: str = "") -> FileMaker:
     """Function that makes a file, changes its bytes and optionally gives it another name."""
 
-    def altered_file(folder: Path) -> Path:
-        path = make_file(folder)
-        path.write_bytes(change(path.read_bytes()))
-        return path.rename(folder / name) if name else path
+    def altered_file(output_folder: Path) -> Path:
+        path = make_file(output_folder)
+        path.write_bytes(change_bytes(path.read_bytes()))
+        return path.rename(output_folder / file_name) if file_name else path
 
     return altered_file
 
@@ -230,19 +248,19 @@ def file_of_two_rates(file_extension: str) -> FileMaker:
     """Make a file of two groups that have different sampling rates."""
     clocks = (("Fz", SAMPLE_PERIOD, FZ), ("Fx", SLOW_PERIOD, FX))
 
-    def make(folder: Path) -> Path:
+    def make(output_folder: Path) -> Path:
         groups = [
             ChannelGroup((name,), ("N",), ("",), period, SAMPLE_COUNT, [samples[:, None]])
             for name, period, samples in clocks
         ]
-        return write(folder / f"odd{file_extension}", groups)
+        return write(output_folder / f"odd{file_extension}", groups)
 
     return make
 
 
-def usual_file_called(file_extension: str, name: str) -> FileMaker:
+def usual_file_called(file_extension: str, file_name: str) -> FileMaker:
     """Make the usual file under another name."""
-    return altered_file_maker(usual_file(file_extension), bytes, name)
+    return altered_file_maker(usual_file(file_extension), bytes, file_name)
 
 
 @dataclass(frozen=True)
@@ -256,12 +274,12 @@ class CutSweep:
     extension: str
     cuts: int = 40
 
-    def silent_cuts(self, folder: Path) -> int:
+    def silent_cuts(self, work_folder: Path) -> int:
         """Number of cuts after which the reader returns wrong values or does not report that the file is cut off."""
-        folder.mkdir(parents=True, exist_ok=True)
+        work_folder.mkdir(parents=True, exist_ok=True)
         count = 7000 if self.extension == ".rsp" else SAMPLE_COUNT  # three groups of RPC III and a half
         table = np.column_stack((FZ, FX)) if count == SAMPLE_COUNT else np.arange(float(count))[:, None] * [1.0, -2.5]
-        path = write_usual_file(folder / f"cut{self.extension}", values=table)
+        path = write_usual_file(work_folder / f"cut{self.extension}", channel_values=table)
         truth = {
             name: (SAMPLE_PERIOD * np.arange(count), column) for name, column in zip(("Fz", "Fx"), table.T, strict=True)
         }
@@ -271,14 +289,16 @@ class CutSweep:
         )
         return sum(self._is_silent(path, data[:cut_length], truth) for cut_length in cut_lengths)
 
-    def _is_silent(self, path: Path, raw_bytes: bytes, truth: Truth) -> bool:
+    def _is_silent(self, file_path: Path, raw_bytes: bytes, expected_channels: Truth) -> bool:
         """Whether the reader fails to report that this file is cut off, or reads it wrongly."""
-        path.write_bytes(raw_bytes)
+        file_path.write_bytes(raw_bytes)
         try:
-            source = open_source(path)
+            source = open_source(file_path)
             complete_truth = {
-                name: truth[name] for name in truth if name in {channel.name for channel in source.channels}
+                name: expected_channels[name]
+                for name in expected_channels
+                if name in {channel.name for channel in source.channels}
             }
             return reading_error(source, complete_truth, "cut off") > TOLERANCE
         except InputError as refusal:
-            return path.name not in str(refusal)
+            return file_path.name not in str(refusal)

@@ -27,16 +27,16 @@ KEY, RECORD, BLOCK, POINTS = 32, 128, 512, 2048
 RPC = usual_file(".rsp")
 
 
-def with_parameters(make_file: FileMaker = RPC, **changed: str | None) -> FileMaker:
+def with_parameters(make_file: FileMaker = RPC, **changed_parameters: str | None) -> FileMaker:
     """Make a file with some header parameters changed or, if None, removed. In the keywords, ``_`` stands for ``.``."""
 
     def change(raw_bytes: bytes) -> bytes:
         values = _header_parameters(raw_bytes)
         size = BLOCK * int(values["NUM_HEADER_BLOCKS"])
         names = {name.replace(".", "_"): name for name in values}
-        values |= {names.get(key, key): value for key, value in changed.items()}
+        values |= {names.get(key, key): value for key, value in changed_parameters.items()}
         given_parameters = {name: value for name, value in values.items() if value is not None}
-        given_parameters["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(given_parameters))
+        given_parameters["NUM_PARAMS"] = changed_parameters.get("NUM_PARAMS") or str(len(given_parameters))
         records = [
             (name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in given_parameters.items()
         ]
@@ -195,4 +195,4 @@ RIGHT: Files = {
     ),
 }
 GREEDY = ("RPC III of a huge number of frames", "RPC III of a huge number of channels", "RPC III of a huge header")
-FILES = odd_files(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)
+FILES = odd_files(refused_files=REFUSED, files_with_message=NAMED, readable_files=RIGHT, greedy_names=GREEDY)

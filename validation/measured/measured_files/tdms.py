@@ -39,26 +39,28 @@ CLOCK = {"wf_increment": SAMPLE_PERIOD, "wf_start_offset": 0.0}
 TDMS = usual_file(".tdms")
 
 
-def tdms_file(*columns: tuple[str, str, Any, dict[str, Any]]) -> FileMaker:
+def tdms_file(*channel_columns: tuple[str, str, Any, dict[str, Any]]) -> FileMaker:
     """Make a TDMS file. Each column gives group, name, samples and properties of a channel."""
 
-    def make(folder: Path) -> Path:
+    def make(output_folder: Path) -> Path:
         from nptdms import ChannelObject, TdmsWriter
 
-        with TdmsWriter(str(folder / "odd.tdms")) as file:
-            file.write_segment([ChannelObject(*column) for column in columns])
-        return folder / "odd.tdms"
+        with TdmsWriter(str(output_folder / "odd.tdms")) as file:
+            file.write_segment([ChannelObject(*column) for column in channel_columns])
+        return output_folder / "odd.tdms"
 
     return make
 
 
-def with_changed_bytes(byte_offset: int, new_bytes: bytes, length: int | None = None) -> FileMaker:
-    """Make the usual file with bytes replaced, or cut off at ``length``. Both offsets count from the start of its last
-    segment."""
+def with_changed_bytes(byte_offset: int, new_bytes: bytes, byte_count: int | None = None) -> FileMaker:
+    """Make the usual file with bytes replaced, or cut off at ``byte_count``. Both offsets count from the start of its
+    last segment."""
 
     def change(raw_bytes: bytes) -> bytes:
         begin = raw_bytes.rindex(b"TDSm")
-        return patched_bytes(raw_bytes, begin + byte_offset, new_bytes)[: None if length is None else begin + length]
+        return patched_bytes(raw_bytes, begin + byte_offset, new_bytes)[
+            : None if byte_count is None else begin + byte_count
+        ]
 
     return altered_file_maker(TDMS, change)
 
@@ -68,34 +70,34 @@ def cut_by(byte_count: int) -> FileMaker:
     return altered_file_maker(TDMS, lambda data: data[:-byte_count])
 
 
-def with_stated_count(stated_count: int) -> FileMaker:
+def with_stated_count(stated_sample_count: int) -> FileMaker:
     """Make the usual file with a wrong number of samples stated for its first channel."""
-    index, number = struct.pack("<LLLQ", 20, 10, 1, SAMPLE_COUNT), struct.pack("<Q", stated_count)
+    index, number = struct.pack("<LLLQ", 20, 10, 1, SAMPLE_COUNT), struct.pack("<Q", stated_sample_count)
     return altered_file_maker(TDMS, lambda data: patched_bytes(data, data.rindex(index) + 12, number))
 
 
-def beside_old_index(folder: Path) -> Path:
+def beside_old_index(output_folder: Path) -> Path:
     """Write the usual file next to an index file that belongs to another TDMS file."""
-    other_path = write_usual_file(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
+    other_path = write_usual_file(output_folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
     data = other_path.read_bytes()
     other_path.unlink()
-    (folder / "odd.tdms_index").write_bytes(data.replace(b"TDSm", b"TDSh"))
-    return TDMS(folder)
+    (output_folder / "odd.tdms_index").write_bytes(data.replace(b"TDSm", b"TDSh"))
+    return TDMS(output_folder)
 
 
-def channel_named(name: str, values: Any, **properties: Any) -> tuple[str, str, Any, dict[str, Any]]:
+def channel_named(channel_name: str, channel_values: Any, **properties: Any) -> tuple[str, str, Any, dict[str, Any]]:
     """A channel with the usual clock, as group, name, samples and properties."""
-    return "g", name, values, CLOCK | properties
+    return "g", channel_name, channel_values, CLOCK | properties
 
 
-def start_time(hour: int) -> np.datetime64:
+def start_time(start_hour: int) -> np.datetime64:
     """Start time of a recording that begins at a given hour."""
-    return np.datetime64(f"2026-11-21T{hour:02d}:00:00")
+    return np.datetime64(f"2026-11-21T{start_hour:02d}:00:00")
 
 
-def usual_truth_of(**values: np.ndarray) -> Truth:
+def usual_truth_of(**channel_values: np.ndarray) -> Truth:
     """Expected times and values of channels that have the usual clock."""
-    return {name: (SAMPLE_TIMES, samples) for name, samples in values.items()}
+    return {name: (SAMPLE_TIMES, samples) for name, samples in channel_values.items()}
 
 
 REFUSED: Files = {
@@ -249,4 +251,4 @@ GREEDY = (
     "TDMS of a huge number of channels",
     "TDMS of a huge name",
 )
-FILES = odd_files(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)
+FILES = odd_files(refused_files=REFUSED, files_with_message=NAMED, readable_files=RIGHT, greedy_names=GREEDY)

@@ -101,14 +101,14 @@ class BrakingStop:
         "the chassis leaves wheel and tyre with the exact step, and gives its digits."
     )
 
-    def __init__(self, quick: bool) -> None:
-        self.speed, self.change = (SPEED / 2, SURFACE_CHANGE / 4) if quick else (SPEED, SURFACE_CHANGE)
+    def __init__(self, is_quick: bool) -> None:
+        self.speed, self.change = (SPEED / 2, SURFACE_CHANGE / 4) if is_quick else (SPEED, SURFACE_CHANGE)
         self.title = (
             f"Anti-lock stop of a quarter vehicle from {self.speed:.4g} m/s, {SURFACES[0]} and from "
             f"{self.change:g} m on {SURFACES[1]}, valves replayed"
         )
         self.units, self.bound = {"stopping distance": "m"}, 10.0
-        self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 1e-4)
+        self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if is_quick else (1e-2, 1e-3, 1e-4)
         self._tables = [table_of_surface(name) for name in SURFACES]
         self.slips = np.unique(np.concatenate([table.slips for table in self._tables]))
         self.mu = np.array([np.interp(self.slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
@@ -119,7 +119,7 @@ class BrakingStop:
         )
         self.valves = self._recorded_commands()
         self.duration = self.valves.size * SAMPLING_PERIOD
-        solvers = REFERENCE_SOLVERS[quick]
+        solvers = REFERENCE_SOLVERS[is_quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self.true, other_distance = (self._distance_by_scipy(*solver_arguments) for solver_arguments in solvers)
         self.uncertainty = {"stopping distance": abs(self.true - other_distance)}
@@ -169,32 +169,38 @@ class BrakingStop:
         vehicle.run(tape, self.speed)
         return np.array(tape.valves + [tape.valves[-1]] * EXTRA_SAMPLES)
 
-    def _distance_by_scipy(self, method: str, tolerance: float) -> float:
+    def _distance_by_scipy(self, method_name: str, tolerance: float) -> float:
         """Stopping distance (m) by an adaptive method of scipy; changes of friction, locking and release are events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
         return reference_distance_on_stretches(
-            FRONT_WHEEL, PAPER_FRONT_BRAKE, stretches, ReplayedController(self.valves), self.speed, tolerance, method
+            FRONT_WHEEL,
+            PAPER_FRONT_BRAKE,
+            stretches,
+            ReplayedController(self.valves),
+            self.speed,
+            tolerance,
+            method_name,
         )
 
-    def _friction(self, surface_number: int, slip: float) -> float:
-        return float(np.interp(slip, self.slips, self.mu[surface_number]))
+    def _friction(self, surface_number: int, wheel_slip: float) -> float:
+        return float(np.interp(wheel_slip, self.slips, self.mu[surface_number]))
 
-    def _torques(self, substeps: int) -> np.ndarray:
+    def _torques(self, substep_count: int) -> np.ndarray:
         """Brake torques (n, 1) in N m at the start and at the end of every step."""
-        air, substep_torques = air_at_rest(self._chambers, SAMPLING_PERIOD), np.zeros((substeps + 1, 1))
+        air, substep_torques = air_at_rest(self._chambers, SAMPLING_PERIOD), np.zeros((substep_count + 1, 1))
         torques = [np.zeros(1)]
         for valve in self.valves:
             advance_by_valves(np.array([valve]), SAMPLING_PERIOD, air, self._chambers, self._brakes, substep_torques)
             torques.append(substep_torques[1:, 0].copy())
         return np.concatenate(torques)
 
-    def _stop_by_twinrig(self, substeps: int) -> StopResult:
+    def _stop_by_twinrig(self, substep_count: int) -> StopResult:
         stop = stop_of_quarter_vehicle(
             FRONT_WHEEL,
             stacked_tables(self._tables),
             self._road,
-            self._torques(substeps),
-            SAMPLING_PERIOD / substeps,
+            self._torques(substep_count),
+            SAMPLING_PERIOD / substep_count,
             self.speed,
         )
         if stop.step_of_rest < 0:
@@ -204,19 +210,19 @@ class BrakingStop:
             {"steps": stop.step_of_rest, "force calls": CALLS_PER_STEP[EXACT_WHEEL_METHOD] * stop.step_of_rest},
         )
 
-    def _stop_by_method(self, method: str, substeps: int) -> StopResult:
-        number = (EULER, RK4, LITERAL).index(method)
-        torques, step = self._torques(substeps), SAMPLING_PERIOD / substeps
+    def _stop_by_method(self, method_name: str, substep_count: int) -> StopResult:
+        number = (EULER, RK4, LITERAL).index(method_name)
+        torques, step = self._torques(substep_count), SAMPLING_PERIOD / substep_count
         friction = FrictionChange(
             FrictionCurve(self.slips, self.mu[0]), FrictionCurve(self.slips, self.mu[1]), self.change
         )
         distance, steps, _ = stop_by_scheme(number, FRONT_WHEEL, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return StopResult(distance, {"steps": steps, "force calls": CALLS_PER_STEP[method] * steps})
+        return StopResult(distance, {"steps": steps, "force calls": CALLS_PER_STEP[method_name] * steps})
 
 
 @cache
-def problem(quick: bool) -> BrakingStop:
+def problem(is_quick: bool) -> BrakingStop:
     """The test problem of the braking stop; its reference solution is computed once per process."""
-    return BrakingStop(quick)
+    return BrakingStop(is_quick)

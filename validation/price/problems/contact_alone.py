@@ -102,16 +102,19 @@ class ContactAlone:
             zip(self.units, (float(contact_errors.mean()), float(np.quantile(contact_errors, 0.95))), strict=True)
         )
 
-    def _run(self, theory: TheorySettings, cells: int) -> ContactResult:
+    def _run(self, contact_theory: TheorySettings, cell_count: int) -> ContactResult:
         forces = np.array(
-            [tangential_force_of(theory.rolled(case, cells)(case.motion)) / case.friction_limit for case in self._cases]
+            [
+                tangential_force_of(contact_theory.rolled(case, cell_count)(case.motion)) / case.friction_limit
+                for case in self._cases
+            ]
         )
-        linear, number = theory.name == "linear theory", len(self._cases)
-        counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
+        linear, number = contact_theory.name == "linear theory", len(self._cases)
+        counts = {"contacts": number, "contact cells": number * (1 if linear else cell_count**2)}
         return ContactResult(forces, counts, friction_warning(np.linalg.norm(forces, axis=1)) if linear else "")
 
 
 @cache
-def problem(quick: bool) -> ContactAlone:
+def problem(is_quick: bool) -> ContactAlone:
     """The test problem of rolling contacts; its reference forces are read once per process."""
     return ContactAlone()

@@ -88,18 +88,18 @@ class ForceExcited:
     excitation_text = "driven by its wheel forces"
     judged_quantities: tuple[tuple[str, str], ...] = ()
 
-    def __init__(self, quick: bool) -> None:
+    def __init__(self, is_quick: bool) -> None:
         self.units = dict((*self.judged_quantities, ("state", "m, rad, m/s, rad/s")))
-        steps = [1e3 * setting.value for setting in self.settings(quick)]
+        steps = [1e3 * setting.value for setting in self.settings(is_quick)]
         self.title = (
             f"Pitch-plane vehicle {self.excitation_text}, {DURATION:g} s at {SPEED:g} m/s, before "
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.assembly = self.vehicle_under_forces()
         other_settings = (
-            Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12)
+            Settings("RK4", 2 * FINE_STEP, DURATION) if is_quick else Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12)
         )
-        self.reference = f"RK4 at {1e6 * FINE_STEP:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
+        self.reference = f"RK4 at {1e6 * FINE_STEP:.2g} us and " + ("twice that" if is_quick else "DOP853 at 1e-12")
         self._true, check = (
             self._sampled(build("reference", self.assembly, settings).run())
             for settings in (Settings("RK4", FINE_STEP, DURATION), other_settings)
@@ -111,14 +111,14 @@ class ForceExcited:
         """The vehicle with its inputs, whose equations are solved."""
         return vehicle_under_forces()
 
-    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+    def read(self, finished_run: Trajectory) -> dict[str, np.ndarray]:
         """The compared quantities (n, ...) by name, at all n rows of a run."""
-        return {"state": run.states}
+        return {"state": finished_run.states}
 
-    def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
+    def _sampled(self, finished_run: Trajectory) -> dict[str, np.ndarray]:
         """The compared quantities of a run by name, at the sample times of the forces."""
-        stride = (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)
-        return {name: values[::stride] for name, values in self.read(run).items()}
+        stride = (len(finished_run.states) - 1) // round(DURATION / SAMPLE_PERIOD)
+        return {name: values[::stride] for name, values in self.read(finished_run).items()}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """Settings of all curves, or for the quick report of QUICK_STEPS."""
@@ -158,10 +158,13 @@ class NoisyForces(ForceExcited):
         noise = DEVIATION * normal_samples(SEED, 0, *clean.input.values.shape)
         return replace(clean, input=Sampled(clean.input.values + noise, SAMPLE_PERIOD, held=False))
 
-    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+    def read(self, finished_run: Trajectory) -> dict[str, np.ndarray]:
         """Suspension forces (n, 2) in N and states (n, 8) of a run."""
-        channels = output_channels(self.assembly, run)
-        return {"suspension force": np.column_stack([channels[name][2] for name in ("f3", "f4")]), "state": run.states}
+        channels = output_channels(self.assembly, finished_run)
+        return {
+            "suspension force": np.column_stack([channels[name][2] for name in ("f3", "f4")]),
+            "state": finished_run.states,
+        }
 
 
 class PrescribedPitch(ForceExcited):
@@ -192,25 +195,25 @@ class PrescribedPitch(ForceExcited):
         assembly.initial[[3, 7]] = pitch.at(0.0)[:2]
         return assembly
 
-    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+    def read(self, finished_run: Trajectory) -> dict[str, np.ndarray]:
         """Enforced moment (n,) in N m and states (n, 8) of a run."""
-        assert run.moment is not None
-        return {"enforced moment": run.moment, "state": run.states}
+        assert finished_run.moment is not None
+        return {"enforced moment": finished_run.moment, "state": finished_run.states}
 
 
 @cache
-def problem(quick: bool) -> ForceExcited:
+def problem(is_quick: bool) -> ForceExcited:
     """The test problem of a vehicle under wheel forces; its reference solution is computed once per process."""
-    return ForceExcited(quick)
+    return ForceExcited(is_quick)
 
 
 @cache
-def noisy_problem(quick: bool) -> NoisyForces:
+def noisy_problem(is_quick: bool) -> NoisyForces:
     """The test problem of a vehicle under noisy wheel forces, computed once per process."""
-    return NoisyForces(quick)
+    return NoisyForces(is_quick)
 
 
 @cache
-def prescribed_pitch_problem(quick: bool) -> PrescribedPitch:
+def prescribed_pitch_problem(is_quick: bool) -> PrescribedPitch:
     """The test problem of a vehicle with prescribed pitch, computed once per process."""
-    return PrescribedPitch(quick)
+    return PrescribedPitch(is_quick)

@@ -59,10 +59,10 @@ REFERENCE_SOLVERS = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "M
 """Reference solvers: method of scipy, relative tolerance, and name of the equations that it solves."""
 
 
-def track_heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
+def track_heights(positions: ArrayLike, track_number: int) -> tuple[np.ndarray, np.ndarray]:
     """Height (m) and slope of the road's left (0) or right (1) track at positions (...) in m along the road."""
     x, k = np.asarray(positions, dtype=float), np.arange(1, SINE_COUNT + 1)
-    angle = 2 * np.pi * (x[..., None] * k / LONGEST_WAVELENGTH + GOLDEN * k * (k + SINE_COUNT * track))
+    angle = 2 * np.pi * (x[..., None] * k / LONGEST_WAVELENGTH + GOLDEN * k * (k + SINE_COUNT * track_number))
     shape = (LARGEST_AMPLITUDE / k * np.sin(angle)).sum(axis=-1)
     slope = 2 * np.pi * LARGEST_AMPLITUDE / LONGEST_WAVELENGTH * np.cos(angle).sum(axis=-1)
     rise = 1 / (1 + np.exp(-(x - RISE_STATION) / RISE_LENGTH))
@@ -87,8 +87,8 @@ class FreeVehicle:
     )
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1)
 
-    def __init__(self, quick: bool) -> None:
-        steps = [1e3 * setting.value for setting in self.settings(quick) if not setting.adaptive]
+    def __init__(self, is_quick: bool) -> None:
+        steps = [1e3 * setting.value for setting in self.settings(is_quick) if not setting.adaptive]
         self.title = (
             f"Passenger car of 19 freedoms, free on a road of two tracks, {DURATION:g} s at {SPEED:g} m/s, "
             f"steps of {min(steps):g} to {max(steps):g} ms"
@@ -115,18 +115,20 @@ class FreeVehicle:
         ]
         return np.stack([*(height for height, _ in waves), *(SPEED * slope for _, slope in waves)], axis=-1)
 
-    def _solved(self, acceleration: Callable[..., np.ndarray], method: str, tolerance: float) -> np.ndarray:
+    def _solved(
+        self, acceleration_function: Callable[..., np.ndarray], method_name: str, tolerance: float
+    ) -> np.ndarray:
         """States (m, 2 n) at the m compared times by a method of scipy, from the equilibrium."""
         n = len(self.vehicle.coordinates())
 
         def rates(t: float, y: np.ndarray) -> np.ndarray:
-            return np.concatenate([y[n:], acceleration(t, y[:n], y[n:], self.road(t))])
+            return np.concatenate([y[n:], acceleration_function(t, y[:n], y[n:], self.road(t))])
 
         solution = solve_ivp(
             rates,
             (0.0, DURATION),
             np.zeros(2 * n),
-            method=method,
+            method=method_name,
             t_eval=self.instants,
             rtol=tolerance,
             atol=1e-2 * tolerance,
@@ -177,6 +179,6 @@ class FreeVehicle:
 
 
 @cache
-def problem(quick: bool) -> FreeVehicle:
+def problem(is_quick: bool) -> FreeVehicle:
     """The test problem of the free vehicle; its reference solution is computed once per process."""
-    return FreeVehicle(quick)
+    return FreeVehicle(is_quick)

@@ -88,16 +88,17 @@ def gyro(times: np.ndarray) -> np.ndarray:
     )
 
 
-def magnus_attitudes(step: float) -> np.ndarray:
-    """Quaternions (n + 1, 4) of the car's attitude by the Magnus method of order six with steps of ``step`` s, which
-    reads the rates at three Gauss points.
+def magnus_attitudes(time_step: float) -> np.ndarray:
+    """Quaternions (n + 1, 4) of the car's attitude by the Magnus method of order six with steps of ``time_step`` s,
+    which reads the rates at three Gauss points.
 
     The bracket of two rotation vectors is their vector product, with the sign of rates that are local (Blanes, Casas,
     Oteo and Ros, Physics Reports 470, 2009, eq. 257).
     """
-    start = step * np.arange(round(DURATION / step))
+    start = time_step * np.arange(round(DURATION / time_step))
     first_turn, middle, last_turn = (
-        step * gyro(start + step * (0.5 + point_offset)) for point_offset in np.array([-1, 0, 1]) * np.sqrt(0.15)
+        time_step * gyro(start + time_step * (0.5 + point_offset))
+        for point_offset in np.array([-1, 0, 1]) * np.sqrt(0.15)
     )
     slope, bend = np.sqrt(15) / 3 * (last_turn - first_turn), 10 / 3 * (last_turn - 2 * middle + first_turn)
     odd = -np.cross(middle, slope)
@@ -107,11 +108,11 @@ def magnus_attitudes(step: float) -> np.ndarray:
     return integrate_attitude(np.concatenate([turn, turn[-1:]]), 1.0, car_attitude(np.zeros(1))[0], "held")
 
 
-def largest_angle(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
+def largest_angle(computed_attitudes: np.ndarray, true_attitudes: np.ndarray) -> float:
     """Largest angle (rad) between computed and true attitudes, quaternions (n, 4) each."""
     return float(
         np.linalg.norm(
-            rotation_vector(quaternion_product(conjugate_quaternion(computed_attitudes), true_values)), axis=-1
+            rotation_vector(quaternion_product(conjugate_quaternion(computed_attitudes), true_attitudes)), axis=-1
         ).max()
     )
 
@@ -146,8 +147,8 @@ class InertialUnit:
     )
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
-    def __init__(self, quick: bool) -> None:
-        rates = [1 / setting.value for setting in self.settings(quick)]
+    def __init__(self, is_quick: bool) -> None:
+        rates = [1 / setting.value for setting in self.settings(is_quick)]
         self.title = (
             f"Attitude of a car for {DURATION:g} s from {min(rates):g} to {max(rates):g} samples of its rates a second"
         )
@@ -191,6 +192,6 @@ class InertialUnit:
 
 
 @cache
-def problem(quick: bool) -> InertialUnit:
+def problem(is_quick: bool) -> InertialUnit:
     """The test problem of the attitude from gyro rates; its reference is computed once per process."""
-    return InertialUnit(quick)
+    return InertialUnit(is_quick)

@@ -101,11 +101,11 @@ def scene(duration: float = DURATION):
     )
 
 
-def result_with_assumptions(assembly: Assembly, run: Trajectory) -> Result:
+def result_with_assumptions(assembly: Assembly, finished_run: Trajectory) -> Result:
     """Result of a run, with the assumptions of the assembly that the run broke."""
-    channels = output_channels(replace(assembly, sensors=()), run)
+    channels = output_channels(replace(assembly, sensors=()), finished_run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
-    time_axis = {"time": Channel("time", run.times, "s")}
+    time_axis = {"time": Channel("time", finished_run.times, "s")}
     return with_assumptions(result(assembly.scene, labelled, time_axis, mode=assembly.mode), assumptions(assembly))
 
 
@@ -122,12 +122,12 @@ def setting(engine: str, method: str, step_or_tolerance: float) -> Setting:
     return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES_OF_METHOD.get(method, 0), default)
 
 
-def settings(quick: bool) -> tuple[Setting, ...]:
+def settings(is_quick: bool) -> tuple[Setting, ...]:
     """Settings of FULL_STEPS, or for the quick report of QUICK_STEPS."""
-    return settings_of_curves(QUICK_STEPS if quick else FULL_STEPS, setting)
+    return settings_of_curves(QUICK_STEPS if is_quick else FULL_STEPS, setting)
 
 
-def continuous_solution(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
+def continuous_solution(assembly: Assembly, method_name: str, tolerance: float) -> OdeSolution:
     """Continuous solution of the paper's equations by a method of scipy, which restarts where the road is only twice
     differentiable."""
     derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
@@ -140,7 +140,7 @@ def continuous_solution(assembly: Assembly, method: str, tolerance: float) -> Od
             lambda t, y: derivative(y, road_at(t), p),
             (start, end),
             y,
-            method=method,
+            method=method_name,
             dense_output=True,
             rtol=tolerance,
             atol=1e-2 * tolerance,
@@ -164,15 +164,15 @@ class RoadExcited:
         "it, their force calls do not."
     )
 
-    def __init__(self, quick: bool) -> None:
-        steps = [1e3 * setting.value for setting in self.settings(quick) if not setting.adaptive]
+    def __init__(self, is_quick: bool) -> None:
+        steps = [1e3 * setting.value for setting in self.settings(is_quick) if not setting.adaptive]
         self.title = (
             f"Pitch-plane vehicle on the study road, {DURATION:g} s at {SPEED:g} m/s, "
             f"fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
         self.assembly = assembly_of_scene(scene())
-        solvers = REFERENCE_SOLVERS[quick]
+        solvers = REFERENCE_SOLVERS[is_quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self._solution = continuous_solution(self.assembly, *solvers[0])
         grid_times = REFERENCE_SPACING * np.arange(round(DURATION / REFERENCE_SPACING) + 1)
@@ -212,6 +212,6 @@ class RoadExcited:
 
 
 @cache
-def problem(quick: bool) -> RoadExcited:
+def problem(is_quick: bool) -> RoadExcited:
     """The test problem of a vehicle on a road; its reference solution is computed once per process."""
-    return RoadExcited(quick)
+    return RoadExcited(is_quick)

@@ -38,18 +38,27 @@ class Attitudes:
 
 
 def attitudes_in_mujoco(
-    method: str, sample_period: float, step_count: int, steps_per_row: int, start_attitude: np.ndarray, gyro: Gyro
+    method_name: str,
+    sample_period: float,
+    step_count: int,
+    steps_per_row: int,
+    start_attitude: np.ndarray,
+    gyro_rates: Gyro,
 ) -> Attitudes:
     """Attitudes of the rotating sphere in MuJoCo: ``step_count`` steps of ``sample_period`` (s) from an attitude (4,),
     of which every ``steps_per_row``-th is kept.
     """
     spec = mujoco.MjSpec()
-    spec.option.timestep, spec.option.gravity, spec.option.integrator = sample_period, [0, 0, 0], INTEGRATORS[method]
+    spec.option.timestep, spec.option.gravity, spec.option.integrator = (
+        sample_period,
+        [0, 0, 0],
+        INTEGRATORS[method_name],
+    )
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
     body = spec.worldbody.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0], ipos=[0, 0, 0], explicitinertial=True)
     body.add_joint(type=mujoco.mjtJoint.mjJNT_BALL)
     model = spec.compile()
-    rates = gyro(sample_period * np.arange(step_count + 1))
+    rates = gyro_rates(sample_period * np.arange(step_count + 1))
     torques = np.diff(rates, axis=0)[None] / sample_period
     with without_warnings():
         path, _ = rollout.rollout(
@@ -61,24 +70,29 @@ def attitudes_in_mujoco(
         )
     attitudes = np.vstack([start_attitude, path[0, steps_per_row - 1 :: steps_per_row, 1:5]])
     return _normalised_attitudes(
-        "mujoco", attitudes, {"steps": step_count, "force calls": (4 if method == "RK4" else 1) * step_count}
+        "mujoco", attitudes, {"steps": step_count, "force calls": (4 if method_name == "RK4" else 1) * step_count}
     )
 
 
 def attitudes_in_exudyn(
-    method: str, sample_period: float, step_count: int, steps_per_row: int, start_attitude: np.ndarray, gyro: Gyro
+    method_name: str,
+    sample_period: float,
+    step_count: int,
+    steps_per_row: int,
+    start_attitude: np.ndarray,
+    gyro_rates: Gyro,
 ) -> Attitudes:
     """Attitudes of the rotating sphere in Exudyn; raises Refused for methods whose steps cannot end on samples."""
-    name = method.split()[0]
+    name = method_name.split()[0]
     known = CATALOGUE["exudyn"][name]
     if known.adaptive:
         raise Refused("exudyn", f"{name} picks its own steps, which do not end on the samples of the rates")
     sample_times = sample_period * np.arange(step_count + 2)
-    rates = gyro(sample_times)
+    rates = gyro_rates(sample_times)
     pushed = (
         np.diff(rates, axis=0) / sample_period
         if known.holds
-        else (gyro(sample_times + HALF_DIFFERENCE_INTERVAL) - gyro(sample_times - HALF_DIFFERENCE_INTERVAL))
+        else (gyro_rates(sample_times + HALF_DIFFERENCE_INTERVAL) - gyro_rates(sample_times - HALF_DIFFERENCE_INTERVAL))
         / 2
         / HALF_DIFFERENCE_INTERVAL
     )

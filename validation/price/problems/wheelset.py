@@ -108,31 +108,33 @@ class WheelsetSolver:
 
 
 @njit(cache=True, error_model="numpy")
-def rates(state, table_of_wheels, table, state_rate):
-    """Fill ``state_rate`` (2 n,) with the time derivatives of coordinates and rates (2 n,) of rolling wheels; table
-    (3, n) : masses, stiffnesses and dampings."""
-    n = table.shape[1]
-    state_rate[:n] = state[n:]
+def rates(wheel_state, creep_table, suspension_table, state_rate):
+    """Fill ``state_rate`` (2 n,) with the time derivatives of coordinates and rates (2 n,) of rolling wheels;
+    suspension_table (3, n) : masses, stiffnesses and dampings."""
+    n = suspension_table.shape[1]
+    state_rate[:n] = wheel_state[n:]
     state_rate[n:] = 0.0
-    position, rate, force = state[:n].copy(), state[n:].copy(), np.zeros(n)
-    forces(start(table_of_wheels), 0.0, start(position), start(rate), start(force))
+    position, rate, force = wheel_state[:n].copy(), wheel_state[n:].copy(), np.zeros(n)
+    forces(start(creep_table), 0.0, start(position), start(rate), start(force))
     for i in range(n):
-        state_rate[n + i] = (force[i] - table[1, i] * position[i] - table[2, i] * rate[i]) / table[0, i]
+        state_rate[n + i] = (
+            force[i] - suspension_table[1, i] * position[i] - suspension_table[2, i] * rate[i]
+        ) / suspension_table[0, i]
 
 
 @njit(cache=True, error_model="numpy")
-def march(state, table_of_wheels, table, step, step_count):
-    """Advance ``state`` (2 n,) in place by ``step_count`` steps of ``step`` s by RK4."""
-    total, rate = np.empty(state.size), np.empty(state.size)
+def march(wheel_state, creep_table, suspension_table, time_step, step_count):
+    """Advance ``wheel_state`` (2 n,) in place by ``step_count`` steps of ``time_step`` s by RK4."""
+    total, rate = np.empty(wheel_state.size), np.empty(wheel_state.size)
     for _ in range(step_count):
         total[:] = 0.0
         for stage in range(4):
-            stage_state = state.copy()
+            stage_state = wheel_state.copy()
             if stage > 0:
-                stage_state += (step if stage == 3 else 0.5 * step) * rate
-            rates(stage_state, table_of_wheels, table, rate)
+                stage_state += (time_step if stage == 3 else 0.5 * time_step) * rate
+            rates(stage_state, creep_table, suspension_table, rate)
             total += (1.0 if stage % 3 == 0 else 2.0) * rate
-        state += step / 6.0 * total
+        wheel_state += time_step / 6.0 * total
 
 
 class RollingWheels:
@@ -212,13 +214,13 @@ class RollingWheels:
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
         return {"creep force": force[:2], "displacement": state[:2]}
 
-    def _channel_errors(self, channels: dict[str, Array]) -> dict[str, float]:
-        return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
+    def _channel_errors(self, computed_channels: dict[str, Array]) -> dict[str, float]:
+        return {name: float(np.abs(values - self._true[name]).max()) for name, values in computed_channels.items()}
 
-    def _run_by_method(self, method: str, step_or_tolerance: float) -> WheelsetResult:
+    def _run_by_method(self, method_name: str, step_or_tolerance: float) -> WheelsetResult:
         """Final state by the hand-written equations: with RK4 at a step (s), or with scipy at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
-        if method == "RK4":
+        if method_name == "RK4":
             steps = round(DURATION / step_or_tolerance)
             march(state, numbers, self._table, DURATION / steps, steps)
             return WheelsetResult(state, {"steps": steps, "force calls": 4 * steps})
@@ -228,23 +230,25 @@ class RollingWheels:
             return state_rate
 
         solution = solve_ivp(
-            derivative, (0.0, DURATION), state, method, rtol=step_or_tolerance, atol=1e-6 * step_or_tolerance
+            derivative, (0.0, DURATION), state, method_name, rtol=step_or_tolerance, atol=1e-6 * step_or_tolerance
         )
         if not solution.success:
             raise RunFailed("reference", solution.message)
         return WheelsetResult(solution.y[:, -1], {"steps": solution.t.size - 1, "force calls": int(solution.nfev)})
 
-    def _solver_in_mujoco(self, method: str, steps: int) -> WheelsetSolver:
-        marcher = Marcher(model(self.wheels, DURATION / steps, method))
+    def _solver_in_mujoco(self, method_name: str, step_count: int) -> WheelsetSolver:
+        marcher = Marcher(model(self.wheels, DURATION / step_count, method_name))
 
         def run() -> WheelsetResult:
             with installed(kernel_law(forces)):
-                state = marcher.run(self._start[None], steps)[0, -1]
-            return WheelsetResult(state, {"steps": steps, "force calls": STAGES_OF_METHOD[method] * steps})
+                state = marcher.run(self._start[None], step_count)[0, -1]
+            return WheelsetResult(
+                state, {"steps": step_count, "force calls": STAGES_OF_METHOD[method_name] * step_count}
+            )
 
         return WheelsetSolver(run)
 
-    def _solver_in_exudyn(self, setting: Setting, method: str) -> WheelsetSolver:
+    def _solver_in_exudyn(self, setting: Setting, method_name: str) -> WheelsetSolver:
         calls, law = [0], Forces(self.wheels)
         slopes = (
             counting_calls(law.slopes, calls, JACOBIAN_EVALUATIONS)
@@ -258,15 +262,15 @@ class RollingWheels:
         def run() -> WheelsetResult:
             calls[0] = 0
             q, v = np.split(self._start, 2)
-            state = rolling.run(q, v, steps, DURATION / steps, method, tolerance)
+            state = rolling.run(q, v, steps, DURATION / steps, method_name, tolerance)
             return WheelsetResult(
-                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - START_FORCE_CALLS.get(method, 0)}
+                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - START_FORCE_CALLS.get(method_name, 0)}
             )
 
         return WheelsetSolver(run)
 
 
 @cache
-def problem(quick: bool, speed: float) -> RollingWheels:
+def problem(is_quick: bool, speed: float) -> RollingWheels:
     """The test problem of a wheel that rolls at a speed (m/s); its reference is computed once per process."""
     return RollingWheels(speed)

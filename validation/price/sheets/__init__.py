@@ -22,9 +22,10 @@ WRITERS: tuple[Callable[[Path], list[ReferenceValue]], ...] = (
 TABLE_HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
 
 
-def main(folder: Path, writers: tuple[Callable[[Path], list[ReferenceValue]], ...] = WRITERS) -> None:
-    """Write a problem sheet and its input files for each problem into ``folder``, and one ``reference_values.csv``."""
-    values = [value for write in writers for value in write(folder)]
-    with open(folder / "reference_values.csv", "w", newline="") as file:
+def main(output_folder: Path, writers: tuple[Callable[[Path], list[ReferenceValue]], ...] = WRITERS) -> None:
+    """Write a problem sheet and its input files for each problem into ``output_folder``, and one
+    ``reference_values.csv``."""
+    values = [value for write in writers for value in write(output_folder)]
+    with open(output_folder / "reference_values.csv", "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerows([TABLE_HEADS, *(value.cells() for value in values)])

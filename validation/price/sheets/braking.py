@@ -37,17 +37,17 @@ Asked for: the stopping distance. After the first sample that ends at u <= {LAST
 rest of the way is u^2 / (2 g mu(1))."""
 
 
-def write(folder: Path) -> list[ReferenceValue]:
+def write(output_folder: Path) -> list[ReferenceValue]:
     """Write the problem sheet, tyre table and valve commands; returns the reference value of the stopping distance."""
     problem = braking_stop.problem(False)
     heads = ("slip", *(f"mu {name}" for name in SURFACES))
-    write_columns(folder, "braking_friction", heads, np.column_stack([problem.slips, *problem.mu]))
-    write_columns(folder, "braking_valves", ("valve",), problem.valves[:, None])
+    write_columns(output_folder, "braking_friction", heads, np.column_stack([problem.slips, *problem.mu]))
+    write_columns(output_folder, "braking_valves", ("valve",), problem.valves[:, None])
     values = [
         ReferenceValue("braking", "stopping distance", "m", 0.0, problem.true, problem.uncertainty["stopping distance"])
     ]
     write_page(
-        folder,
+        output_folder,
         "braking",
         problem.title,
         SHEET_TEXT,

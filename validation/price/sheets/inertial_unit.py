@@ -10,8 +10,8 @@ from validation.price.sheets.page import write as write_page
 QUATERNION_NAMES = ("q1", "q2", "q3", "q4")
 
 
-def write(folder: Path) -> list[ReferenceValue]:
-    """Write the problem sheet into ``folder``; returns the reference values of the final quaternion."""
+def write(output_folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet into ``output_folder``; returns the reference values of the final quaternion."""
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
     values = [
@@ -19,7 +19,7 @@ def write(folder: Path) -> list[ReferenceValue]:
         for name, component in zip(QUATERNION_NAMES, problem.true[-1], strict=True)
     ]
     return write_page(
-        folder,
+        output_folder,
         "unit",
         problem.title,
         _sheet_text(),

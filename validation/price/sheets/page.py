@@ -22,34 +22,46 @@ class ReferenceValue(NamedTuple):
         return (*self[:3], f"{self.time:.17g}", f"{self.value:.16e}", f"{self.uncertainty:.1e}")
 
 
-def write_columns(folder: Path, name: str, headings: Sequence[str], values: np.ndarray) -> None:
-    """Write columns (n, c) with headings (c,) to the file ``name``.csv, with all digits."""
-    np.savetxt(folder / f"{name}.csv", values, fmt="%.17g", delimiter=",", header=",".join(headings), comments="")
+def write_columns(output_folder: Path, file_name: str, headings: Sequence[str], column_values: np.ndarray) -> None:
+    """Write columns (n, c) with headings (c,) to the file ``file_name``.csv, with all digits."""
+    np.savetxt(
+        output_folder / f"{file_name}.csv",
+        column_values,
+        fmt="%.17g",
+        delimiter=",",
+        header=",".join(headings),
+        comments="",
+    )
 
 
-def write_matrices(folder: Path, name: str, arrays: dict[str, np.ndarray]) -> None:
-    """Write the nonzero entries of matrices to the file ``name``.csv: matrix, row, column (counted from 1),
+def write_matrices(output_folder: Path, file_name: str, matrices: dict[str, np.ndarray]) -> None:
+    """Write the nonzero entries of matrices to the file ``file_name``.csv: matrix, row, column (counted from 1),
     value."""
     lines = ["matrix,row,column,value"]
-    for key, values in arrays.items():
+    for key, values in matrices.items():
         lines += [f"{key},{i + 1},{j + 1},{values[i, j]:.17g}" for i, j in np.argwhere(values != 0.0)]
-    (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    (output_folder / f"{file_name}.csv").write_text("\n".join(lines) + "\n")
 
 
-def vector_text(values: Sequence[float] | np.ndarray) -> str:
+def vector_text(components: Sequence[float] | np.ndarray) -> str:
     """Text of a vector with all digits of its numbers, in brackets."""
-    return "(" + ", ".join(f"{value:.17g}" for value in values) + ")"
+    return "(" + ", ".join(f"{value:.17g}" for value in components) + ")"
 
 
 def write(
-    folder: Path, key: str, title: str, body: str, reference_text: str, values: list[ReferenceValue]
+    output_folder: Path,
+    sheet_name: str,
+    sheet_title: str,
+    problem_text: str,
+    reference_text: str,
+    reference_values: list[ReferenceValue],
 ) -> list[ReferenceValue]:
-    """Write the problem sheet ``key``.md: the problem, how its reference was computed, and the reference values, which
-    are returned."""
-    lines = "\n".join(f"| {v.quantity} | {v.value:.16e} | {v.unit} | {v.uncertainty:.1e} |" for v in values)
-    (folder / f"{key}.md").write_text(f"""# {title}
+    """Write the problem sheet ``sheet_name``.md: the problem, how its reference was computed, and the reference values,
+    which are returned."""
+    lines = "\n".join(f"| {v.quantity} | {v.value:.16e} | {v.unit} | {v.uncertainty:.1e} |" for v in reference_values)
+    (output_folder / f"{sheet_name}.md").write_text(f"""# {sheet_title}
 
-{body}
+{problem_text}
 
 {reference_text}
 
@@ -57,4 +69,4 @@ def write(
 |---|---|---|---|
 {lines}
 """)
-    return values
+    return reference_values

@@ -34,19 +34,19 @@ r is the road, positive down; A_i [m], W_i [rad/m], P_i [rad] are the lines of `
 """
 
 
-def write(folder: Path) -> list[ReferenceValue]:
+def write(output_folder: Path) -> list[ReferenceValue]:
     """Write all four problem sheets with their input files; returns the reference values."""
     return [
-        *write_road_sheet(folder),
-        *(value for make in FORCE_PROBLEMS for value in write_force_sheet(make(False), folder)),
+        *write_road_sheet(output_folder),
+        *(value for make in FORCE_PROBLEMS for value in write_force_sheet(make(False), output_folder)),
     ]
 
 
-def write_road_sheet(folder: Path) -> list[ReferenceValue]:
+def write_road_sheet(output_folder: Path) -> list[ReferenceValue]:
     """Write the problem sheet of the vehicle on the study road; returns the reference values."""
     problem, road = road_excited.problem(False), study_road()
     write_columns(
-        folder,
+        output_folder,
         "road",
         ("amplitude [m]", "wavenumber [rad/m]", "phase [rad]"),
         np.column_stack([road.amplitude, road.wavenumber, road.phase]),
@@ -57,7 +57,7 @@ def write_road_sheet(folder: Path) -> list[ReferenceValue]:
     )
     sure = np.max([np.abs(other_solution - true) for other_solution in other_solutions], axis=0)
     return write_page(
-        folder,
+        output_folder,
         "road",
         problem.title,
         f"{EQUATIONS_TEXT}{ROAD_FORCES_TEXT}\n{_parameters_and_start(problem)}",
@@ -67,65 +67,67 @@ def write_road_sheet(folder: Path) -> list[ReferenceValue]:
     )
 
 
-def write_force_sheet(problem: ForceExcited, folder: Path) -> list[ReferenceValue]:
+def write_force_sheet(priced_problem: ForceExcited, output_folder: Path) -> list[ReferenceValue]:
     """Write the problem sheet and the input file of a vehicle under wheel forces; returns the reference values."""
-    signal, guided = problem.assembly.input, bool(problem.assembly.guided)
+    signal, guided = priced_problem.assembly.input, bool(priced_problem.assembly.guided)
     assert signal is not None
     heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
     sample_times = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     inputs = signal.sample(0.0, SAMPLE_PERIOD, len(sample_times))[:, : len(heads) - 1]
-    write_columns(folder, problem.key, heads, np.column_stack([sample_times, inputs]))
+    write_columns(output_folder, priced_problem.key, heads, np.column_stack([sample_times, inputs]))
     return write_page(
-        folder,
-        problem.key,
-        problem.title,
-        _sheet_text(problem, guided),
+        output_folder,
+        priced_problem.key,
+        priced_problem.title,
+        _sheet_text(priced_problem, guided),
         f"End values at {DURATION:g} s "
-        f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
-        final_values(problem),
+        f"({priced_problem.reference}); the uncertainty is the largest difference of the two over the run.",
+        final_values(priced_problem),
     )
 
 
-def final_values(problem: ForceExcited) -> list[ReferenceValue]:
+def final_values(priced_problem: ForceExcited) -> list[ReferenceValue]:
     """Reference values of all final states; the uncertainty is the largest difference between two reference solvers
     over the run."""
     runs = [
-        build("reference", problem.assembly, settings).run()
+        build("reference", priced_problem.assembly, settings).run()
         for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12))
     ]
     true, other_states = (run.states[:: (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)] for run in runs)
-    return _reference_values(problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
+    return _reference_values(priced_problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
 
 
-def _reference_values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[ReferenceValue]:
+def _reference_values(
+    problem_name: str, time: float, final_states: np.ndarray, uncertainties: np.ndarray
+) -> list[ReferenceValue]:
     return [
-        ReferenceValue(key, *entry[:2], time, *map(float, entry[2:]))
-        for entry in zip(STATE_NAMES, STATE_UNITS, states, uncertainties, strict=True)
+        ReferenceValue(problem_name, *entry[:2], time, *map(float, entry[2:]))
+        for entry in zip(STATE_NAMES, STATE_UNITS, final_states, uncertainties, strict=True)
     ]
 
 
-def _parameters_and_start(problem: ForceExcited | road_excited.RoadExcited) -> str:
+def _parameters_and_start(priced_problem: ForceExcited | road_excited.RoadExcited) -> str:
     """Text of a problem's parameters and initial state."""
-    numbers = ", ".join(f"{name} = {value!r}" for name, value in problem.assembly.parameters)
+    numbers = ", ".join(f"{name} = {value!r}" for name, value in priced_problem.assembly.parameters)
     start = ", ".join(
-        f"{name} = {value:.16e}" for name, value in zip(STATE_NAMES, problem.assembly.initial, strict=True)
+        f"{name} = {value:.16e}" for name, value in zip(STATE_NAMES, priced_problem.assembly.initial, strict=True)
     )
     return f"Parameters (SI): {numbers}.\n\nStart: {start}."
 
 
-def _sheet_text(problem: ForceExcited, guided: bool) -> str:
+def _sheet_text(priced_problem: ForceExcited, is_guided: bool) -> str:
     pitch = (
         " The pitch is a quintic spline through its samples (not-a-knot at both ends), prescribed; M is the "
         "moment that this takes."
-        if guided
+        if is_guided
         else " M is zero."
     )
-    question = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
-    return f"""{problem.note}
+    question = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in priced_problem.units.items())
+    return f"""{priced_problem.note}
 {EQUATIONS_TEXT}
-{_parameters_and_start(problem)}
+{_parameters_and_start(priced_problem)}
 
-Input: `{problem.key}.csv`; between samples, forces are linear.{pitch}
+Input: `{priced_problem.key}.csv`; between samples, forces are linear.{pitch}
 
 Asked for: {question}, at the samples up to {DURATION:g} s. Steps should end on the samples, where the
 input has kinks."""

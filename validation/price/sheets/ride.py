@@ -10,13 +10,13 @@ from validation.price.sheets.page import ReferenceValue, write_matrices
 from validation.price.sheets.page import write as write_page
 
 
-def write(folder: Path) -> list[ReferenceValue]:
-    """Write the problem sheet and its matrices into ``folder``; returns the reference standard deviation of each
+def write(output_folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet and its matrices into ``output_folder``; returns the reference standard deviation of each
     output."""
     problem = ride.problem()
     vehicle = problem.vehicle
     write_matrices(
-        folder,
+        output_folder,
         "ride",
         {
             "M": vehicle.mass,
@@ -27,15 +27,15 @@ def write(folder: Path) -> list[ReferenceValue]:
             **dict(zip("AVPHE", vehicle.read, strict=True)),
         },
     )
-    sure = problem.truth * max(
-        0.5 * problem.uncertainty, float(np.abs(ride.lyapunov_deviations(problem) / problem.truth - 1).max())
+    sure = problem.true_deviations * max(
+        0.5 * problem.uncertainty, float(np.abs(ride.lyapunov_deviations(problem) / problem.true_deviations - 1).max())
     )
     values = [
         ReferenceValue("ride", output.name, output.unit, 0.0, *map(float, known))
-        for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)
+        for output, *known in zip(vehicle.outputs, problem.true_deviations, sure, strict=True)
     ]
     write_page(
-        folder,
+        output_folder,
         "ride",
         f"Standard deviations of a passenger car of 19 freedoms at {ride.SPEED:g} m/s",
         _sheet_text(problem),

@@ -56,7 +56,7 @@ with k = 1 .. {SINE_COUNT}. Start: all coordinates and rates are 0.
 """
 
 
-def write(folder: Path) -> list[ReferenceValue]:
+def write(output_folder: Path) -> list[ReferenceValue]:
     """Write the problem sheet; returns the reference values of all final coordinates and rates."""
     problem = free_vehicle.problem(False)
     sure = np.abs(problem.states - problem.other_states).max(axis=0)
@@ -69,7 +69,7 @@ def write(folder: Path) -> list[ReferenceValue]:
         f"every {1e3 * free_vehicle.COMPARED_GRID:g} ms."
     )
     return write_page(
-        folder,
+        output_folder,
         "vehicle",
         problem.title,
         f"{LAWS}\n{_parameter_tables(problem.vehicle)}\n\n{question}",
@@ -79,11 +79,11 @@ def write(folder: Path) -> list[ReferenceValue]:
     )
 
 
-def _names_and_units_of_states(problem: FreeVehicle) -> list[tuple[str, str]]:
+def _names_and_units_of_states(priced_problem: FreeVehicle) -> list[tuple[str, str]]:
     """Names and units of the coordinates, then of their rates."""
     coordinates = [
         (f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
-        for body, freedom in problem.vehicle.coordinates()
+        for body, freedom in priced_problem.vehicle.coordinates()
     ]
     return coordinates + [(f"{name} rate", f"{unit}/s") for name, unit in coordinates]
 
@@ -139,7 +139,7 @@ def _parameter_tables(vehicle: SpatialVehicle) -> str:
     return "\n\n".join(_markdown_table(heads, rows) for heads, rows in parts.items())
 
 
-def _markdown_table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+def _markdown_table(headings: tuple[str, ...], table_rows: Sequence[Sequence[Any]]) -> str:
     """Markdown text of a table; its numbers have all digits."""
-    text_rows = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
+    text_rows = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in table_rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (headings, ("---",) * len(headings), *text_rows))

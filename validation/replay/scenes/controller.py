@@ -9,7 +9,7 @@ class Releases:
     """Controller that releases slipping wheels and else applies. ``below``: ratio of a wheel's rim speed to the fastest
     one's below which it counts as slipping."""
 
-    def __init__(self, wheels, below=0.8):
+    def __init__(self, wheel_count, below=0.8):
         self.below = below
 
     def sample(self, sensor_sample):

@@ -98,12 +98,12 @@ def _random_brakes(generator: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _random_procedure(generator: np.random.Generator, surface: str) -> dict[str, Any]:
+def _random_procedure(generator: np.random.Generator, surface_name: str) -> dict[str, Any]:
     kind, speed = str(generator.choice(["straight", "split", "turn", "j_turn"])), generator.uniform(5.0, 20.0)
     radius = generator.choice([-1.0, 1.0]) * max(
-        speed**2 / (SURFACES[surface] * 9.81 * generator.uniform(0.2, 0.6)), 25.0
+        speed**2 / (SURFACES[surface_name] * 9.81 * generator.uniform(0.2, 0.6)), 25.0
     )
-    other_surface = str(generator.choice([name for name in SURFACES if name != surface]))
+    other_surface = str(generator.choice([name for name in SURFACES if name != surface_name]))
     of_kind = {
         "split": {"right": other_surface},
         "turn": {"radius": radius},
@@ -140,8 +140,8 @@ def counting_steps() -> Iterator[list[float]]:
     """Context that yields a list, to which every braking run within it adds its number of steps."""
     calls, march = list[float](), BrakedVehicle.run
 
-    def counting(vehicle: BrakedVehicle, *arguments: Any) -> BrakingPath:
-        path = march(vehicle, *arguments)
+    def counting(vehicle: BrakedVehicle, *march_arguments: Any) -> BrakingPath:
+        path = march(vehicle, *march_arguments)
         calls.append(float(vehicle.substeps * (len(path.times) - 1)))
         return path
 

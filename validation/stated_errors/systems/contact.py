@@ -69,7 +69,7 @@ def _sample_of_contact(scene: ContactScene) -> Sample:
 
 
 def _forces_of_motion(
-    body: RollingContact, motion: tuple[float, float, float], cells: int
+    rolling_contact: RollingContact, creepages_and_spin: tuple[float, float, float], cell_count: int
 ) -> tuple[float, float, float]:
-    forces = body.roll(motion, cells)
+    forces = rolling_contact.roll(creepages_and_spin, cell_count)
     return forces.fx, forces.fy, forces.mz

@@ -91,15 +91,15 @@ def _run_with_error(scene: HubScene, engine: str) -> Result:
         return error.partial
 
 
-def _true_errors(scene: HubScene, engine: str, stated_result: Result, names: list[str]) -> dict[str, float]:
-    """True root mean square error of each channel in ``names``, by a finer measurement and run."""
+def _true_errors(scene: HubScene, engine: str, stated_result: Result, channel_names: list[str]) -> dict[str, float]:
+    """True root mean square error of each channel in ``channel_names``, by a finer measurement and run."""
     fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER_STEPS})})
     vehicle = scene.cut_vehicle()
     truth, stated = (
         principal_series(vehicle, run(fine, engine).detail).channels,
         principal_series(vehicle, stated_result.detail).channels,
     )
-    return {name: float(np.sqrt(np.mean((stated[name] - truth[name][::FINER_STEPS]) ** 2))) for name in names}
+    return {name: float(np.sqrt(np.mean((stated[name] - truth[name][::FINER_STEPS]) ** 2))) for name in channel_names}
 
 
 @contextmanager

@@ -59,10 +59,10 @@ def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
+def _sample_of_recording(scene_table: dict[str, Any], engine: str) -> Sample:
     """Sample from the run of a recording with its stated error; the true error is computed by a finer measurement and
     run."""
-    scene = build(table, "drawn.toml")
+    scene = build(scene_table, "drawn.toml")
     with counting_force_calls() as calls:
         try:
             stated_run = run(scene, engine, error=True)
@@ -70,18 +70,19 @@ def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
             if error.partial is None:
                 raise
             stated_run = error.partial
-    virtual = table["virtual"] | {"step": table["virtual"]["step"] / FINER_STEPS}
+    virtual = scene_table["virtual"] | {"step": scene_table["virtual"]["step"] / FINER_STEPS}
     truth = run(
-        build(table | {"virtual": virtual, "run": {"step": 1.0 / (FINER_STEPS * virtual["sampling_rate"])}}), engine
+        build(scene_table | {"virtual": virtual, "run": {"step": 1.0 / (FINER_STEPS * virtual["sampling_rate"])}}),
+        engine,
     )
-    steps = 4.0 * (round(virtual["duration"] / table["virtual"]["step"]) + stated_run.counts()["steps"])
-    title = f"{table['title']}, {table['stabilise']['method']}"
+    steps = 4.0 * (round(virtual["duration"] / scene_table["virtual"]["step"]) + stated_run.counts()["steps"])
+    title = f"{scene_table['title']}, {scene_table['stabilise']['method']}"
     return Sample(title, engine, errors_of(stated_run), _true_errors(stated_run, truth), steps, sum(calls) - steps)
 
 
-def _true_errors(stated_result: Result, truth: Result) -> dict[str, float]:
+def _true_errors(stated_result: Result, fine_result: Result) -> dict[str, float]:
     """True root mean square error of every channel whose error is stated, against a finer run."""
-    mine, fine = (run_result.detail.outcome for run_result in (stated_result, truth))
+    mine, fine = (run_result.detail.outcome for run_result in (stated_result, fine_result))
     return {
         name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))
         for name in errors_of(stated_result)

@@ -38,12 +38,12 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
         yield from random_samples(sample_count, [seed, 1], lambda generator: _sample_of_run(generator, Path(folder)))
 
 
-def _sample_of_run(generator: np.random.Generator, folder: Path) -> Sample:
+def _sample_of_run(generator: np.random.Generator, scene_folder: Path) -> Sample:
     """Sample from a random run; raises for an unstable step, and for an interpolation that the method cannot use."""
     engine = str(generator.choice(["reference", "exudyn", "mujoco"]))
     known = [name for name in CATALOGUE[engine] if (engine, name) not in UNAVAILABLE_INTEGRATORS]
     integrator = str(generator.choice(known))
-    scene = _random_scene(generator, folder, engine, integrator)
+    scene = _random_scene(generator, scene_folder, engine, integrator)
     with _count_force_calls() as calls:
         run = _run_with_error(scene, engine)
     truth = _reference_run(scene, engine)
@@ -72,12 +72,12 @@ def _reference_run(scene: Scene, engine: str) -> Result:
     return single.run(scene, "reference", Settings("RK4", step / finer, scene.run.duration))
 
 
-def _truth_at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
+def _truth_at(true_result: Result, channel_name: str, times: np.ndarray) -> np.ndarray:
     """Channel of the true solution at times (n,) in s: its rows, or a cubic spline if the times lie between them."""
-    rows = np.clip(np.searchsorted(truth.times, times - 1e-9), 0, len(truth.times) - 1)
-    if np.abs(truth.times[rows] - times).max() < 1e-9:
-        return truth[name][rows]
-    return CubicSpline(truth.times, truth[name])(times)
+    rows = np.clip(np.searchsorted(true_result.times, times - 1e-9), 0, len(true_result.times) - 1)
+    if np.abs(true_result.times[rows] - times).max() < 1e-9:
+        return true_result[channel_name][rows]
+    return CubicSpline(true_result.times, true_result[channel_name])(times)
 
 
 @contextmanager
@@ -86,8 +86,8 @@ def _count_force_calls() -> Iterator[list[float]]:
     calls: list[float] = []
     build_model = single.build
 
-    def counting(*asked: Any) -> Any:
-        model = build_model(*asked)
+    def counting(*build_arguments: Any) -> Any:
+        model = build_model(*build_arguments)
         march = model.run
 
         def run() -> Any:
@@ -102,7 +102,7 @@ def _count_force_calls() -> Iterator[list[float]]:
         yield calls
 
 
-def _random_scene(generator: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
+def _random_scene(generator: np.random.Generator, scene_folder: Path, engine: str, integrator_name: str) -> Scene:
     table: dict[str, Any] = {
         "title": "random",
         "vehicle": {
@@ -113,20 +113,20 @@ def _random_scene(generator: np.random.Generator, folder: Path, engine: str, int
         "run": {"duration": float(generator.choice([1.0, 2.0, 3.0]))},
     }
     tolerance = (
-        {"tolerance": float(10.0 ** generator.uniform(-11, -4))} if CATALOGUE[engine][integrator].adaptive else {}
+        {"tolerance": float(10.0 ** generator.uniform(-11, -4))} if CATALOGUE[engine][integrator_name].adaptive else {}
     )
-    table["engines"] = {engine: {"integrator": integrator, **tolerance}}
+    table["engines"] = {engine: {"integrator": integrator_name, **tolerance}}
     kind = str(generator.choice(["free", "road", "road", "road", "forces", "forces"]))
     if kind == "free":
         table["start"] = {"pitch": float(generator.uniform(-0.1, 0.1)), "z3": float(generator.uniform(-0.1, 0.1))}
         table["effects"] = _random_lift_off(generator)
     elif kind == "road":
-        table["effects"] = {"road": _random_road(generator, folder), **_random_lift_off(generator)}
+        table["effects"] = {"road": _random_road(generator, scene_folder), **_random_lift_off(generator)}
     else:
-        table["effects"] = _random_force_effects(generator, folder, table)
+        table["effects"] = _random_force_effects(generator, scene_folder, table)
     period = table.pop("period", None)
     table["run"]["step"] = _random_step(generator, table["run"]["duration"], period)
-    return build(table, "random.toml", folder)
+    return build(table, "random.toml", scene_folder)
 
 
 def _random_parameters(generator: np.random.Generator) -> dict[str, float]:
@@ -144,7 +144,7 @@ def _random_lift_off(generator: np.random.Generator) -> dict[str, Any]:
     return {"lift_off": {}} if generator.random() < 0.5 else {}
 
 
-def _random_road(generator: np.random.Generator, folder: Path) -> dict[str, Any]:
+def _random_road(generator: np.random.Generator, scene_folder: Path) -> dict[str, Any]:
     speed = float(generator.uniform(5.0, 35.0))
     source = str(generator.choice(["study", "hills", "iso8608", "csv"]))
     options: dict[str, Any] = {}
@@ -155,30 +155,32 @@ def _random_road(generator: np.random.Generator, folder: Path) -> dict[str, Any]
         stations = spacing * np.arange(round(20.0 / spacing) + 1)
         heights = np.cumsum(generator.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
         lines = [f"{s:.3f}, {h:.6f}, {h:.6f}" for s, h in zip(stations, heights - heights[0], strict=True)]
-        (folder / "road.csv").write_text("\n".join(["s [m], left [m], right [m]", *lines]) + "\n")
+        (scene_folder / "road.csv").write_text("\n".join(["s [m], left [m], right [m]", *lines]) + "\n")
         options = {"file": "road.csv", "beyond_end": "mirrored"}
     return {"source": source, "speed": speed, **options}
 
 
-def _random_force_effects(generator: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+def _random_force_effects(
+    generator: np.random.Generator, scene_folder: Path, scene_table: dict[str, Any]
+) -> dict[str, Any]:
     """Table of effects: wheel forces from a virtual measurement, sometimes with noise, often with a random
     stabiliser."""
-    period, duration = float(generator.choice(SAMPLING_PERIODS)), table["run"]["duration"]
+    period, duration = float(generator.choice(SAMPLING_PERIODS)), scene_table["run"]["duration"]
     road = {"source": "study", "speed": float(generator.uniform(8.0, 25.0))}
     on_road = build(
         {
-            **{key: table[key] for key in ("title", "vehicle")},
+            **{key: scene_table[key] for key in ("title", "vehicle")},
             "run": {"duration": duration, "step": 2e-4},
             "effects": {"road": road, "lift_off": {}},
         },
         "measured.toml",
     )
     measured = measure(on_road)
-    write_measurement(measured, folder, period)
+    write_measurement(measured, scene_folder, period)
     stride = round(period / 2e-4)
     both_columns = {"z3": ("m", measured["z3"][::stride]), "pitch": ("rad", measured["pitch"][::stride])}
-    write_time_series(folder / "both.csv", both_columns, period)
-    table["period"] = period
+    write_time_series(scene_folder / "both.csv", both_columns, period)
+    scene_table["period"] = period
     rule = str(generator.choice(["held", "linear", "smooth"]))
     forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(generator.choice(["inertial", "body"]))}
     noise = (

@@ -48,7 +48,9 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
         yield kinds[i % len(kinds)](rng, i)
 
 
-def _random_scene(generator: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
+def _random_scene(
+    generator: np.random.Generator, vehicle_file: str, output_point: str = "unloaded", **scene_tables: Any
+) -> RideScene:
     """Ride scene of a vehicle file with a random level, random corners and sometimes a random cutoff of the road."""
     road = {
         "level": float(10 ** generator.uniform(-6.0, -4.3)),
@@ -56,8 +58,10 @@ def _random_scene(generator: np.random.Generator, file: str, point: str = "unloa
         "corner_roll": float(generator.uniform(0.6, 3.0)),
     }
     road |= {"cutoff": float(generator.uniform(8.0, 40.0))} if generator.random() < 0.5 else {}
-    vehicle = {"file": file, "operating_point": point}
-    return build({"title": "a sample", "system": "ride", "vehicle": vehicle, "road": road, **tables}, "sample.toml")
+    vehicle = {"file": vehicle_file, "operating_point": output_point}
+    return build(
+        {"title": "a sample", "system": "ride", "vehicle": vehicle, "road": road, **scene_tables}, "sample.toml"
+    )
 
 
 def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
@@ -71,10 +75,15 @@ def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> 
 
 
 def _sample_of(
-    result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra_calls: float
+    ride_result: Result,
+    sample_name: str,
+    engine: str,
+    true_errors: Mapping[str, float],
+    call_count: float,
+    extra_call_count: float,
 ) -> Sample:
-    estimates = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true_errors}
-    return Sample(name, engine, estimates, true_errors, calls, extra_calls)
+    estimates = {channel: estimate for channel, estimate in errors_of(ride_result).items() if channel in true_errors}
+    return Sample(sample_name, engine, estimates, true_errors, call_count, extra_call_count)
 
 
 def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Sample:
@@ -94,19 +103,25 @@ def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Samp
     )
 
 
-def exact_deviations(linear_vehicle: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
+def exact_deviations(linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float) -> np.ndarray:
     """Standard deviations (p,) of the outputs of a linear vehicle with undamped tyres, computed in extended
     precision."""
-    system, n, m = vehicle_with_road(linear_vehicle, road, speed), len(linear_vehicle.mass), len(road.F)
+    system, n, m = (
+        vehicle_with_road(linear_vehicle, road_excitation, speed),
+        len(linear_vehicle.mass),
+        len(road_excitation.F),
+    )
     A, C = system.A.astype(np.longdouble), system.C.astype(np.longdouble)
-    forces = np.hstack([linear_vehicle.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
+    forces = np.hstack(
+        [linear_vehicle.road_stiffness.astype(np.longdouble) @ heights for heights in road_excitation.heights]
+    )
     wanted = np.hstack([-linear_vehicle.stiffness, -linear_vehicle.damping, forces])
     for _ in range(3):
         left = wanted - linear_vehicle.mass.astype(np.longdouble) @ A[n : 2 * n]
         A[n : 2 * n] += np.linalg.solve(linear_vehicle.mass, left.astype(float))
-    A[2 * n :, 2 * n :] = np.kron(np.eye(len(road.heights)), speed * road.F.astype(np.longdouble)).reshape(
-        len(road.heights) * m, -1
-    )
+    A[2 * n :, 2 * n :] = np.kron(
+        np.eye(len(road_excitation.heights)), speed * road_excitation.F.astype(np.longdouble)
+    ).reshape(len(road_excitation.heights) * m, -1)
     C += linear_vehicle.read.acceleration_factors @ (A - system.A)[n : 2 * n]
     met = noise_arrivals(system)
     earlier_response, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
@@ -122,10 +137,10 @@ def exact_deviations(linear_vehicle: LinearVehicle, road: Excitation, speed: flo
     return np.sqrt(np.einsum("pi,ij,pj->p", C, P, C)).astype(float)
 
 
-def _exponential(A: np.ndarray) -> np.ndarray:
+def _exponential(matrix: np.ndarray) -> np.ndarray:
     """Matrix exponential e^A in extended precision: series of a small fraction of A, then squaring."""
-    halvings = max(0, int(np.ceil(np.log2(float(abs(A).sum(axis=1).max()) + 1e-30))) + 1)
-    small, term = A / 2**halvings, np.eye(len(A), dtype=np.longdouble)
+    halvings = max(0, int(np.ceil(np.log2(float(abs(matrix).sum(axis=1).max()) + 1e-30))) + 1)
+    small, term = matrix / 2**halvings, np.eye(len(matrix), dtype=np.longdouble)
     total = term.copy()
     for k in range(1, 30):
         term = term @ small / k
@@ -224,11 +239,18 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
 
 
 def _road_path_of_run(
-    scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: RunSampling, road: Excitation, speed: float
+    scene: RideScene,
+    engine: str,
+    vehicle: SpatialVehicle,
+    sampling: RunSampling,
+    road_excitation: Excitation,
+    speed: float,
 ) -> RoadPath:
     """Road path with the step that ``in_engine`` uses."""
     from models.ride.nonlinear_copies import longest_resolving_step
     from models.ride.road_path import road_path
     from models.systems.ride.nonlinear import LONGEST_TIME_STEP
 
-    return road_path(road, speed, min(sampling.step or LONGEST_TIME_STEP, longest_resolving_step(vehicle, speed)))
+    return road_path(
+        road_excitation, speed, min(sampling.step or LONGEST_TIME_STEP, longest_resolving_step(vehicle, speed))
+    )

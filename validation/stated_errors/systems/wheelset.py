@@ -87,10 +87,10 @@ def _count_of_cells(scene: WheelsetScene) -> float:
 
 
 def _true_errors(
-    scene: WheelsetScene, run: Result, march_scene: Callable[[WheelsetScene], WheelsetPath]
+    scene: WheelsetScene, run_result: Result, march_scene: Callable[[WheelsetScene], WheelsetPath]
 ) -> Mapping[str, float]:
     """True root mean square errors of a run's channels: by shorter steps, and by more cells ("NAME of cells")."""
-    fine = principal_series(run.detail)
+    fine = principal_series(run_result.detail)
     true = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0 / FINER_STEPS))))
     if scene.contact.law == "linear":
         return true
@@ -99,9 +99,9 @@ def _true_errors(
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 
-def _rms_differences(fine_series: Series, truth: Series) -> dict[str, float]:
-    rows = nearest_rows(truth.times, fine_series.times)
+def _rms_differences(fine_series: Series, true_series: Series) -> dict[str, float]:
+    rows = nearest_rows(true_series.times, fine_series.times)
     return {
-        name: float(np.sqrt(np.mean((values - truth.channels[name][rows]) ** 2)))
+        name: float(np.sqrt(np.mean((values - true_series.channels[name][rows]) ** 2)))
         for name, values in fine_series.channels.items()
     }
